@@ -1,0 +1,71 @@
+"""Composition root of the command line: verbs as lazy "module:attribute" strings, so that --help imports nothing."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+import click
+
+from flagdata.console import fail
+from flagdata.errors import FlagdataError
+
+# verb → (where its click command is, one line of help shown without importing it)
+VERBS: dict[str, tuple[str, str]] = {
+    "init": ("flagdata.commands.lake:init", "Create an empty lake."),
+    "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
+    "align": ("flagdata.commands.align:align", "Put a camera and an anemometer on one clock: a recording."),
+    "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
+    "ls": ("flagdata.commands.lake:ls", "List artifacts."),
+    "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
+    "log": ("flagdata.commands.lake:log", "List commits."),
+    "tag": ("flagdata.commands.lake:tag", "Name a version for good."),
+    "branch": ("flagdata.commands.lake:branch", "Create or list lines of work."),
+    "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
+    "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
+    "export": ("flagdata.commands.export:export", "Write WebDataset, Parquet, MP4 + CSV or MCAP subsets."),
+    "verify": ("flagdata.commands.lake:verify", "Re-hash every object."),
+    "doctor": ("flagdata.commands.lake:doctor", "Find and explain what is wrong with a lake."),
+    "gc": ("flagdata.commands.lake:gc", "Delete what nothing refers to."),
+    "recover": ("flagdata.commands.lake:recover", "Salvage a record that was cut off."),
+    "demo": ("flagdata.commands.demo:demo", "Make a small field recording and take it through everything."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are run."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        module, _, attribute = VERBS[cmd_name][0].partition(":")
+        return getattr(import_module(module), attribute)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(verb, about) for verb, (_, about) in VERBS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="flagdata")
+def root() -> None:
+    """Measure the physics of cloth in the wind from video and anemometer logs."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit: 0 done, 1 failed, 2 usage, 3 a gate not met."""
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        root.main(args=given, prog_name="flagdata", standalone_mode=False)
+    except FlagdataError as error:
+        sys.exit(fail(error, as_json="--json" in given))
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("flagdata: interrupted", err=True)
+        sys.exit(1)
+    sys.exit(0)

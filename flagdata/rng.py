@@ -1,0 +1,24 @@
+"""Randomness by named streams from one seed, so that a new camera draw does not move the gusts."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+
+def stream(seed: int, *names: str | int) -> np.random.Generator:
+    """A generator that depends on `seed` and the path of `names` alone.
+
+    `stream(7, "sequence", 12, "wind")` is the same whatever other streams were drawn, and in what order. The names are
+    hashed (SHA-256) into a `SeedSequence`'s entropy; the bit generator is PCG64DXSM.
+    """
+    path = "\x1f".join(f"{type(name).__name__}:{name}" for name in names)
+    digest = hashlib.sha256(path.encode()).digest()
+    words = np.frombuffer(digest, dtype="<u4").tolist()
+    return np.random.Generator(np.random.PCG64DXSM(np.random.SeedSequence([seed & (2**64 - 1), *words])))
+
+
+def child_seed(seed: int, *names: str | int) -> int:
+    """A 63-bit seed for a library that wants an integer, from the same named stream."""
+    return int(stream(seed, *names).integers(0, 2**63 - 1))

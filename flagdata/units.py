@@ -1,0 +1,92 @@
+"""Conversion of the units found in sensor files to SI, in one table.
+
+Inside the package every quantity is SI and angles are radians (no unit suffix on names). A file's unit enters here and
+nowhere else. Factors are exact by definition (BIPM SI Brochure, 9th ed.; international knot 1852 m/h, foot 0.3048 m).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flagdata.errors import UnknownNameError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """A unit of a file: `si_value = value * scale + offset`, in the SI unit named by `si`."""
+
+    si: str
+    scale: float
+    offset: float = 0.0
+
+    def to_si(self, value: ArrayLike) -> NDArray[np.float64]:
+        """Convert values of this unit to SI; shape kept."""
+        return np.asarray(value, dtype=np.float64) * self.scale + self.offset
+
+    def from_si(self, value: ArrayLike) -> NDArray[np.float64]:
+        """Convert SI values to this unit; shape kept."""
+        return (np.asarray(value, dtype=np.float64) - self.offset) / self.scale
+
+
+UNITS: dict[str, Unit] = {
+    "m/s": Unit(si="m/s", scale=1.0),
+    "km/h": Unit(si="m/s", scale=1 / 3.6),
+    "kn": Unit(si="m/s", scale=1852 / 3600),
+    "mph": Unit(si="m/s", scale=0.44704),
+    "ft/s": Unit(si="m/s", scale=0.3048),
+    "ft/min": Unit(si="m/s", scale=0.3048 / 60),
+    "rad": Unit(si="rad", scale=1.0),
+    "deg": Unit(si="rad", scale=math.pi / 180),
+    "K": Unit(si="K", scale=1.0),
+    "degC": Unit(si="K", scale=1.0, offset=273.15),
+    "degF": Unit(si="K", scale=5 / 9, offset=273.15 - 32 * 5 / 9),
+    "Pa": Unit(si="Pa", scale=1.0),
+    "hPa": Unit(si="Pa", scale=100.0),
+    "kPa": Unit(si="Pa", scale=1000.0),
+    "inHg": Unit(si="Pa", scale=3386.389),
+    "1": Unit(si="1", scale=1.0),
+    "%": Unit(si="1", scale=0.01),
+    "m": Unit(si="m", scale=1.0),
+    "mm": Unit(si="m", scale=1e-3),
+    "cm": Unit(si="m", scale=1e-2),
+    "ft": Unit(si="m", scale=0.3048),
+    "s": Unit(si="s", scale=1.0),
+    "ms": Unit(si="s", scale=1e-3),
+}
+
+# Spellings seen in instrument exports, lower-cased and without blanks, → the table's name. Beaufort is left out on
+# purpose: it is an interval scale of classes, not a unit.
+SPELLINGS: dict[str, str] = {
+    "mps": "m/s", "ms-1": "m/s", "m.s-1": "m/s", "meters/sec": "m/s", "meter/sec": "m/s",
+    "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h",
+    "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn",
+    "mi/h": "mph", "miles/hour": "mph",
+    "fps": "ft/s", "fpm": "ft/min",
+    "°": "deg", "º": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg",
+    "°c": "degC", "ºc": "degC", "c": "degC", "celsius": "degC", "degc": "degC", "deg_c": "degC",
+    "°f": "degF", "ºf": "degF", "f": "degF", "fahrenheit": "degF", "degf": "degF", "deg_f": "degF",
+    "k": "K", "kelvin": "K",
+    "mb": "hPa", "mbar": "hPa", "hpa": "hPa", "kpa": "kPa", "pa": "Pa", "inhg": "inHg",
+    "percent": "%", "%rh": "%",
+}  # fmt: skip
+
+
+def unit(text: str, *, where: str | None = None) -> Unit:
+    """The unit that a file spells as `text`.
+
+    Raises:
+        UnknownNameError: with the nearest known spelling.
+    """
+    stripped = text.strip()
+    if stripped in UNITS:
+        return UNITS[stripped]
+    key = stripped.lower().replace(" ", "")
+    if key in UNITS:
+        return UNITS[key]
+    if key in SPELLINGS:
+        return UNITS[SPELLINGS[key]]
+    raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
