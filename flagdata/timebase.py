@@ -106,8 +106,8 @@ def parse(text: str, *, default: tzinfo | None = None, where: str | None = None)
         raise TimeError(f"{text!r} is not an ISO 8601 time", where=where, fix="write it as 2026-05-01T12:00:00+02:00")
     year, month, day, hour, minute, second, fraction, offset = match.groups()
     try:
-        numbers = (int(part or 0) for part in (year, month, day, hour, minute, second))
-        wall = datetime(*numbers)  # noqa: DTZ001 - a wall-clock time; the zone is attached below
+        # A wall-clock time: its zone is attached below.
+        wall = datetime(int(year), int(month), int(day), int(hour or 0), int(minute or 0), int(second or 0))  # noqa: DTZ001
     except ValueError as error:
         raise TimeError(f"{text!r}: {error}", where=where, fix="correct the date") from None
     nanosecond = int((fraction or "").ljust(9, "0"))
