@@ -1,0 +1,251 @@
+"""`flagdata query`: rows of the catalog by filter or SQL, at any version."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from datetime import date, datetime, time
+from decimal import Decimal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.console import document, json_option, lake_option, say, table
+from flagdata.errors import ConflictError, InputError, UsageError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from flagdata.query import Request, Selection
+
+PEOPLE_LIMIT = 20
+_SHORT = 12  # characters of an identity; look-ups take unique prefixes
+
+# What people see without --columns, by the one kind that was selected.
+VIEWS: dict[str | None, tuple[str, ...]] = {
+    "camera": ("artifact", "name", "start_time", "duration", "frame_count", "rate", "quality"),
+    "wind": ("artifact", "name", "start_time", "duration", "rate", "quality"),
+    "recording": (
+        "artifact", "name", "start_time", "duration", "frame_count",
+        "clock_method", "clock_offset", "clock_sigma", "quality",
+    ),
+    "clip": (
+        "artifact", "recording", "start_time", "frame_first", "frame_count",
+        "wind", "wind_sigma", "wind_coverage", "wind_staleness", "quality",
+    ),
+    "meshes": ("artifact", "name", "frame_count", "rate", "seed", "wind", "quality"),
+    "model": ("artifact", "name", "created", "code_version", "quality"),
+    "measurement": ("artifact", "name", "created", "wind", "wind_sigma", "quality"),
+    None: ("artifact", "kind", "name", "start_time", "duration", "wind", "wind_sigma", "quality"),
+}  # fmt: skip
+
+
+@click.command()
+@click.option("--where", metavar="EXPR", help="SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\".")
+@click.option("--sql", metavar="SELECT", help="One whole SELECT over the table catalog, instead of --where.")
+@click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
+@click.option("--columns", metavar="A,B", help="Columns wanted, in order.")
+@click.option("--order", metavar="TERMS", help='SQL order, e.g. "wind desc, start".')
+@click.option(
+    "--limit", type=click.IntRange(min=0), help=f"Rows at most; {PEOPLE_LIMIT} in the table for people, else all."
+)
+@click.option("--arrow", metavar="FILE", type=click.Path(path_type=Path), help="Write an Arrow IPC file.")
+@click.option("--csv", "as_csv", is_flag=True, help="Comma-separated values on stdout.")
+@click.option("--describe", is_flag=True, help="List the columns with their units.")
+@json_option
+@lake_option
+def query(
+    where: str | None,
+    sql: str | None,
+    at: str | None,
+    columns: str | None,
+    order: str | None,
+    limit: int | None,
+    arrow: Path | None,
+    as_csv: bool,
+    describe: bool,
+    as_json: bool,
+    lake_path: str,
+) -> None:
+    """Select rows of the catalog by filter or SQL.
+
+    The SQL is DuckDB's, over one read-only table, catalog. Times are compared through start_time and end_time:
+
+    \b
+      flagdata query --where "kind = 'clip' and wind between 3 and 6" --order "wind desc"
+      flagdata query --where "start_time >= '2026-05-01 12:00+02:00'" --columns name,wind,wind_sigma
+      flagdata query --sql "select session, count(*) n, avg(wind) wind from catalog group by session" --json
+    """
+    if sum((as_json, as_csv, arrow is not None)) > 1:
+        raise UsageError("more than one form of output", fix="choose one of --json, --csv and --arrow")
+    if describe:
+        _describe(as_json=as_json)
+        return
+    from flagdata.lake import Lake
+    from flagdata.query import Request, Selection
+
+    lake = Lake.open(lake_path)
+    version = lake.resolve(at)
+    names = None if columns is None else tuple(name.strip() for name in columns.split(","))
+    request = Request(where=where, sql=sql, columns=names, order=order, limit=limit)
+    catalog = lake.rows(at=str(version))
+    if arrow is not None:
+        count = write_arrow(Selection(catalog, request), arrow)
+        say(f"{count:,} rows of version {version} → {arrow}")
+    elif as_csv:
+        _print_csv(Selection(catalog, request))
+    elif as_json:
+        document("query", as_document(Selection(catalog, request), at=at, version=version))
+    else:
+        _print_table(catalog, request)
+
+
+def write_arrow(selection: Selection, path: Path) -> int:
+    """Stream a selection into a new Arrow IPC file; the file appears whole or not at all. Returns the rows written.
+
+    Raises:
+        ConflictError: the file is there already.
+        InputError: its folder is not.
+    """
+    import pyarrow as pa
+
+    if path.exists():
+        raise ConflictError(f"{path} exists", fix="choose another name or remove it")
+    if not path.absolute().parent.is_dir():
+        raise InputError("no such folder", where=str(path.parent), fix="create it first")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    count = 0
+    try:
+        batches = selection.batches()
+        with pa.OSFile(str(partial), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
+            for batch in batches:
+                writer.write_batch(batch)
+                count += batch.num_rows
+        partial.rename(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return count
+
+
+def as_document(selection: Selection, *, at: str | None, version: int) -> dict[str, Any]:
+    """The JSON form: columns with type and unit, rows, and what JSON cannot say.
+
+    JSON has no NaN or infinity: such cells are null, and `not_finite` counts them by column.
+    """
+    result = selection.table()
+    fields = [
+        {"name": f.name, "type": str(f.type), "unit": (f.metadata or {}).get(b"unit", b"").decode() or None}
+        for f in result.schema
+    ]
+    names = [field["name"] for field in fields]
+    if len(set(names)) < len(names):
+        raise UsageError("two columns of one name", fix="name them apart in the SQL, by AS")
+    not_finite: dict[str, int] = {}
+    rows = []
+    for source in result.to_pylist():
+        row = {name: plain(value) for name, value in source.items()}
+        for name, value in row.items():
+            if isinstance(value, float) and not math.isfinite(value):
+                row[name] = None
+                not_finite[name] = not_finite.get(name, 0) + 1
+        rows.append(row)
+    return {
+        "at": at, "version": version, "where": selection.request.where, "sql": selection.request.sql,
+        "count": len(rows), "total": selection.total(), "columns": fields, "not_finite": not_finite, "rows": rows,
+    }  # fmt: skip
+
+
+def plain(value: Any) -> Any:
+    """A cell as what JSON and CSV can hold; times as ISO 8601.
+
+    Raises:
+        UsageError: a type with no such form (bytes, intervals).
+    """
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, datetime):
+        return value.isoformat().replace("+00:00", "Z")
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if isinstance(value, Decimal):
+        return int(value) if value == value.to_integral_value() else float(value)
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    raise UsageError(
+        f"a value of type {type(value).__name__} has no form in text", fix="cast it in the SQL, or write it by --arrow"
+    )
+
+
+def _print_csv(selection: Selection) -> None:
+    batches = selection.batches()
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(batches.schema.names)
+    for batch in batches:
+        cells = [[_csv_cell(value) for value in column.to_pylist()] for column in batch.columns]
+        writer.writerows(zip(*cells, strict=True))
+
+
+def _csv_cell(value: Any) -> Any:
+    value = plain(value)
+    return ";".join(str(item) for item in value) if isinstance(value, list) else value
+
+
+def _print_table(catalog: pa.Table, request: Request) -> None:
+    from dataclasses import replace
+
+    from flagdata.query import Selection
+
+    if request.sql is None and request.columns is None:
+        kinds = Selection(catalog, replace(request, columns=("kind",), limit=None)).table()["kind"].unique().to_pylist()
+        shown = replace(request, columns=VIEWS[kinds[0] if len(kinds) == 1 else None])
+        short = True
+    else:
+        shown, short = request, False
+    if shown.limit is None:
+        shown = replace(shown, limit=PEOPLE_LIMIT)
+    selection = Selection(catalog, shown)
+    result, total = selection.table(), selection.total()
+    if not total:
+        say(f"no rows of {catalog.num_rows:,} match")
+        return
+    header = [f"{f.name} [{unit}]" if (unit := _unit(f)) else f.name for f in result.schema]
+    columns = [[_cell(value, short=short) for value in column.to_pylist()] for column in result.columns]
+    table(header, zip(*columns, strict=True))
+    if result.num_rows < total:
+        say(f"{result.num_rows:,} of {total:,} rows; more by --limit")
+
+
+def _unit(field: pa.Field) -> str:
+    unit = (field.metadata or {}).get(b"unit", b"").decode()
+    return "" if unit == "1" else unit
+
+
+def _cell(value: Any, *, short: bool) -> str | None:
+    """A cell for people: floats to 4 digits, lists by commas, identities cut in the default views only."""
+    value = plain(value)
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ",".join(str(item) for item in value)
+    if short and isinstance(value, str) and len(value) == 32 and not value.strip("0123456789abcdef"):
+        return value[:_SHORT]
+    return None if value is None else str(value)
+
+
+def _describe(*, as_json: bool) -> None:
+    from flagdata.query import COLUMNS
+
+    if as_json:
+        columns = [
+            {"name": name, "type": str(f.type), "unit": f.unit or None, "about": f.about} for name, f in COLUMNS.items()
+        ]
+        document("columns", {"columns": columns})
+        return
+    rows: Iterable[Sequence[object]] = [(name, str(f.type), f.unit, f.about) for name, f in COLUMNS.items()]
+    table(("column", "type", "unit", "about"), rows)

@@ -1,0 +1,243 @@
+"""Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, sealed off from everything else.
+
+SQL sees one table, `catalog`: the columns of `schema.CATALOG` and the derived ones of `DERIVED`. It cannot read or
+write files, load extensions, change settings or run more than one statement: a stranger's query is safe to run.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+import duckdb
+import pyarrow as pa
+
+from flagdata.errors import UnknownNameError, UsageError
+from flagdata.schema import CATALOG, Field, Kind
+
+# name → (what it is, SQL over the stored columns). `start` and `end` stay exact to the nanosecond beside them.
+DERIVED: dict[str, tuple[Field, str]] = {
+    "start_time": (
+        Field(type=pa.timestamp("us", tz="UTC"), about="start as a time, cut to microseconds"),
+        "to_timestamp(0) + to_microseconds(start // 1000)",
+    ),
+    "end_time": (
+        Field(type=pa.timestamp("us", tz="UTC"), about="end as a time, cut to microseconds"),
+        'to_timestamp(0) + to_microseconds("end" // 1000)',
+    ),
+    "duration": (Field(type=pa.float64(), unit="s", about="end - start"), '("end" - start) / 1e9'),
+}
+COLUMNS: dict[str, Field] = {**CATALOG, **{name: field for name, (field, _) in DERIVED.items()}}
+DEFAULT_ORDER = "kind, start NULLS LAST, artifact"
+
+_SEALED: dict[str, str | bool | int | float | list[str]] = {
+    "enable_external_access": "false",
+    "autoinstall_known_extensions": "false",
+    "autoload_known_extensions": "false",
+    "python_enable_replacements": "false",
+}
+_MISSING_COLUMN = re.compile(r'Referenced column "([^"]+)" (?:was )?not found|does not have a column named "([^"]+)"')
+_MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
+_TEXT_AS_INSTANT = re.compile(r"Could not convert string '\d{4}-\d\d.*' to INT64")
+_RESERVED_END = re.compile(r'syntax error at or near "(?:end|END)"')
+
+
+class Rows(Protocol):
+    """What a query needs of a lake: its catalog at a ref."""
+
+    def rows(
+        self, where: str | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
+    ) -> pa.Table: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What to select.
+
+    Attributes:
+        where: an SQL boolean expression over the columns of `COLUMNS`; `None` is every row.
+        columns: names in the order wanted; `None` is every stored column.
+        order: SQL order terms ("wind DESC, start"); `None` is by kind, start and identity.
+        sql: one SELECT over `catalog` instead of all of the above.
+        limit: rows at most.
+
+    Raises:
+        UsageError: `sql` together with `where`, `columns` or `order`; a negative limit.
+        UnknownNameError: a column that is not in the catalog.
+    """
+
+    where: str | None = None
+    columns: tuple[str, ...] | None = None
+    order: str | None = None
+    sql: str | None = None
+    limit: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.sql is not None and (self.where, self.columns, self.order) != (None, None, None):
+            raise UsageError(
+                "a whole SQL statement leaves no room for a filter, columns or an order beside it",
+                fix="put WHERE, the columns and ORDER BY into the SQL",
+            )
+        if self.limit is not None and self.limit < 0:
+            raise UsageError(f"a limit of {self.limit} rows", fix="give 0 or more")
+        if self.columns is not None and not self.columns:
+            raise UsageError("no columns", fix=f"name some of: {', '.join(COLUMNS)}")
+        for name in self.columns or ():
+            if name not in COLUMNS:
+                raise UnknownNameError.of("column", name, COLUMNS)
+
+
+class Selection:
+    """The answer to a request over one catalog, computed when it is read.
+
+    Args:
+        catalog: rows with the columns of `schema.CATALOG`.
+        request: what is wanted of them.
+
+    Raises:
+        UsageError: SQL that is not a single SELECT, does not parse, or names what is not there.
+    """
+
+    def __init__(self, catalog: pa.Table, request: Request) -> None:
+        self.request = request
+        self._connection = duckdb.connect(":memory:", config=_SEALED)
+        with _explained(request):
+            self._connection.register("stored", catalog)
+            derived = ", ".join(f"{sql} AS {name}" for name, (_, sql) in DERIVED.items())
+            self._connection.execute(f"CREATE VIEW catalog AS SELECT *, {derived} FROM stored")
+            self._connection.execute("SET TimeZone = 'UTC'")
+            self._connection.execute("SET lock_configuration = true")
+            self._relation = self._sql(request.sql) if request.sql is not None else self._filtered(request)
+
+    def _sql(self, sql: str) -> duckdb.DuckDBPyRelation:
+        statements = self._connection.extract_statements(sql)
+        if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
+            raise UsageError(
+                "the SQL is not one SELECT statement", where=sql, fix="the catalog is read-only: give a single SELECT"
+            )
+        relation = self._connection.sql(sql)
+        if relation is None:
+            raise UsageError("the SQL returns no rows to show", where=sql, fix="give a SELECT from catalog")
+        return relation
+
+    def _filtered(self, request: Request) -> duckdb.DuckDBPyRelation:
+        relation = self._connection.view("catalog")
+        if request.where is not None:
+            relation = relation.filter(request.where)
+        relation = relation.order(request.order or DEFAULT_ORDER)
+        return relation.project(", ".join(f'"{name}"' for name in request.columns or CATALOG))
+
+    def total(self) -> int:
+        """How many rows there are without the limit."""
+        with _explained(self.request):
+            row = self._relation.aggregate("count(*)").fetchone()
+        return int(row[0]) if row else 0
+
+    def batches(self, size: int = 65_536) -> pa.RecordBatchReader:
+        """The rows as a stream of record batches of at most `size` rows."""
+        relation = self._relation if self.request.limit is None else self._relation.limit(self.request.limit)
+        with _explained(self.request):
+            raw = relation.to_arrow_reader(size)
+        schema = pa.schema([self._described(field) for field in raw.schema])
+
+        def stream() -> Iterator[pa.RecordBatch]:
+            while True:
+                with _explained(self.request):
+                    try:
+                        batch = raw.read_next_batch()
+                    except StopIteration:
+                        return
+                yield pa.RecordBatch.from_arrays(
+                    [array.cast(field.type) for array, field in zip(batch.columns, schema, strict=True)], schema=schema
+                )
+
+        return pa.RecordBatchReader.from_batches(schema, stream())
+
+    def table(self) -> pa.Table:
+        """The rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not."""
+        return self.batches().read_all()
+
+    def _described(self, field: pa.Field) -> pa.Field:
+        known = COLUMNS.get(field.name) if self.request.sql is None else None
+        if known is None:
+            return field
+        return pa.field(field.name, known.type, metadata={"unit": known.unit, "about": known.about})
+
+
+def select(
+    lake: Rows,
+    where: str | None = None,
+    *,
+    at: str | None = None,
+    columns: Sequence[str] | None = None,
+    order: str | None = None,
+    sql: str | None = None,
+    limit: int | None = None,
+) -> pa.Table:
+    """Rows of a lake's catalog at a ref; arguments as in `Request`.
+
+    Raises:
+        UsageError: SQL that cannot be run; the message carries DuckDB's reason and, for a misspelt column, its name.
+        NotFoundError: no such ref.
+    """
+    request = Request(
+        where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit
+    )
+    return Selection(lake.rows(at=at), request).table()
+
+
+@contextmanager
+def _explained(request: Request) -> Iterator[None]:
+    """Turns DuckDB's errors into usage errors that carry the fix."""
+    try:
+        yield
+    except duckdb.Error as error:
+        given = (request.sql, request.where, request.order)
+        raise explain(error, where="; ".join(text for text in given if text) or None) from None
+
+
+def explain(error: duckdb.Error, *, where: str | None) -> UsageError:
+    """The usage error for what DuckDB says about a user's SQL.
+
+    Args:
+        error: DuckDB's.
+        where: the SQL or expression it is about.
+    """
+    text = str(error)
+    column = _MISSING_COLUMN.search(text)
+    if column:
+        name = column[1] or column[2]
+        if name in set(Kind):
+            return UsageError(
+                f"{name} without quotes is a column to SQL", where=where, fix=f"write '{name}' in single quotes"
+            )
+        return UnknownNameError.of("column", name, COLUMNS, where=where)
+    table = _MISSING_TABLE.search(text)
+    if table:
+        return UsageError(f"no table {table[1]!r}", where=where, fix="the one table is called catalog")
+    if isinstance(error, duckdb.PermissionException):
+        return UsageError(
+            "SQL on a lake reads its catalog and nothing else", where=where, fix="select from catalog; leave out files"
+        )
+    if _RESERVED_END.search(text):
+        return UsageError(
+            "END is a word of SQL", where=where, fix='write the column in double quotes, "end", or use end_time'
+        )
+    if _TEXT_AS_INSTANT.search(text):
+        return UsageError(
+            'start and "end" are nanoseconds since 1970, not text',
+            where=where,
+            fix="compare start_time or end_time with a time in single quotes",
+        )
+    return UsageError(
+        f"DuckDB cannot run it: {_first_line(text)}",
+        where=where,
+        fix="correct the SQL; the columns are listed by `flagdata query --describe`",
+    )
+
+
+def _first_line(text: str) -> str:
+    return text.strip().splitlines()[0].rstrip(".") if text.strip() else "no reason given"
