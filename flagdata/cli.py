@@ -69,3 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
         click.echo("flagdata: interrupted", err=True)
         sys.exit(1)
     sys.exit(0)
+
+
+if __name__ == "__main__":
+    main()

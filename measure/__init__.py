@@ -1,0 +1,1 @@
+"""From recordings to measurements: scores, similarity, refinement, residuals, and the effects a model lacks."""

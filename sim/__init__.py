@@ -1,0 +1,1 @@
+"""The phenomenon: cloth, wind, their simulation, and how it is seen."""

@@ -1,0 +1,1 @@
+"""Wind that drives the cloth."""

@@ -1,0 +1,135 @@
+"""Errors, units, named random streams, registries, provenance and the catalog's schema."""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from flagdata import provenance, rng, schema, units
+from flagdata.cli import main
+from flagdata.errors import FlagdataError, RefusedError, UnknownNameError
+from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.registry import Registry
+
+
+def subclasses(cls: type[FlagdataError]) -> list[type[FlagdataError]]:
+    return [cls, *(s for child in cls.__subclasses__() for s in subclasses(child))]
+
+
+def test_error_kinds_are_distinct_and_errors_survive_a_process_boundary() -> None:
+    errors = subclasses(FlagdataError)
+    assert len({e.kind for e in errors}) == len(errors)
+    error = pickle.loads(pickle.dumps(RefusedError("a", where="b", fix="c")))
+    assert isinstance(error, RefusedError)
+    assert error.as_dict() == {"kind": "refused", "what": "a", "where": "b", "fix": "c"}
+
+
+def test_an_unknown_name_suggests_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'drag'"):
+        raise UnknownNameError.of("effect", "drga", ["drag", "lift"])
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "si"),
+    [
+        ("km/h", 36.0, 10.0),
+        ("KTS", 1.0, 0.514444),  # BIPM: 1852/3600 m/s
+        ("mph", 1.0, 0.44704),
+        ("ft/min", 196.850394, 1.0),
+        ("°F", 212.0, 373.15),
+        ("ºC", -40.0, 233.15),
+        ("inHg", 29.92126, 101325.0),
+        ("deg", 180.0, math.pi),
+        ("%", 50.0, 0.5),
+    ],
+)
+def test_units_agree_with_their_definitions(text: str, value: float, si: float) -> None:
+    # 7 digits: the literals above are given to that many.
+    assert float(units.unit(text).to_si(value)) == pytest.approx(si, rel=2e-6)
+
+
+def test_units_convert_back_exactly_enough() -> None:
+    for name, unit in units.UNITS.items():
+        assert float(unit.from_si(unit.to_si(12.5))) == pytest.approx(12.5, rel=1e-12), name
+
+
+def test_every_spelling_names_a_unit_and_beaufort_is_not_one() -> None:
+    assert set(units.SPELLINGS.values()) <= set(units.UNITS)
+    with pytest.raises(UnknownNameError):
+        units.unit("bft")
+
+
+def test_a_named_stream_does_not_depend_on_other_draws() -> None:
+    alone = rng.stream(7, "gust", 3).standard_normal(4)
+    rng.stream(7, "camera").standard_normal(1000)
+    assert np.array_equal(alone, rng.stream(7, "gust", 3).standard_normal(4))
+
+
+def test_streams_of_other_names_seeds_and_types_differ() -> None:
+    draws = {
+        tuple(rng.stream(*key).integers(0, 2**31, 4))
+        for key in [(7, "a"), (8, "a"), (7, "b"), (7, "a", "b"), (7, "ab"), (7, 1), (7, "1")]
+    }
+    assert len(draws) == 7
+
+
+def test_a_registry_imports_only_what_is_asked_for() -> None:
+    table = Registry("thing", {"join": "posixpath:join", "broken": "no_such_module:x"})
+    assert table["join"]("a", "b") == "a/b"
+    assert set(table) == {"join", "broken"}
+    with pytest.raises(UnknownNameError, match="did you mean 'join'"):
+        table["jion"]
+
+
+def test_a_recipe_hash_ignores_order_and_sees_values() -> None:
+    assert provenance.recipe_hash({"a": 1, "b": [2]}) == provenance.recipe_hash({"b": [2], "a": 1})
+    assert provenance.recipe_hash({"a": 1}) != provenance.recipe_hash({"a": 2})
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        provenance.recipe_hash({"a": float("nan")})
+
+
+def test_the_file_hash_is_sha256(tmp_path: Path) -> None:
+    (tmp_path / "abc").write_bytes(b"abc")
+    # FIPS 180-2, appendix B.1
+    assert provenance.file_hash(tmp_path / "abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+
+
+def test_the_catalog_schema_carries_units() -> None:
+    arrow = schema.catalog_schema()
+    assert arrow.field("wind").metadata[b"unit"] == b"m/s"
+    assert arrow.field("wind").type == pa.float64()
+    assert not arrow.field("artifact").nullable
+
+
+def test_quality_flags_are_warnings_and_errors_once() -> None:
+    def found(kind: str, severity: Severity) -> Finding:
+        return Finding(kind=kind, severity=severity, what="")
+
+    kinds = quality_flags((found("b", Severity.WARNING), found("a", Severity.ERROR), found("b", Severity.ERROR)))
+    assert kinds == ["a", "b"]
+    assert quality_flags((found("c", Severity.NOTE),)) == []
+
+
+def test_errors_on_the_command_line_say_what_and_how_to_mend_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["ls", "--lake", str(tmp_path), "--json"])
+    printed = capsys.readouterr()
+    assert stop.value.code == 1
+    assert json.loads(printed.out)["kind"] == "not-found"
+    assert "fix:" in printed.err
+
+
+def test_a_misspelt_verb_exits_2() -> None:
+    done = subprocess.run([sys.executable, "-m", "flagdata.cli", "ingets"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "ingest" in done.stderr
