@@ -1,0 +1,216 @@
+"""Ground truth of a clip: the mean wind speed over a window that ends with it, and how well that mean is known.
+
+The window is (end - window, end]: a sample stamped exactly at the clip's end counts, one stamped exactly a window earlier
+does not, and nothing after the end does. A sample speaks for the time since the row before it, so that an irregular
+logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.schema import TRUTH_WINDOW, UNUSABLE, SampleFlag
+from flagdata.signals import Instants, Sensor, Series, WindSeries
+from flagdata.timebase import NANOSECONDS
+
+BLOCK = 1.0  # s, length of the block means whose correlation gives the standard error
+GAP = 1.5  # sampling periods; a longer silence is a gap
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindTruth:
+    """A mean wind speed and its budget of uncertainty.
+
+    Attributes:
+        wind: mean speed over the window [m/s], NaN when no usable sample is in it.
+        sigma: standard uncertainty [m/s], the root sum of squares of the parts below; NaN when a part cannot be known.
+        sigma_mean: standard error of the mean of a correlated series [m/s]; NaN with fewer than two blocks.
+        sigma_sensor: accuracy of the instrument, its resolution and its dead zone; does not shrink by averaging [m/s].
+        sigma_clock: what the uncertainty of the common clock does to the mean [m/s].
+        coverage: share of the window that usable samples speak for, 0 to 1.
+        staleness: age of the newest usable sample at the end [s]; infinite when there is none before the end.
+        count: usable samples in the window.
+        flags: machine-readable names of what is off, sorted.
+    """
+
+    wind: float
+    sigma: float
+    sigma_mean: float
+    sigma_sensor: float
+    sigma_clock: float
+    coverage: float
+    staleness: float
+    count: int
+    flags: tuple[str, ...] = ()
+
+
+def horizontal_speed(series: WindSeries) -> Series:
+    """Speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a sonic.
+
+    Raises:
+        InputError: the series knows neither (the apparent wind of a moving platform is not ground truth).
+    """
+    channels = series.channels
+    if "wind_speed" in channels:
+        return np.asarray(channels["wind_speed"], dtype=np.float64)
+    if "wind_x" in channels and "wind_y" in channels:
+        return np.hypot(channels["wind_x"], channels["wind_y"])
+    raise InputError(
+        "no wind over ground among the channels " + ", ".join(sorted(channels)),
+        where=series.sensor.name,
+        fix="give a log with wind_speed, or wind_x and wind_y; apparent wind is not ground truth",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthSeries:
+    """A wind series made ready for many windows; on the clock of the clips.
+
+    Attributes:
+        time: (n,) of the usable samples [UTC ns].
+        speed: (n,) [m/s].
+        held: (n,) time each sample speaks for, up to its stamp [s].
+        dead: (n,) whether the sample lies in the sensor's dead zone.
+        period: the sampling period [s], a spacing that nine in ten do not exceed.
+        sensor: the instrument.
+    """
+
+    time: Instants
+    speed: Series
+    held: Series
+    dead: NDArray[np.bool_]
+    period: float
+    sensor: Sensor
+
+    @classmethod
+    def of(cls, series: WindSeries) -> TruthSeries:
+        """Prepare `series`, whose times must be on the clock of the clips.
+
+        Raises:
+            InputError: see `horizontal_speed`.
+        """
+        speed = horizontal_speed(series)
+        usable = np.isfinite(speed) & ((series.flags & int(UNUSABLE)) == 0)
+        spacing = np.diff(series.time) / NANOSECONDS
+        period = float(np.quantile(spacing, 0.9, method="lower")) if len(spacing) else BLOCK
+        since = np.concatenate([[period], spacing])[: len(speed)]
+        held = np.where(since <= GAP * period, since, period)
+        return cls(
+            time=series.time[usable],
+            speed=speed[usable],
+            held=held[usable],
+            dead=((series.flags & int(SampleFlag.DEAD_ZONE)) != 0)[usable],
+            period=period,
+            sensor=series.sensor,
+        )
+
+    def before(self, end: int, *, window: float = TRUTH_WINDOW, clock_sigma: float = 0.0) -> WindTruth:
+        """The mean over (end - window, end].
+
+        Args:
+            end: the clip's last instant [UTC ns].
+            window: [s].
+            clock_sigma: standard uncertainty of the clip's instants on the series' clock [s].
+
+        Raises:
+            UsageError: a window or σ that is not a length of time.
+        """
+        if not (math.isfinite(window) and window > 0):
+            raise UsageError(f"a window of {window} s", fix="give a length above zero")
+        if not (math.isfinite(clock_sigma) and clock_sigma >= 0):
+            raise UsageError(f"a clock uncertainty of {clock_sigma} s", fix="give a σ of zero or more")
+        begin = end - round(window * NANOSECONDS)
+        first, last = np.searchsorted(self.time, [begin, end], side="right").tolist()
+        staleness = (end - int(self.time[last - 1])) / NANOSECONDS if last else math.inf
+        if first == last:
+            nan = math.nan
+            return WindTruth(
+                wind=nan, sigma=nan, sigma_mean=nan, sigma_sensor=nan, sigma_clock=nan,
+                coverage=0.0, staleness=staleness, count=0, flags=("wind-missing",),
+            )  # fmt: skip
+        speed, held = self.speed[first:last], self.held[first:last]
+        wind = float(np.average(speed, weights=held))
+        inside = np.minimum(held, (self.time[first:last] - begin) / NANOSECONDS)
+        sigma_mean = _standard_error(self._blocks(first, last, begin))
+        dead = float(np.average(self.dead[first:last], weights=held))
+        sigma_sensor = _sensor_sigma(self.sensor, wind, dead)
+        sigma_clock = clock_sigma * self._slope(first, last, begin, end, clock_sigma)
+        flags = {
+            "sensor-accuracy-unknown": self.sensor.accuracy is None and self.sensor.accuracy_relative is None,
+            "wind-dead-zone": dead > 0,
+            "wind-sigma-unknown": math.isnan(sigma_mean),
+        }
+        return WindTruth(
+            wind=wind,
+            sigma=math.hypot(sigma_mean, sigma_sensor, sigma_clock),
+            sigma_mean=sigma_mean,
+            sigma_sensor=sigma_sensor,
+            sigma_clock=sigma_clock,
+            coverage=min(1.0, float(inside.sum()) / window),
+            staleness=staleness,
+            count=last - first,
+            flags=tuple(sorted(name for name, holds in flags.items() if holds)),
+        )
+
+    def _blocks(self, first: int, last: int, begin: int) -> Series:
+        """Means over consecutive blocks of a second (or of the sampling period, if longer); empty blocks are absent."""
+        width = round(max(BLOCK, self.period) * NANOSECONDS)
+        # A stamp closes its block, as it closes the window.
+        block = (self.time[first:last] - begin - 1) // width
+        starts = np.concatenate([[0], np.nonzero(np.diff(block))[0] + 1])
+        held = self.held[first:last]
+        return np.add.reduceat(self.speed[first:last] * held, starts) / np.add.reduceat(held, starts)
+
+    def _slope(self, first: int, last: int, begin: int, end: int, clock_sigma: float) -> float:
+        """Size of the derivative of the window's mean with respect to its position [m/s²].
+
+        Moving the window by δ gains δ · v(end) and loses δ · v(begin), so the derivative is (v(end) - v(begin)) / window.
+        Both speeds are means over ±σ (at least a block) about the edges. Where an edge has no samples the scatter within
+        the window stands in: two independent draws differ by √2 of it.
+        """
+        window = (end - begin) / NANOSECONDS
+        reach = round(max(clock_sigma, BLOCK, self.period) * NANOSECONDS)
+        edges = []
+        for edge in (begin, end):
+            low, high = np.searchsorted(self.time, [edge - reach, edge + reach + 1], side="left").tolist()
+            if low == high:
+                return math.sqrt(2) * float(np.std(self.speed[first:last])) / window
+            edges.append(float(np.mean(self.speed[low:high])))
+        return abs(edges[1] - edges[0]) / window
+
+
+def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
+    """Accuracy, a rectangular resolution step, and for the share `dead` a rectangular true speed in [0, threshold]."""
+    accuracy = max(sensor.accuracy or 0.0, (sensor.accuracy_relative or 0.0) * wind)
+    step = (sensor.resolution or 0.0) / math.sqrt(12)
+    hidden = dead * (sensor.threshold or 0.0) / math.sqrt(3)
+    return math.hypot(accuracy, step, hidden)
+
+
+def _standard_error(values: Series) -> float:
+    """Standard error of the mean of a correlated series (n,), in the unit of the values; NaN for n < 2.
+
+    var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²) and τ the integrated autocorrelation time in steps: the divisor
+    undoes the loss of variance that removing the sample's own mean causes. τ is Geyer's initial monotone sequence
+    (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992, section 3.3), held between 1 (no credit for
+    anti-correlation) and n/2 (the error is then the scatter itself: the window saw no two independent winds).
+    """
+    n = len(values)
+    if n < 2:
+        return math.nan
+    centred = values - np.mean(values)
+    variance = float(np.mean(centred**2))
+    if variance == 0:
+        return 0.0
+    spectrum = np.fft.rfft(centred, 2 * n)
+    correlation = np.fft.irfft(spectrum * np.conj(spectrum), 2 * n)[:n] / (n * variance)
+    pairs = correlation[0 : n - n % 2 : 2] + correlation[1::2]
+    positive = pairs[: int(np.argmax(pairs <= 0))] if np.any(pairs <= 0) else pairs
+    time = 2 * float(np.sum(np.minimum.accumulate(positive))) - 1
+    time = min(max(time, 1.0), n / 2)
+    return math.sqrt(variance * time / (n - time))

@@ -1,0 +1,235 @@
+"""The ground truth of a clip, against hand-worked means and the theory of correlated series."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flagdata.dataset.truth import TruthSeries
+from flagdata.errors import InputError, UsageError
+from flagdata.schema import SampleFlag
+from flagdata.signals import Sensor, WindSeries
+
+NS = 1_000_000_000
+START = 1_777_636_800 * NS  # 2026-05-01T12:00:00Z
+
+
+def series(seconds, speed, *, flags=None, sensor=None, channel="wind_speed"):
+    """A wind series with samples at `seconds` after START."""
+    time = START + np.round(np.asarray(seconds, dtype=float) * NS).astype(np.int64)
+    values = np.broadcast_to(np.asarray(speed, dtype=float), time.shape).copy()
+    bits = np.zeros(len(time), dtype=np.uint16) if flags is None else np.asarray(flags, dtype=np.uint16)
+    return WindSeries(time=time, channels={channel: values}, flags=bits, sensor=sensor or Sensor(name="exact"))
+
+
+def truth(wind, end, **options):
+    return TruthSeries.of(wind).before(START + round(end * NS), **options)
+
+
+def test_constant_wind_is_its_own_mean_with_no_scatter():
+    result = truth(series(np.arange(1, 121), 5.0), 100)
+    assert result.wind == 5.0
+    assert result.sigma == 0.0
+    assert (result.coverage, result.staleness, result.count) == (1.0, 0.0, 60)
+
+
+def test_mean_of_a_ramp_is_its_value_at_the_mean_of_the_stamps():
+    seconds = np.arange(0, 200)
+    result = truth(series(seconds, 0.1 * seconds), 100)
+    # Samples at 41, 42, ..., 100 s: mean stamp (41 + 100) / 2.
+    assert result.wind == pytest.approx(0.1 * 70.5, rel=1e-12)
+
+
+def test_dense_ramp_has_the_mid_value_of_the_window():
+    seconds = np.arange(0, 200, 0.05)
+    # A sample speaks for the 0.05 s before it, so the mean lies half of that late.
+    assert truth(series(seconds, 0.1 * seconds), 100).wind == pytest.approx(0.1 * 70.025, rel=1e-9)
+
+
+def test_window_is_open_at_its_start_and_closed_at_its_end():
+    seconds = np.arange(0, 121)
+    speed = np.where(seconds == 40, 1000.0, 4.0) + np.where(seconds == 101, 1000.0, 0.0)
+    speed = speed + np.where(seconds == 100, 60.0, 0.0)
+    # 40 s (exactly a window early) and 101 s (after the end) are out; 100 s (exactly the end) is one of 60 samples.
+    assert truth(series(seconds, speed), 100).wind == pytest.approx(4.0 + 60.0 / 60, rel=1e-12)
+
+
+def test_nothing_after_the_end_is_used():
+    seconds = np.arange(0, 121)
+    calm = truth(series(seconds, 3.0), 60)
+    storm = truth(series(seconds, np.where(seconds > 60, 30.0, 3.0)), 60)
+    assert calm == storm
+
+
+def test_gap_lowers_coverage_by_its_share_and_is_not_filled_in():
+    seconds = np.concatenate([np.arange(0, 71), np.arange(86, 121)])  # rows 71..85 are missing: 15 s
+    speed = np.where(seconds < 80, 2.0, 6.0)
+    result = truth(series(seconds, speed), 100)
+    assert result.coverage == pytest.approx(45 / 60, rel=1e-12)
+    # 30 samples of 2 m/s (41..70 s) and 15 of 6 m/s (86..100 s).
+    assert result.wind == pytest.approx((30 * 2 + 15 * 6) / 45, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "flag", [SampleFlag.STALE, SampleFlag.OUT_OF_RANGE, SampleFlag.MISSING, SampleFlag.SENSOR_FAULT]
+)
+def test_unusable_samples_are_left_out_and_leave_a_hole(flag):
+    seconds = np.arange(0, 121)
+    bad = (seconds > 50) & (seconds <= 62)
+    wind = series(seconds, np.where(bad, 99.0, 4.0), flags=np.where(bad, int(flag), 0))
+    result = truth(wind, 100)
+    assert result.wind == 4.0
+    assert result.coverage == pytest.approx(48 / 60, rel=1e-12)
+
+
+def test_staleness_is_the_age_of_the_newest_usable_sample():
+    seconds = np.arange(0, 121)
+    wind = series(seconds, 4.0, flags=np.where(seconds > 93, int(SampleFlag.STALE), 0))
+    assert truth(wind, 100).staleness == pytest.approx(7.0, rel=1e-12)
+
+
+def test_log_that_ended_long_ago_has_no_mean_and_says_how_old_it_is():
+    result = truth(series(np.arange(0, 11), 4.0), 100)
+    assert math.isnan(result.wind)
+    assert math.isnan(result.sigma)
+    assert (result.coverage, result.staleness, result.count) == (0.0, 90.0, 0)
+    assert result.flags == ("wind-missing",)
+
+
+def test_log_that_begins_later_is_infinitely_stale():
+    assert truth(series(np.arange(200, 300), 4.0), 100).staleness == math.inf
+
+
+def test_irregular_logger_is_not_biased_towards_its_busy_moments():
+    # 2 m/s for 30 s logged once a second, then 8 m/s for 30 s logged twice a second.
+    seconds = np.concatenate([np.arange(-60, 31), np.arange(30.5, 60.01, 0.5)])
+    speed = np.where(seconds <= 30, 2.0, 8.0)
+    assert truth(series(seconds, speed), 60).wind == pytest.approx(5.0, rel=1e-12)
+
+
+def test_clock_uncertainty_acts_through_the_slope_of_the_wind():
+    seconds = np.arange(-60, 200, 0.1)
+    ramp = series(seconds, 10 + 0.02 * seconds)
+    # The mean of a ramp of 0.02 m/s² moves by 0.02 m/s for each second the window moves.
+    assert truth(ramp, 100, clock_sigma=2.0).sigma_clock == pytest.approx(0.04, rel=1e-6)
+    assert truth(ramp, 100).sigma_clock == 0.0
+    assert truth(series(seconds, 10.0), 100, clock_sigma=2.0).sigma_clock == 0.0
+
+
+def test_clock_uncertainty_is_bounded_by_the_scatter_where_the_log_has_no_edge():
+    seconds = np.concatenate([np.arange(45, 90), np.arange(110, 200)])
+    wind = series(seconds, np.where(seconds % 2 == 0, 3.0, 5.0))
+    # Nothing near the edge at 40 s: √2 × scatter (1 m/s, nearly: 45 samples) over the window of 60 s, per second.
+    assert truth(wind, 100, clock_sigma=1.0).sigma_clock == pytest.approx(math.sqrt(2) / 60, rel=1e-3)
+
+
+def test_sensor_accuracy_does_not_shrink_by_averaging():
+    sensor = Sensor(name="cup", accuracy=0.3, accuracy_relative=0.02, resolution=0.1)
+    step = 0.1 / math.sqrt(12)
+    seconds = np.arange(0, 121)
+    assert truth(series(seconds, 5.0, sensor=sensor), 100).sigma == pytest.approx(math.hypot(0.3, step), rel=1e-12)
+    assert truth(series(seconds, 20.0, sensor=sensor), 100).sigma == pytest.approx(math.hypot(0.4, step), rel=1e-12)
+
+
+def test_dead_zone_widens_the_interval_by_what_it_may_hide():
+    sensor = Sensor(name="cup", accuracy=0.0, threshold=0.6)
+    wind = series(np.arange(0, 121), 0.0, flags=np.full(121, int(SampleFlag.DEAD_ZONE)), sensor=sensor)
+    result = truth(wind, 100)
+    # A true speed anywhere in [0, 0.6] read as 0: root mean square 0.6 / √3.
+    assert result.sigma == pytest.approx(0.6 / math.sqrt(3), rel=1e-12)
+    assert "wind-dead-zone" in result.flags
+
+
+def test_unknown_accuracy_is_said():
+    assert "sensor-accuracy-unknown" in truth(series(np.arange(0, 121), 5.0), 100).flags
+    known = Sensor(name="cup", accuracy=0.1)
+    assert truth(series(np.arange(0, 121), 5.0, sensor=known), 100).flags == ()
+
+
+def test_one_sample_has_a_mean_but_no_known_uncertainty():
+    result = truth(series([90], 5.0), 100)
+    assert result.wind == 5.0
+    assert math.isnan(result.sigma)
+    assert "wind-sigma-unknown" in result.flags
+
+
+def test_white_noise_has_the_textbook_standard_error():
+    generator = np.random.default_rng(1)
+    windows = 400
+    speed = 10 + generator.normal(size=60 * windows)
+    wind = TruthSeries.of(series(np.arange(1, 60 * windows + 1), speed))
+    sigmas = [wind.before(START + 60 * k * NS).sigma_mean for k in range(1, windows + 1)]
+    # 1/√60 = 0.129. τ is never taken below 1, and its estimate from 60 values scatters upwards: 15 % is allowed.
+    assert np.mean(sigmas) == pytest.approx(1 / math.sqrt(60), rel=0.15)
+    assert np.mean(sigmas) >= 1 / math.sqrt(60) * 0.98
+
+
+def test_standard_error_covers_the_true_mean_of_correlated_wind():
+    generator = np.random.default_rng(2)
+    phi, windows = 0.7, 600  # AR(1): correlation time (1 + φ)/(1 - φ) = 5.7 s, ten of them in a minute
+    noise = generator.normal(size=60 * windows) * math.sqrt(1 - phi**2)
+    speed = np.empty(len(noise))
+    speed[0] = noise[0]
+    for k in range(1, len(noise)):
+        speed[k] = phi * speed[k - 1] + noise[k]
+    wind = TruthSeries.of(series(np.arange(1, len(speed) + 1), 10 + speed))
+    results = [wind.before(START + 60 * k * NS) for k in range(1, windows + 1)]
+    inside = np.mean([abs(r.wind - 10) <= 2 * r.sigma_mean for r in results])
+    naive = np.mean([abs(r.wind - 10) <= 2 / math.sqrt(60) for r in results])
+    # Nominal 95 %; with ten independent winds in a window Student's t alone takes 2 % off, and τ is estimated.
+    assert inside > 0.87
+    assert naive < 0.65  # the error of uncorrelated samples would be badly short
+
+
+@pytest.mark.parametrize("rate", [1, 4, 20])
+def test_standard_error_does_not_depend_on_the_logging_rate(rate):
+    seconds = np.arange(1, 61 * rate) / rate
+    gust = 5 + np.sin(2 * np.pi * seconds / 12)
+    coarse = truth(series(np.arange(1, 61), 5 + np.sin(2 * np.pi * np.arange(1, 61) / 12)), 60)
+    # Block means over a second lose sinc(1/12) = 1.1 % of a 12 s wave.
+    assert truth(series(seconds, gust), 60).sigma_mean == pytest.approx(coarse.sigma_mean, rel=0.03)
+
+
+def test_sonic_components_give_the_horizontal_speed():
+    wind = series(np.arange(0, 121), 3.0, channel="wind_x")
+    both = WindSeries(
+        time=wind.time,
+        channels={"wind_x": wind.channels["wind_x"], "wind_y": np.full(121, -4.0), "wind_z": np.full(121, 9.0)},
+        flags=wind.flags,
+        sensor=wind.sensor,
+    )
+    assert truth(both, 100).wind == pytest.approx(5.0, rel=1e-12)
+
+
+def test_apparent_wind_is_refused_as_ground_truth():
+    with pytest.raises(InputError, match="apparent wind is not ground truth"):
+        TruthSeries.of(series(np.arange(0, 121), 3.0, channel="apparent_wind_speed"))
+
+
+@pytest.mark.parametrize(
+    "options", [{"window": 0.0}, {"window": math.inf}, {"clock_sigma": -1.0}, {"clock_sigma": math.nan}]
+)
+def test_impossible_window_or_clock_is_a_usage_error(options):
+    with pytest.raises(UsageError):
+        truth(series(np.arange(0, 121), 3.0), 100, **options)
+
+
+@given(
+    gaps=st.lists(st.floats(0.05, 20.0), min_size=2, max_size=80),
+    end=st.floats(0.0, 200.0),
+    window=st.floats(1.0, 120.0),
+    speed=st.floats(0.0, 60.0),
+)
+def test_any_spacing_keeps_the_mean_within_the_samples_and_coverage_within_one(gaps, end, window, speed):
+    result = truth(series(np.cumsum(gaps), speed), end, window=window)
+    assert 0.0 <= result.coverage <= 1.0
+    assert result.staleness >= 0.0
+    if result.count:
+        assert result.wind == pytest.approx(speed, rel=1e-12, abs=1e-12)
+        assert result.staleness < window
+    else:
+        assert math.isnan(result.wind)
