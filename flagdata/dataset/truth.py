@@ -1,8 +1,8 @@
 """Ground truth of a clip: the mean wind speed over a window that ends with it, and how well that mean is known.
 
-The window is (end - window, end]: a sample stamped exactly at the clip's end counts, one stamped exactly a window earlier
-does not, and nothing after the end does. A sample speaks for the time since the row before it, so that an irregular
-logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
+The window is (end - window, end]: a sample stamped exactly at the clip's end counts, one stamped exactly a window
+earlier does not, and nothing after the end does. A sample speaks for the time since the row before it, so that an
+irregular logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
 """
 
 from __future__ import annotations
@@ -47,6 +47,23 @@ class WindTruth:
     staleness: float
     count: int
     flags: tuple[str, ...] = ()
+
+    @classmethod
+    def exact(cls, wind: float) -> WindTruth:
+        """A wind that a simulation states [m/s]."""
+        return cls(
+            wind=wind, sigma=0.0, sigma_mean=0.0, sigma_sensor=0.0, sigma_clock=0.0,
+            coverage=1.0, staleness=0.0, count=0,
+        )  # fmt: skip
+
+    @classmethod
+    def missing(cls, *, staleness: float) -> WindTruth:
+        """No usable sample in the window; the newest before its end is `staleness` old [s]."""
+        nan = math.nan
+        return cls(
+            wind=nan, sigma=nan, sigma_mean=nan, sigma_sensor=nan, sigma_clock=nan,
+            coverage=0.0, staleness=staleness, count=0, flags=("wind-missing",),
+        )  # fmt: skip
 
 
 def horizontal_speed(series: WindSeries) -> Series:
@@ -128,11 +145,7 @@ class TruthSeries:
         first, last = np.searchsorted(self.time, [begin, end], side="right").tolist()
         staleness = (end - int(self.time[last - 1])) / NANOSECONDS if last else math.inf
         if first == last:
-            nan = math.nan
-            return WindTruth(
-                wind=nan, sigma=nan, sigma_mean=nan, sigma_sensor=nan, sigma_clock=nan,
-                coverage=0.0, staleness=staleness, count=0, flags=("wind-missing",),
-            )  # fmt: skip
+            return WindTruth.missing(staleness=staleness)
         speed, held = self.speed[first:last], self.held[first:last]
         wind = float(np.average(speed, weights=held))
         inside = np.minimum(held, (self.time[first:last] - begin) / NANOSECONDS)
@@ -169,9 +182,9 @@ class TruthSeries:
     def _slope(self, first: int, last: int, begin: int, end: int, clock_sigma: float) -> float:
         """Size of the derivative of the window's mean with respect to its position [m/s²].
 
-        Moving the window by δ gains δ · v(end) and loses δ · v(begin), so the derivative is (v(end) - v(begin)) / window.
-        Both speeds are means over ±σ (at least a block) about the edges. Where an edge has no samples the scatter within
-        the window stands in: two independent draws differ by √2 of it.
+        Moving the window by δ gains δ · v(end) and loses δ · v(begin): the derivative is (v(end) - v(begin)) / window.
+        Both speeds are means over ±σ (at least a block) about the edges. Where an edge has no samples the scatter
+        within the window stands in: two independent draws differ by √2 of it.
         """
         window = (end - begin) / NANOSECONDS
         reach = round(max(clock_sigma, BLOCK, self.period) * NANOSECONDS)
@@ -198,7 +211,9 @@ def _standard_error(values: Series) -> float:
     var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²) and τ the integrated autocorrelation time in steps: the divisor
     undoes the loss of variance that removing the sample's own mean causes. τ is Geyer's initial monotone sequence
     (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992, section 3.3), held between 1 (no credit for
-    anti-correlation) and n/2 (the error is then the scatter itself: the window saw no two independent winds).
+    anti-correlation) and n/2 (the error is then the scatter itself: the window saw no two independent winds). With
+    few independent winds in the window no estimate from the window alone can be right: for AR(1) series of 60 values,
+    mean ± 2 standard errors holds the true mean in 96, 92, 89 and 76 % of cases at φ = 0, 0.5, 0.7 and 0.9.
     """
     n = len(values)
     if n < 2:
