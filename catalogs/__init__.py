@@ -1,0 +1,1 @@
+"""Recipes and data tables: TOML and CSV only, read through importlib.resources."""

@@ -1,0 +1,144 @@
+"""A field recording as a user would bring it: an H.264 file at 60 fps, and an anemometer's CSV on another clock.
+
+The two share one gusty wind. What a user does not know (the offset of the two clocks) is drawn from the seed and
+written nowhere but into the returned `Field`, so that the tool can be held against it.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta, timezone
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from measure.demo.flag import DrawnFlag
+from sim.wind.spectral import VonKarman
+
+_BEFORE = 120.0  # s of wind logged before the camera starts
+_AFTER = 30.0
+_WIND_RATE = 20  # Hz at which the true wind is made
+_ZONE = timezone(timedelta(hours=2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldRecipe:
+    """What to make.
+
+    Attributes:
+        seed: root of all random streams.
+        duration: of the video [s].
+        frame_rate: of the video [Hz].
+        wind: the gusts; an intensity near zero makes the steady wind in which clocks cannot be found.
+        distance_constant: of the cup anemometer [m].
+        threshold: speed below which the cups stand still [m/s].
+        resolution: of the logged speed [m/s].
+        dropout: length of one gap in the log [s].
+        largest_offset: the hidden offset is drawn uniformly within ± this [s].
+    """
+
+    seed: int
+    duration: float = 600.0
+    frame_rate: int = 60
+    wind: VonKarman = field(default_factory=lambda: VonKarman(mean=5.0, intensity=0.2, length=60.0))
+    distance_constant: float = 2.3
+    threshold: float = 0.4
+    resolution: float = 0.1
+    dropout: float = 7.0
+    largest_offset: float = 45.0
+
+    def __post_init__(self) -> None:
+        if self.duration < 10 or self.frame_rate < 1:
+            raise InputError(
+                f"a recording of {self.duration} s at {self.frame_rate} Hz", fix="make it at least 10 s long, at 1 Hz"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """Where the files are, and the truth about them.
+
+    Attributes:
+        clock_offset: what must be added to the camera's clock to reach the anemometer's [s].
+        wind: true speed at the flag [m/s] at `_WIND_RATE`, starting `_BEFORE` seconds before the first frame.
+    """
+
+    video: Path
+    log: Path
+    clock_offset: float
+    wind: NDArray[np.float64]
+
+
+def make_field(recipe: FieldRecipe, folder: Path, *, advance: Callable[[int], None]) -> Field:
+    """Write `flag.mp4` and `anemometer.csv` into `folder`; `advance` is called with the number of frames done."""
+    offset = float(stream(recipe.seed, "clock").uniform(-recipe.largest_offset, recipe.largest_offset))
+    duration = _BEFORE + recipe.duration + _AFTER
+    wind = recipe.wind.series(stream(recipe.seed, "wind"), duration=duration, rate=_WIND_RATE)
+    start = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
+    video, log = folder / "flag.mp4", folder / "anemometer.csv"
+    times = np.arange(round(recipe.duration * recipe.frame_rate)) / recipe.frame_rate + _BEFORE
+    at_frames = np.interp(times, np.arange(len(wind)) / _WIND_RATE, wind)
+    _write_video(video, recipe, at_frames, start, advance)
+    _write_log(log, recipe, wind, start + timedelta(seconds=offset - _BEFORE))
+    return Field(video=video, log=log, clock_offset=offset, wind=wind)
+
+
+def _write_video(
+    path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], start: datetime, advance: Callable[[int], None]
+) -> None:
+    flag = DrawnFlag()
+    with av.open(str(path), "w") as container:
+        container.metadata["creation_time"] = start.isoformat()
+        video = container.add_stream("libx264", rate=recipe.frame_rate, options={"preset": "veryfast", "crf": "23"})
+        video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
+        video.codec_context.time_base = Fraction(1, recipe.frame_rate)
+        video.codec_context.thread_count = 1  # the same bytes on every machine
+        for number, image in enumerate(flag.frames(wind, recipe.frame_rate, stream(recipe.seed, "camera"))):
+            frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
+            frame.pts = number
+            container.mux(video.encode(frame))
+            advance(1)
+        container.mux(video.encode())
+
+
+def _write_log(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], start: datetime) -> None:
+    """Once a second: the cups' mean speed over the second before the stamp, in km/h on the logger's own wall clock;
+    with a gap, and a reading that sticks. `start` is the logger's time at the first value of `wind`."""
+    rng = stream(recipe.seed, "anemometer")
+    first = start.replace(microsecond=0) + timedelta(seconds=2)  # the logger stamps its own whole seconds
+    seconds = len(wind) // _WIND_RATE - 2
+    edges = (first - start).total_seconds() + np.arange(-1, seconds)
+    total = np.concatenate([[0.0], np.cumsum(_cups(wind, recipe.distance_constant)) / _WIND_RATE])
+    speed = np.diff(np.interp(edges, np.arange(len(total)) / _WIND_RATE, total))
+    speed = np.where(speed < recipe.threshold, 0.0, speed + 0.05 * rng.standard_normal(seconds))
+    speed = np.round(np.maximum(speed, 0.0) / recipe.resolution) * recipe.resolution
+    gap = int(rng.integers(seconds // 4, seconds // 2))
+    stuck = int(rng.integers(seconds // 2, 3 * seconds // 4))
+    speed[stuck : stuck + 12] = speed[stuck]
+    direction = np.cumsum(rng.normal(0, 2, seconds)) + 240
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, delimiter=";")
+        writer.writerow(["Date", "Time", "Wind speed [km/h]", "Wind direction [deg]"])
+        for second in range(seconds):
+            if gap <= second < gap + recipe.dropout:
+                continue
+            stamp = (first + timedelta(seconds=second)).astimezone(_ZONE)
+            decimal = f"{speed[second] * 3.6:.2f}".replace(".", ",")
+            writer.writerow([f"{stamp:%d.%m.%Y}", f"{stamp:%H:%M:%S}", decimal, f"{direction[second] % 360:.0f}"])
+
+
+def _cups(wind: NDArray[np.float64], distance_constant: float) -> NDArray[np.float64]:
+    """A rotating sensor: du/dt = (U - u) |U| / ℓ, ℓ the distance constant (Kristensen 1998); explicit steps."""
+    reading = np.empty_like(wind)
+    now = wind[0]
+    for i, u in enumerate(wind):
+        now += (u - now) * min(1.0, abs(u) / (distance_constant * _WIND_RATE))
+        reading[i] = now
+    return reading
