@@ -1,0 +1,304 @@
+"""The MCAP container read by offset: the summary at its end, and where each message of a topic lies. No message is
+decoded here, and no offset is trusted before what it points at has been checked.
+
+Source: the MCAP specification, https://mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError, InputError, NotFoundError
+
+MAGIC = b"\x89MCAP0\r\n"
+RECORD_HEAD = 9  # opcode, uint64 length
+MESSAGE_HEAD = RECORD_HEAD + 22  # channel, sequence, log_time, publish_time; then the data
+CHUNK_HEAD = RECORD_HEAD + 8 + 8 + 8 + 4 + 4 + 8  # and the name of the compression; then the records
+_FOOTER = struct.Struct("<BQQQI")
+_TAIL = _FOOTER.size + len(MAGIC)
+_MESSAGE = np.dtype(
+    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
+)
+_RECOVER = "run `flagdata recover` on the file"
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What the end of a record says about it. All offsets lie within the file."""
+
+    data_end: int
+    """Where the summary section begins [B]."""
+    schemas: Mapping[int, Schema]
+    channels: Mapping[str, Channel]
+    """By topic."""
+    chunks: tuple[ChunkIndex, ...]
+    """In file order."""
+    attachments: tuple[AttachmentIndex, ...]
+    metadata: tuple[MetadataIndex, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Messages:
+    """Where the messages of one topic lie, in order of log time: all arrays (n,) int64.
+
+    Attributes:
+        log_time, publish_time: [UTC ns].
+        offset, length: of the message's data in the file [B].
+    """
+
+    log_time: NDArray[np.int64]
+    publish_time: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    length: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.log_time)
+
+
+def open_file(path: Path) -> int:
+    """A file descriptor for reading by offset.
+
+    Raises:
+        NotFoundError: no such file.
+    """
+    try:
+        return os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotFoundError("no such record", where=str(path), fix="check the path, or run flagdata doctor") from None
+
+
+def read_exact(file: int, length: int, offset: int, *, where: str) -> bytes:
+    """`length` bytes at `offset`.
+
+    Raises:
+        CorruptError: the file ends before.
+    """
+    data = os.pread(file, length, offset)
+    while len(data) < length:
+        more = os.pread(file, length - len(data), offset + len(data))
+        if not more:
+            raise CorruptError(f"the record ends before byte {offset + length}", where=where, fix=_RECOVER)
+        data += more
+    return data
+
+
+def read_summary(file: int, *, where: str) -> Summary:
+    """Read and check the summary section.
+
+    Raises:
+        CorruptError: not an MCAP file, cut off, or a summary whose checksum or offsets are wrong.
+    """
+    size = os.fstat(file).st_size
+    if size < len(MAGIC) + _TAIL or os.pread(file, len(MAGIC), 0) != MAGIC:
+        raise CorruptError("not an MCAP record", where=where, fix="check that it is the right file")
+    tail = read_exact(file, _TAIL, size - _TAIL, where=where)
+    if tail[-len(MAGIC) :] != MAGIC:
+        raise CorruptError("the record is cut off: its end is missing", where=where, fix=_RECOVER)
+    opcode, length, start, _, checksum = _FOOTER.unpack_from(tail)
+    if opcode != Opcode.FOOTER or length != _FOOTER.size - RECORD_HEAD:
+        raise CorruptError("the record has no footer", where=where, fix=_RECOVER)
+    if not len(MAGIC) <= start < size - _TAIL:
+        raise CorruptError("the record has no summary", where=where, fix=_RECOVER)
+    body = read_exact(file, size - _TAIL - start, start, where=where)
+    if zlib.crc32(tail[: _FOOTER.size - 4], zlib.crc32(body)) != checksum:
+        raise CorruptError("the checksum of the record's summary is wrong", where=where, fix=_RECOVER)
+    return _summary(body, start, where=where)
+
+
+def _summary(body: bytes, start: int, *, where: str) -> Summary:
+    schemas: dict[int, Schema] = {}
+    channels: dict[str, Channel] = {}
+    chunks: list[ChunkIndex] = []
+    attachments: list[AttachmentIndex] = []
+    metadata: list[MetadataIndex] = []
+    for opcode, record in split_records(body, where=where):
+        if opcode == Opcode.SCHEMA:
+            schema = parse(Schema.read, record, where=where)
+            schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = parse(Channel.read, record, where=where)
+            channels[channel.topic] = channel
+        elif opcode == Opcode.CHUNK_INDEX:
+            chunk = parse(ChunkIndex.read, record, where=where)
+            _check_span(chunk.chunk_start_offset, chunk.chunk_length + chunk.message_index_length, start, where=where)
+            if CHUNK_HEAD + len(chunk.compression.encode()) + chunk.compressed_size != chunk.chunk_length:
+                raise CorruptError("a chunk's lengths contradict each other", where=where, fix=_RECOVER)
+            chunks.append(chunk)
+        elif opcode == Opcode.ATTACHMENT_INDEX:
+            attachment = parse(AttachmentIndex.read, record, where=where)
+            _check_span(attachment.offset, attachment.length, start, where=where)
+            attachments.append(attachment)
+        elif opcode == Opcode.METADATA_INDEX:
+            entry = parse(MetadataIndex.read, record, where=where)
+            _check_span(entry.offset, entry.length, start, where=where)
+            metadata.append(entry)
+    return Summary(
+        data_end=start,
+        schemas=schemas,
+        channels=channels,
+        chunks=tuple(sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)),
+        attachments=tuple(attachments),
+        metadata=tuple(metadata),
+    )
+
+
+def _check_span(offset: int, length: int, end: int, *, where: str) -> None:
+    if offset < len(MAGIC) or offset + length > end:
+        raise CorruptError(
+            f"the summary points to bytes {offset} to {offset + length} of {end}", where=where, fix=_RECOVER
+        )
+
+
+def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of each record in `body`.
+
+    Raises:
+        CorruptError: a record reaches beyond the end.
+    """
+    at = 0
+    while at < len(body):
+        if at + RECORD_HEAD > len(body):
+            raise CorruptError("a record's head is cut off", where=where, fix=_RECOVER)
+        opcode, length = struct.unpack_from("<BQ", body, at)
+        at += RECORD_HEAD
+        if at + length > len(body):
+            raise CorruptError(f"a record of {length} bytes reaches beyond its section", where=where, fix=_RECOVER)
+        yield opcode, bytes(body[at : at + length])
+        at += length
+
+
+def parse(read: Callable[[ReadDataStream], R], record: bytes, *, where: str) -> R:
+    """`record`'s content by the `read` of one of mcap.records.
+
+    Raises:
+        CorruptError: it is not of that kind.
+    """
+    try:
+        return read(ReadDataStream(BytesIO(record)))
+    except (struct.error, UnicodeDecodeError, McapError, OverflowError) as error:
+        raise CorruptError(f"a record of the container cannot be read: {error}", where=where, fix=_RECOVER) from None
+
+
+def data_start(chunk: ChunkIndex) -> int:
+    """Where the records of an uncompressed chunk begin in the file [B]."""
+    return chunk.chunk_start_offset + CHUNK_HEAD + len(chunk.compression.encode())
+
+
+def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Messages:
+    """Where each message of `topic` lies; every head is read and held against the index. None if the topic is absent.
+
+    Raises:
+        CorruptError: an index that does not fit the messages.
+        InputError: compressed chunks, whose messages have no place in the file.
+    """
+    channel = summary.channels.get(topic)
+    if channel is None:
+        return Messages(log_time=_empty(), publish_time=_empty(), offset=_empty(), length=_empty())
+    times, places, limits = [_empty()], [_empty()], [_empty()]
+    for chunk in summary.chunks:
+        at = chunk.message_index_offsets.get(channel.id)
+        if at is None:
+            continue
+        if chunk.compression:
+            raise InputError(
+                f"the record's chunks are compressed ({chunk.compression})",
+                where=where,
+                fix=_RECOVER + " to rewrite it",
+            )
+        time, offset = _message_index(file, at, channel.id, summary.data_end, where=where)
+        times.append(time)
+        places.append(offset + data_start(chunk))
+        limits.append(np.full(len(time), data_start(chunk) + chunk.compressed_size))
+        if len(offset) and (offset.min() < 0 or offset.max() + MESSAGE_HEAD > chunk.compressed_size):
+            raise CorruptError("a message index points out of its chunk", where=where, fix=_RECOVER)
+    time, place, limit = np.concatenate(times), np.concatenate(places), np.concatenate(limits)
+    heads = b"".join([os.pread(file, MESSAGE_HEAD, at) for at in place.tolist()])
+    if len(heads) != MESSAGE_HEAD * len(place):
+        raise CorruptError("the record ends before its last message", where=where, fix=_RECOVER)
+    head = np.frombuffer(heads, dtype=_MESSAGE)
+    length = head["length"].astype(np.int64) - (MESSAGE_HEAD - RECORD_HEAD)
+    sound = (
+        (head["opcode"] == Opcode.MESSAGE)
+        & (head["channel"] == channel.id)
+        & (head["log"].astype(np.int64) == time)
+        & (length >= 0)
+        & (place + MESSAGE_HEAD + length <= limit)
+    )
+    if not bool(sound.all()):
+        bad = int(np.flatnonzero(~sound)[0])
+        raise CorruptError(
+            f"message {bad} of {topic} is not where the index says", where=f"{where}, byte {place[bad]}", fix=_RECOVER
+        )
+    order = np.argsort(time, kind="stable")
+    return Messages(
+        log_time=time[order],
+        publish_time=head["publish"].astype(np.int64)[order],
+        offset=(place + MESSAGE_HEAD)[order],
+        length=length[order],
+    )
+
+
+def _empty() -> NDArray[np.int64]:
+    return np.empty(0, dtype=np.int64)
+
+
+def _message_index(
+    file: int, at: int, channel: int, end: int, *, where: str
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    head = struct.Struct("<BQHI")
+    if at + head.size > end:
+        raise CorruptError("a message index lies beyond the data", where=where, fix=_RECOVER)
+    opcode, length, owner, size = head.unpack(read_exact(file, head.size, at, where=where))
+    if opcode != Opcode.MESSAGE_INDEX or owner != channel or size + 6 != length or size % 16 or at + size > end:
+        raise CorruptError("no message index where the summary says", where=f"{where}, byte {at}", fix=_RECOVER)
+    pairs = np.frombuffer(read_exact(file, size, at + head.size, where=where), dtype="<u8").astype(np.int64)
+    return pairs[0::2], pairs[1::2]
+
+
+def read_metadata(file: int, summary: Summary, *, where: str) -> dict[str, dict[str, str]]:
+    """All metadata records, by name.
+
+    Raises:
+        CorruptError: not what the summary says.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for entry in summary.metadata:
+        record = _record_at(file, entry.offset, entry.length, Opcode.METADATA, where=where)
+        found[entry.name] = parse(Metadata.read, record, where=where).metadata
+    return found
+
+
+def read_attachment(file: int, entry: AttachmentIndex, *, where: str) -> bytes:
+    """The bytes of an attachment as stored, checked.
+
+    Raises:
+        CorruptError: the checksum is wrong.
+    """
+    record = _record_at(file, entry.offset, entry.length, Opcode.ATTACHMENT, where=where)
+    if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
+        raise CorruptError(f"the checksum of attachment {entry.name!r} is wrong", where=where, fix=_RECOVER)
+    return parse(Attachment.read, record, where=where).data
+
+
+def _record_at(file: int, offset: int, length: int, opcode: Opcode, *, where: str) -> bytes:
+    whole = read_exact(file, length, offset, where=where)
+    records = list(split_records(whole, where=where))
+    if len(records) != 1 or records[0][0] != opcode:
+        raise CorruptError(f"no {opcode.name.lower()} at byte {offset}", where=where, fix=_RECOVER)
+    return records[0][1]

@@ -1,0 +1,59 @@
+"""The metadata records of an MCAP record: names, and how a sensor is written into one and read back."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from flagdata.errors import CorruptError
+from flagdata.signals import CameraInfo, Sensor
+
+SENSOR = "sensor"
+CAMERA = "camera"
+CLOCK = "clock"
+PROVENANCE = "provenance"
+UNITS = "units"
+SALVAGE = "salvage"
+
+
+def sensor_metadata(sensor: Sensor) -> dict[str, str]:
+    """A sensor's known properties as text; numbers in SI, written so that they read back exactly."""
+    values = {field.name: getattr(sensor, field.name) for field in dataclasses.fields(sensor)}
+    return {
+        name: value if isinstance(value, str) else repr(value) for name, value in values.items() if value is not None
+    }
+
+
+def sensor_of(metadata: Mapping[str, Mapping[str, str]], *, where: str) -> Sensor:
+    """The sensor that `sensor_metadata` wrote.
+
+    Raises:
+        CorruptError: no such metadata, or a property that is not a number.
+    """
+    written = dict(metadata.get(SENSOR, {}))
+    if "name" not in written:
+        raise CorruptError("a wind record without its sensor", where=where, fix="ingest the log again")
+    name = written.pop("name")
+    known = {field.name for field in dataclasses.fields(Sensor)}
+    try:
+        numbers = {key: float(value) for key, value in written.items() if key in known}
+    except ValueError as error:
+        raise CorruptError(f"sensor metadata: {error}", where=where, fix="ingest the log again") from None
+    return Sensor(
+        name=name,
+        height=numbers.get("height"),
+        distance_constant=numbers.get("distance_constant"),
+        averaging=numbers.get("averaging"),
+        threshold=numbers.get("threshold"),
+        resolution=numbers.get("resolution"),
+        accuracy=numbers.get("accuracy"),
+        accuracy_relative=numbers.get("accuracy_relative"),
+    )
+
+
+def camera_metadata(info: CameraInfo) -> dict[str, str]:
+    """A camera's settled options as text; rates in Hz, sizes in pixels, `start` in UTC nanoseconds."""
+    values = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
+    return {
+        name: ",".join(map(str, value)) if isinstance(value, tuple) else str(value) for name, value in values.items()
+    }

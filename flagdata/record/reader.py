@@ -1,0 +1,255 @@
+"""Reads a record: frames straight from their place in the file, wind, parameters, metadata and attachments."""
+
+from __future__ import annotations
+
+import functools
+import os
+import weakref
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import simplejpeg
+from google.protobuf.message import DecodeError
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
+from flagdata.record import container, messages
+from flagdata.record.metadata import sensor_of
+from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX
+from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
+from flagdata.signals import WindAverage, WindSeries
+
+SPAN_SLACK = 256 << 10
+"""Bytes of other topics that one read of neighbouring frames may take along."""
+_VERIFY = "run flagdata verify"
+
+
+class Record:
+    """A record opened for reading. Cheap to open and to pickle: each process opens the file itself, when first needed,
+    and reads the summary and the frame index once. Reads are by offset, so that a fork or threads share nothing.
+
+    Attributes:
+        path: the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @classmethod
+    def open(cls, path: Path) -> Record:
+        """Open the record at `path` and check its container.
+
+        Raises:
+            NotFoundError: no such file.
+            CorruptError: not a whole MCAP record.
+        """
+        record = cls(Path(path))
+        record._summary  # noqa: B018  read and checked here, kept for later
+        return record
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path}
+
+    def __repr__(self) -> str:
+        return f"Record({str(self.path)!r})"
+
+    @functools.cached_property
+    def _file(self) -> int:
+        file = container.open_file(self.path)
+        weakref.finalize(self, os.close, file)
+        return file
+
+    @functools.cached_property
+    def _summary(self) -> container.Summary:
+        return container.read_summary(self._file, where=str(self.path))
+
+    @functools.cached_property
+    def metadata(self) -> Mapping[str, Mapping[str, str]]:
+        """The metadata records by name."""
+        return container.read_metadata(self._file, self._summary, where=str(self.path))
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        return tuple(sorted(self._summary.channels))
+
+    @functools.cached_property
+    def _frames(self) -> container.Messages:
+        return self._messages(TOPIC_IMAGE)
+
+    @property
+    def frame_count(self) -> int:
+        return len(self._frames)
+
+    @property
+    def frame_times(self) -> NDArray[np.int64]:
+        """(n,) instants of the frames on the common clock [UTC ns]."""
+        return self._frames.log_time
+
+    @property
+    def device_frame_times(self) -> NDArray[np.int64]:
+        """(n,) instants of the frames on the camera's own clock [UTC ns]."""
+        return self._frames.publish_time
+
+    def frames(self, first: int, count: int) -> NDArray[np.uint8]:
+        """`count` consecutive frames from index `first`: (count, height, width) gray.
+
+        Raises:
+            NotFoundError: the record has no such frames.
+            CorruptError: a frame that cannot be decoded, or of another size than the first.
+        """
+        pictures = self._payloads(first, count)
+        where = str(self.path)
+        try:
+            height, width, _, _ = simplejpeg.decode_jpeg_header(pictures[0])
+            out = np.empty((count, int(height), int(width), 1), dtype=np.uint8)
+            for i, picture in enumerate(pictures):
+                decoded = simplejpeg.decode_jpeg(picture, colorspace="GRAY", buffer=out[i])
+                if decoded.shape != out.shape[1:]:
+                    raise CorruptError(
+                        f"frame {first + i} is {decoded.shape[1]}×{decoded.shape[0]}, others {width}×{height}",
+                        where=where,
+                        fix="ingest the camera file again",
+                    )
+        except ValueError as error:
+            raise CorruptError(f"frames {first} to {first + count - 1}: {error}", where=where, fix=_VERIFY) from None
+        return out[..., 0]
+
+    def jpeg(self, index: int) -> bytes:
+        """The stored JPEG of one frame.
+
+        Raises:
+            NotFoundError: the record has no such frame.
+        """
+        return bytes(self._payloads(index, 1)[0])
+
+    def timestamps(self, first: int, count: int) -> NDArray[np.int64]:
+        """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages."""
+        decoded = [messages.CompressedImage.FromString(bytes(m)) for m in self._read(self._frames, first, count)]
+        return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
+
+    def wind(self) -> WindSeries | None:
+        """All samples of the anemometer, on the common clock; `None` if the record has no wind."""
+        table = self._messages(TOPIC_WIND)
+        if not len(table):
+            return None
+        samples = self._decode(TOPIC_WIND, messages.WindSample, table)
+        columns: dict[str, NDArray[np.float64]] = {}
+        for channel, (name, _) in messages.WIND_FIELDS.items():
+            if any(sample.HasField(name) for sample in samples):
+                columns[channel] = np.array([getattr(s, name) if s.HasField(name) else np.nan for s in samples])
+        hosts = [messages.timestamp_of(s.host_time) for s in samples if s.HasField("host_time")]
+        return WindSeries(
+            time=table.log_time,
+            channels=columns,
+            flags=np.array([s.flags for s in samples], dtype=np.uint16),
+            sensor=sensor_of(self.metadata, where=str(self.path)),
+            host_time=np.array(hosts, dtype=np.int64) if len(hosts) == len(samples) else None,
+        )
+
+    @property
+    def device_wind_times(self) -> NDArray[np.int64]:
+        """(n,) instants of the wind samples on the anemometer's own clock [UTC ns]."""
+        return self._messages(TOPIC_WIND).publish_time
+
+    def wind_1hz(self) -> WindAverage | None:
+        """Means over 1 s of the common clock; `None` if the record has no wind."""
+        table = self._messages(TOPIC_WIND_1HZ)
+        if not len(table):
+            return None
+        means = self._decode(TOPIC_WIND_1HZ, messages.WindMean, table)
+        return WindAverage(
+            time=table.log_time,
+            speed=np.array([m.speed for m in means]),
+            sigma=np.array([m.sigma for m in means]),
+            direction=np.array([m.direction for m in means]),
+            count=np.array([m.count for m in means], dtype=np.int32),
+            period=means[0].period,
+        )
+
+    @functools.cached_property
+    def truth(self) -> Mapping[str, float] | None:
+        """The parameters a simulated record was made with, SI; `None` for a real one."""
+        table = self._messages(TOPIC_TRUTH)
+        if not len(table):
+            return None
+        message = self._decode(TOPIC_TRUTH, messages.TruthParameters, table)[0]
+        return {p.name: p.value for p in message.parameters}
+
+    @property
+    def attachments(self) -> tuple[str, ...]:
+        """Names of the attached files."""
+        return tuple(_own_name(entry.name, entry.media_type) for entry in self._summary.attachments)
+
+    def attachment(self, name: str) -> bytes:
+        """The bytes of an attached file, as they were before packing.
+
+        Raises:
+            NotFoundError: no attachment of that name.
+            CorruptError: its checksum is wrong, or it unpacks to more than the limit.
+        """
+        for entry in self._summary.attachments:
+            if _own_name(entry.name, entry.media_type) != name:
+                continue
+            data = container.read_attachment(self._file, entry, where=str(self.path))
+            return _unpack(data, name) if entry.media_type.endswith(GZIP_SUFFIX) else data
+        raise NotFoundError(
+            f"no attachment {name!r}", where=str(self.path), fix=f"there are: {', '.join(self.attachments) or 'none'}"
+        )
+
+    def _messages(self, topic: str) -> container.Messages:
+        return container.read_messages(self._file, self._summary, topic, where=str(self.path))
+
+    def _payloads(self, first: int, count: int) -> list[memoryview]:
+        parts = self._read(self._frames, first, count)
+        spans = [messages.payload_span(part, start=0, end=len(part)) for part in parts]
+        return [part[start:end] for part, (start, end) in zip(parts, spans, strict=True)]
+
+    def _read(self, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
+        if count < 1 or first < 0:
+            raise UsageError(f"{count} frames from {first} were asked for", fix="ask for at least one, from 0 or later")
+        if first + count > len(table):
+            raise NotFoundError(
+                f"frames {first} to {first + count - 1} of {len(table)}", where=str(self.path), fix="ask for fewer"
+            )
+        offsets = table.offset[first : first + count].tolist()
+        lengths = table.length[first : first + count].tolist()
+        start, end = offsets[0], offsets[-1] + lengths[-1]
+        where = str(self.path)
+        if offsets == sorted(offsets) and end - start <= sum(lengths) + SPAN_SLACK:
+            block = memoryview(container.read_exact(self._file, end - start, start, where=where))
+            return [block[o - start : o - start + n] for o, n in zip(offsets, lengths, strict=True)]
+        return [
+            memoryview(container.read_exact(self._file, n, o, where=where))
+            for o, n in zip(offsets, lengths, strict=True)
+        ]
+
+    def _decode(self, topic: str, kind: Any, table: container.Messages) -> list[Any]:
+        schema = self._summary.schemas.get(self._summary.channels[topic].schema_id)
+        if schema is None or schema.name != kind.DESCRIPTOR.full_name:
+            raise InputError(
+                f"{topic} holds {schema.name if schema else 'messages without a schema'}",
+                where=str(self.path),
+                fix=f"write it as {kind.DESCRIPTOR.full_name}",
+            )
+        try:
+            return [kind.FromString(bytes(part)) for part in self._read(table, 0, len(table))]
+        except DecodeError as error:
+            raise CorruptError(f"{topic}: {error}", where=str(self.path), fix=_VERIFY) from None
+
+
+def _own_name(name: str, media_type: str) -> str:
+    return name.removesuffix(".gz") if media_type.endswith(GZIP_SUFFIX) else name
+
+
+def _unpack(data: bytes, name: str) -> bytes:
+    unpacker = zlib.decompressobj(wbits=31)
+    try:
+        out = unpacker.decompress(data, ATTACHMENT_LIMIT)
+    except zlib.error as error:
+        raise CorruptError(f"attachment {name!r}: {error}", fix=_VERIFY) from None
+    if not unpacker.eof:
+        raise CorruptError(f"attachment {name!r} is cut off or unpacks beyond {ATTACHMENT_LIMIT} bytes", fix=_VERIFY)
+    return out

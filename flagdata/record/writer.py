@@ -1,0 +1,275 @@
+"""Writes a record: frames, wind, parameters and attachments into one MCAP file, streaming, with reproducible bytes."""
+
+from __future__ import annotations
+
+import gzip
+import importlib
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import simplejpeg
+from mcap.well_known import MessageEncoding, SchemaEncoding
+from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
+
+from flagdata.align.clock import ClockModel
+from flagdata.errors import ConflictError, InputError, LimitError, UsageError
+from flagdata.record import messages
+from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
+from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
+from flagdata.signals import WindSeries
+from flagdata.timebase import NANOSECONDS
+
+JPEG_QUALITY = 90
+FRAME_ID = "camera"
+PROFILE = "flagdata"
+ATTACHMENT_LIMIT = 256 << 20
+COMPRESS_ATTACHMENTS_ABOVE = 64 << 10
+GZIP_SUFFIX = "+gzip"  # of the media type of an attachment that was packed here (RFC 8460, section 6.5)
+MEAN_PERIOD = 1.0  # s, of the derived means on schema.TOPIC_WIND_1HZ
+
+
+class Chunking(StrEnum):
+    """How often data becomes safe against a crash, against how directly it is read afterwards."""
+
+    COMMITTED = "committed"
+    """Chunks of 1 MiB, for a file that is written in one go."""
+    LIVE = "live"
+    """Chunks of 256 KiB, and one at least every second of log time, for a file written while recording."""
+
+
+_CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
+
+
+class RecordWriter:
+    """Writes one record; a context manager. Chunks are not compressed, so that readers reach a frame directly.
+
+    Leaving the block normally completes the file. Leaving it by an exception, or a crash, leaves a file without a
+    summary: `salvage` recovers its whole chunks. The same calls give the same bytes.
+
+    Args:
+        path: the file to create; it must not exist.
+        metadata: MCAP metadata records, name → key → value ("camera", "provenance", …).
+        chunking: see `Chunking`.
+        quality: JPEG quality of frames given as arrays, 1 to 100.
+
+    Raises:
+        ConflictError: `path` exists.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        metadata: Mapping[str, Mapping[str, str]],
+        chunking: Chunking = Chunking.COMMITTED,
+        quality: int = JPEG_QUALITY,
+    ) -> None:
+        if not 1 <= quality <= 100:
+            raise UsageError(f"JPEG quality {quality} is not between 1 and 100", fix="leave it at the default")
+        self.path = path
+        self._quality = quality
+        self._chunking = chunking
+        try:
+            self._stream = path.open("xb")
+        except FileExistsError:
+            raise ConflictError("the record exists already", where=str(path), fix="choose another path") from None
+        self._writer = Writer(
+            self._stream,
+            chunk_size=_CHUNK_BYTES[chunking],
+            compression=CompressionType.NONE,
+            enable_data_crcs=True,
+        )
+        self._writer.start(profile=PROFILE, library=f"flagdata format {FORMAT_VERSION}")
+        self._names: set[str] = set()
+        self._channels: dict[str, int] = {}
+        self._sequences: dict[str, int] = {}
+        self._last_frame: tuple[int, int] | None = None
+        self._flushed: int | None = None
+        for name, values in metadata.items():
+            self._metadata(name, values)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._stream:
+            if kind is None:
+                self._writer.finish()
+                self._stream.flush()
+                os.fsync(self._stream.fileno())
+
+    def frame(self, *, log_time: int, publish_time: int, timestamp: int, image: NDArray[np.uint8] | bytes) -> None:
+        """Append one frame.
+
+        Args:
+            log_time: instant on the common clock [UTC ns]; greater than the last frame's.
+            publish_time: instant on the camera's own clock [UTC ns].
+            timestamp: mid-exposure on the common clock [UTC ns].
+            image: (height, width) uint8 gray, encoded as JPEG here; or the bytes of a JPEG, kept as they are.
+
+        Raises:
+            InputError: an array of another shape or type, bytes that are no JPEG, or time that does not increase.
+        """
+        self._check_order(log_time, publish_time)
+        data = image if isinstance(image, bytes) else encode_jpeg(image, quality=self._quality)
+        if data[:2] != b"\xff\xd8":
+            raise InputError("a frame's bytes are not a JPEG", fix="give a (height, width) uint8 array or JPEG bytes")
+        message = messages.CompressedImage(frame_id=FRAME_ID, format="jpeg", data=data)
+        messages.set_timestamp(message.timestamp, timestamp)
+        self._message(TOPIC_IMAGE, message, log_time=log_time, publish_time=publish_time)
+
+    def wind(self, series: WindSeries, *, clock: ClockModel | None = None) -> None:
+        """Write all samples of an anemometer, and their means over 1 s of the common clock.
+
+        Args:
+            series: on the device's own clock.
+            clock: of the device on the common clock; `None` where the device's clock is the common clock.
+
+        Raises:
+            ConflictError: called twice.
+            InputError: the clock model folds time back over a jump.
+        """
+        if TOPIC_WIND in self._channels:
+            raise ConflictError("the record has wind already", where=str(self.path), fix="write one series a record")
+        self._metadata(SENSOR, sensor_metadata(series.sensor))
+        common = series.time
+        if clock is not None:
+            common = clock.to_common(series.time)
+            self._metadata(CLOCK + "/" + clock.device, {"model": clock.to_json()})
+        aligned = replace(series, time=common)
+        columns = [
+            (messages.WIND_FIELDS[name][0], np.asarray(values, dtype=np.float64).tolist())
+            for name, values in sorted(series.channels.items())
+        ]
+        hosts = None if series.host_time is None else series.host_time.tolist()
+        flags = series.flags.tolist()
+        for i, (log_time, publish_time) in enumerate(zip(common.tolist(), series.time.tolist(), strict=True)):
+            sample = messages.WindSample(flags=flags[i], **{name: values[i] for name, values in columns})
+            messages.set_timestamp(sample.timestamp, log_time)
+            if hosts is not None:
+                messages.set_timestamp(sample.host_time, hosts[i])
+            self._message(TOPIC_WIND, sample, log_time=log_time, publish_time=publish_time)
+        self._means(aligned)
+
+    def truth(self, parameters: Mapping[str, float], *, log_time: int) -> None:
+        """Write the parameters a simulated record was made with, by name, in SI.
+
+        Raises:
+            ConflictError: called twice.
+            InputError: a value that is not finite.
+        """
+        if TOPIC_TRUTH in self._channels:
+            raise ConflictError("the record has parameters already", where=str(self.path), fix="write them once")
+        message = messages.TruthParameters()
+        messages.set_timestamp(message.timestamp, log_time)
+        for name in sorted(parameters):
+            if not math.isfinite(parameters[name]):
+                raise InputError(f"parameter {name!r} is {parameters[name]}", fix="leave unknown parameters out")
+            message.parameters.add(name=name, value=parameters[name])
+        self._message(TOPIC_TRUTH, message, log_time=log_time, publish_time=log_time)
+
+    def attach(self, name: str, data: bytes, *, media_type: str, log_time: int) -> None:
+        """Attach a file (the vendor's log, a calibration). Above 64 KiB it is stored gzipped as `name`.gz where that is
+        smaller; readers give it back by its own name.
+
+        Raises:
+            ConflictError: the name is taken.
+            LimitError: more than 256 MiB.
+        """
+        if len(data) > ATTACHMENT_LIMIT:
+            raise LimitError(
+                f"attachment of {len(data)} bytes", where=name, fix=f"attach at most {ATTACHMENT_LIMIT} bytes"
+            )
+        if f"attachment {name}" in self._names:
+            raise ConflictError(f"attachment {name!r} is there already", where=str(self.path), fix="rename it")
+        self._names.add(f"attachment {name}")
+        if media_type.endswith(GZIP_SUFFIX):
+            raise InputError(f"media type {media_type!r} is kept for what is packed here", fix="use application/gzip")
+        if len(data) > COMPRESS_ATTACHMENTS_ABOVE:
+            packed = gzip.compress(data, mtime=0)
+            if len(packed) < len(data):
+                name, data, media_type = f"{name}.gz", packed, media_type + GZIP_SUFFIX
+        self._writer.add_attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data)
+
+    def _metadata(self, name: str, values: Mapping[str, str]) -> None:
+        if name in self._names:
+            raise ConflictError(f"metadata {name!r} is there already", where=str(self.path), fix="write it once")
+        self._names.add(name)
+        self._writer.add_metadata(name, dict(values))
+
+    def _means(self, aligned: WindSeries) -> None:
+        try:
+            average = importlib.import_module("flagdata.ingest.anemometer.averaging").average
+        except ModuleNotFoundError:
+            return
+        means = average(aligned, MEAN_PERIOD)
+        rows = zip(
+            means.time.tolist(), means.speed.tolist(), means.sigma.tolist(), means.direction.tolist(),
+            means.count.tolist(), strict=True,
+        )  # fmt: skip
+        for time, speed, sigma, direction, count in rows:
+            mean = messages.WindMean(speed=speed, sigma=sigma, direction=direction, count=count, period=means.period)
+            messages.set_timestamp(mean.timestamp, time)
+            self._message(TOPIC_WIND_1HZ, mean, log_time=time, publish_time=time)
+
+    def _check_order(self, log_time: int, publish_time: int) -> None:
+        if self._last_frame is not None and (log_time <= self._last_frame[0] or publish_time <= self._last_frame[1]):
+            raise InputError(
+                f"a frame at {log_time} (device {publish_time}) does not follow {self._last_frame[0]} "
+                f"(device {self._last_frame[1]})",
+                where=str(self.path),
+                fix="give frames in order of time",
+            )
+        self._last_frame = (log_time, publish_time)
+
+    def _message(self, topic: str, message: Any, *, log_time: int, publish_time: int) -> None:
+        if topic not in self._channels:
+            schema = self._writer.register_schema(
+                name=message.DESCRIPTOR.full_name,
+                encoding=SchemaEncoding.Protobuf,
+                data=messages.descriptor_set(type(message)),
+            )
+            self._channels[topic] = self._writer.register_channel(
+                topic=topic, message_encoding=MessageEncoding.Protobuf, schema_id=schema
+            )
+            self._sequences[topic] = 0
+        if self._chunking is Chunking.LIVE:
+            self._flush_each_second(log_time)
+        self._writer.add_message(
+            channel_id=self._channels[topic],
+            log_time=log_time,
+            data=message.SerializeToString(deterministic=True),
+            publish_time=publish_time,
+            sequence=self._sequences[topic],
+        )
+        self._sequences[topic] += 1
+
+    def _flush_each_second(self, log_time: int) -> None:
+        if self._flushed is None:
+            self._flushed = log_time
+        elif abs(log_time - self._flushed) >= NANOSECONDS:
+            self._writer.flush()
+            self._flushed = log_time
+
+
+def encode_jpeg(image: NDArray[np.uint8], *, quality: int = JPEG_QUALITY) -> bytes:
+    """JPEG of a (height, width) uint8 gray image.
+
+    Raises:
+        InputError: another shape or type.
+    """
+    if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:
+        raise InputError(
+            f"a frame of shape {image.shape} and type {image.dtype}", fix="give a (height, width) uint8 gray image"
+        )
+    return simplejpeg.encode_jpeg(np.ascontiguousarray(image)[..., None], quality=quality, colorspace="GRAY")
