@@ -1,0 +1,18 @@
+"""The lake: immutable objects under their content hash, a Delta catalog whose one commit publishes them, and refs.
+
+Layout of a lake's folder:
+
+    lake.json            format version and identity of the lake
+    catalog/             the Delta table; one row an artifact (schema.CATALOG)
+    mcap/<sha256>.mcap   records
+    zarr/<treehash>.zarr mesh sequences
+    refs/tags/           tags, put once, never changed
+    refs/branches/       branches: where each forked from its parent
+    staging/             one folder a running transaction, with its lease; nothing in it is visible
+"""
+
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.lake import Lake
+from flagdata.lake.transaction import CommitResult, Transaction
+
+__all__ = ["Artifact", "CommitResult", "Lake", "Transaction"]

@@ -1,0 +1,147 @@
+"""One row of the catalog, typed, with the identity that makes ingest idempotent."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+from flagdata import provenance
+from flagdata.errors import InputError
+from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
+
+OBJECT_NAME = re.compile(r"(mcap|zarr)/[0-9a-f]{64}")
+_IDENTITY = re.compile(r"[0-9a-f]{32}")
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+_JSON_COLUMNS = ("parameters", "clock_model", "report")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Artifact:
+    """What a catalog row says; fields are the columns of `schema.CATALOG`, where units and meanings are.
+
+    `recipe` is given as a mapping; `id` (column `artifact`) and `recipe_hash` are derived. `parameters`, `clock_model`
+    and `report` are JSON texts. `branch` and `created` are set by the transaction that publishes the row.
+
+    Raises:
+        InputError: a value that is malformed, naming the column.
+    """
+
+    kind: Kind
+    name: str
+    branch: str = "main"
+    object: str | None = None
+    object_bytes: int | None = None
+    source_hash: str | None = None
+    source_name: str | None = None
+    parents: Sequence[str] = ()
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+    code_version: str = field(default_factory=provenance.code_version)
+    format_version: int = FORMAT_VERSION
+    seed: int | None = None
+    created: datetime | None = None
+    recording: str | None = None
+    session: str | None = None
+    day: str | None = None
+    start: int | None = None
+    end: int | None = None
+    frame_first: int | None = None
+    frame_count: int | None = None
+    rate: float | None = None
+    wind: float | None = None
+    wind_sigma: float | None = None
+    wind_coverage: float | None = None
+    wind_staleness: float | None = None
+    clock_method: str | None = None
+    clock_offset: float | None = None
+    clock_drift: float | None = None
+    clock_sigma: float | None = None
+    clock_model: str | None = None
+    parameters: str | None = None
+    quality: Sequence[str] = ()
+    report: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in list(Kind):
+            raise self._bad("kind", self.kind, f"one of {', '.join(Kind)}")
+        object.__setattr__(self, "kind", Kind(self.kind))
+        object.__setattr__(self, "parents", tuple(self.parents))
+        object.__setattr__(self, "quality", tuple(self.quality))
+        if not self.name.strip():
+            raise self._bad("name", self.name, "a name people can recognise it by")
+        if self.object is not None and not OBJECT_NAME.fullmatch(self.object):
+            raise self._bad("object", self.object, "what Transaction.put returned")
+        for parent in (*self.parents, *([self.recording] if self.recording else [])):
+            if not _IDENTITY.fullmatch(parent):
+                raise self._bad("parents", parent, "full artifact ids (32 hexadecimal digits)")
+        if self.source_hash is not None and not _SHA256.fullmatch(self.source_hash):
+            raise self._bad("source_hash", self.source_hash, "a SHA-256 in hexadecimal")
+        if self.start is not None and self.end is not None and self.end < self.start:
+            raise self._bad("end", self.end, "an instant that is not before the start")
+        for column in ("object_bytes", "frame_first", "frame_count"):
+            value = getattr(self, column)
+            if value is not None and value < 0:
+                raise self._bad(column, value, "a number that is not negative")
+        for column in _JSON_COLUMNS:
+            text = getattr(self, column)
+            if text is not None:
+                try:
+                    json.loads(text)
+                except (TypeError, ValueError) as error:
+                    raise self._bad(column, str(error), "JSON text") from None
+
+    def _bad(self, column: str, value: object, wanted: str) -> InputError:
+        return InputError(f"{column} is {value!r}", where=f"artifact {self.name!r}", fix=f"give {wanted}")
+
+    @property
+    def recipe_hash(self) -> str:
+        """SHA-256 of the recipe's canonical JSON."""
+        return provenance.recipe_hash(self.recipe)
+
+    @property
+    def id(self) -> str:
+        """Identity: what went in and what it is a part of; 32 hexadecimal digits of a SHA-256.
+
+        Neither the object's bytes nor the code version take part: the same source under the same recipe is the same
+        artifact, so that ingesting it again finds it.
+        """
+        identity = {
+            "kind": self.kind.value,
+            "parents": list(self.parents),
+            "source_hash": self.source_hash,
+            "recipe_hash": self.recipe_hash,
+            "frame_first": self.frame_first,
+            "frame_count": self.frame_count,
+            "seed": self.seed,
+        }
+        return provenance.digest(provenance.canonical(identity))[:32]
+
+    def row(self) -> dict[str, Any]:
+        """Values by catalog column; instants as int64, lists as lists."""
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        values.update(
+            artifact=self.id,
+            kind=self.kind.value,
+            parents=list(self.parents),
+            quality=list(self.quality),
+            recipe=provenance.canonical(self.recipe),
+            recipe_hash=self.recipe_hash,
+            created=self.created or datetime.now(UTC),
+        )
+        return {column: values[column] for column in CATALOG}
+
+    @classmethod
+    def from_row(cls, row: Mapping[str, Any]) -> Artifact:
+        """The artifact of a catalog row (the inverse of `row`).
+
+        Raises:
+            InputError: a row whose values break the rules above.
+        """
+        names = {f.name for f in dataclasses.fields(cls)}
+        values = {column: value for column, value in row.items() if column in names}
+        values["recipe"] = json.loads(row["recipe"]) if row.get("recipe") else {}
+        return cls(**values)

@@ -1,0 +1,228 @@
+"""The catalog: one Delta table, appended to under optimistic concurrency, every version readable for good.
+
+Each append is one Parquet file and one log entry. The file is written and flushed to disk first; the log entry is put
+only if its version number is free, so of two writers at the same version one wins and the other is told (`Moved`) and
+looks again. The log is never expired: a tag must be readable for as long as the lake exists.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import uuid
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+import deltalake
+import pyarrow as pa
+import pyarrow.parquet as pq
+from deltalake import CommitProperties, DeltaTable, PostCommitHookProperties
+from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
+from deltalake.transaction import AddAction
+
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
+from flagdata.lake.durable import flush_file, flush_folder
+from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_CONFIGURATION = {
+    "delta.enableExpiredLogCleanup": "false",
+    "delta.logRetentionDuration": "interval 36500 days",
+}
+_INFO_PREFIX = "flagdata."
+_CACHED_VERSIONS = 2
+_user_pid: int | None = None
+
+
+class Moved(Exception):  # noqa: N818 — an outcome to act on, never shown to a user
+    """Another writer has published since the version the append was based on."""
+
+
+def _in_one_process(function: Callable[P, T]) -> Callable[P, T]:
+    """Refuses the Delta library in a forked child of a process that used it: it would hang or crash there."""
+
+    @wraps(function)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> T:
+        global _user_pid
+        if _user_pid is None:
+            _user_pid = os.getpid()
+        elif _user_pid != os.getpid():
+            raise FlagdataError(
+                "the catalog was used before this process was forked, and cannot be used in the child",
+                where=f"process {os.getpid()}",
+                fix="resolve the query in the parent, or start workers by spawn",
+            )
+        return function(*args, **kwargs)
+
+    return guarded
+
+
+class Catalog:
+    """The Delta table under `path`; holds no open files. Rows are ordered by commit, then start, then frame."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._tables: OrderedDict[int, pa.Table] = OrderedDict()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path, "_tables": OrderedDict()}
+
+    @_in_one_process
+    def create(self, info: Mapping[str, str]) -> None:
+        """Make the empty table."""
+        DeltaTable.create(
+            str(self.path),
+            catalog_schema(),
+            mode="error",
+            configuration=_CONFIGURATION,
+            commit_properties=_properties(info),
+        )
+        self._flush_log(0)
+
+    @_in_one_process
+    def head(self) -> int:
+        """The newest version."""
+        return self._open(None).version()
+
+    @_in_one_process
+    def rows(self, version: int) -> pa.Table:
+        """All rows of one version, of all branches, in the catalog's schema; absent columns of old rows are null.
+
+        Raises:
+            NotFoundError: no such version.
+            CorruptError: written by a newer format, or a file of the table is gone.
+        """
+        if version in self._tables:
+            self._tables.move_to_end(version)
+            return self._tables[version]
+        table = self._conform(self._read(self._open(version)))
+        order = [(name, "ascending") for name in ("created", "start", "frame_first", "artifact")]
+        table = table.sort_by(order)
+        self._tables[version] = table
+        while len(self._tables) > _CACHED_VERSIONS:
+            self._tables.popitem(last=False)
+        return table
+
+    @_in_one_process
+    def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
+        """Publish `rows` as version `base + 1`; durable when it returns.
+
+        Raises:
+            Moved: `base` is no longer the newest version; nothing was published.
+        """
+        table = self._open(base)
+        missing = [name for name in CATALOG if name not in {f.name for f in table.schema().fields}]
+        if missing:
+            self._evolve(table, missing)
+            raise Moved
+        path = self.path / f"{uuid.uuid4().hex}.parquet"
+        pq.write_table(rows, path, compression="zstd")
+        flush_file(path)
+        flush_folder(self.path)
+        added = AddAction(
+            path=path.name,
+            size=path.stat().st_size,
+            partition_values={},
+            modification_time=time.time_ns() // 1_000_000,
+            data_change=True,
+            stats=json.dumps({"numRecords": rows.num_rows}),
+        )
+        try:
+            table.create_write_transaction(
+                [added],
+                "append",
+                table.schema(),
+                commit_properties=_properties(info),
+                post_commithook_properties=_HOOKS,
+            )
+        except CommitFailedError:
+            path.unlink()
+            raise Moved from None
+        version = base + 1
+        self._flush_log(version)
+        return version
+
+    @_in_one_process
+    def history(self) -> list[dict[str, Any]]:
+        """One entry a version, newest first: version, timestamp (UTC ms), operation and what the writer said of it."""
+        return [
+            {
+                "version": entry["version"],
+                "timestamp": entry["timestamp"],
+                "operation": entry["operation"],
+                **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
+            }
+            for entry in self._open(None).history()
+        ]
+
+    def _open(self, version: int | None) -> DeltaTable:
+        try:
+            return DeltaTable(str(self.path), version=version)
+        except TableNotFoundError:
+            raise CorruptError("the catalog is gone", where=str(self.path), fix="restore it from a copy") from None
+        except DeltaError as error:
+            if version is not None and version > self.head():
+                raise NotFoundError(
+                    f"there is no version {version}", where=str(self.path), fix=f"the newest is {self.head()}"
+                ) from None
+            raise CorruptError(
+                f"the catalog's log cannot be read: {error}", where=str(self.path), fix="run flagdata doctor"
+            ) from None
+
+    def _read(self, table: DeltaTable) -> pa.Table:
+        try:
+            return table.to_pyarrow_dataset().to_table()
+        except (OSError, pa.ArrowException) as error:
+            raise CorruptError(
+                f"a file of the catalog cannot be read: {error}", where=str(self.path), fix="restore it from a copy"
+            ) from None
+
+    def _conform(self, table: pa.Table) -> pa.Table:
+        unknown = [name for name in table.column_names if name not in CATALOG]
+        if unknown:
+            raise newer(f"it has the columns {', '.join(unknown)}", self.path)
+        schema = catalog_schema()
+        columns = [
+            table[f.name].cast(f.type) if f.name in table.column_names else pa.nulls(table.num_rows, f.type)
+            for f in schema
+        ]
+        return pa.Table.from_arrays(columns, schema=schema)
+
+    def _evolve(self, table: DeltaTable, missing: Sequence[str]) -> None:
+        schema = catalog_schema()
+        fields = [deltalake.Field.from_arrow(schema.field(name).with_nullable(True)) for name in missing]
+        try:
+            table.alter.add_columns(
+                fields, commit_properties=_properties({"message": f"format {FORMAT_VERSION}: {', '.join(missing)}"})
+            )
+        except CommitFailedError:
+            raise Moved from None
+
+    def _flush_log(self, version: int) -> None:
+        log = self.path / "_delta_log"
+        flush_file(log / f"{version:020d}.json")
+        flush_folder(log)
+
+
+_HOOKS = PostCommitHookProperties(create_checkpoint=True, cleanup_expired_logs=False)
+
+
+def _properties(info: Mapping[str, str]) -> CommitProperties:
+    return CommitProperties(
+        custom_metadata={f"{_INFO_PREFIX}{key}": value for key, value in info.items()}, max_commit_retries=0
+    )
+
+
+def newer(why: str, where: Path) -> ConflictError:
+    """The error for a lake of a later format."""
+    return ConflictError(
+        f"the lake was written by a newer flagdata than this one, which reads formats up to {FORMAT_VERSION}: {why}",
+        where=str(where),
+        fix="install the newer flagdata",
+    )

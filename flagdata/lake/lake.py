@@ -1,0 +1,229 @@
+"""The lake as users hold it: open it, ask for rows, publish, name versions."""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from flagdata import provenance
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake import refs as references
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.catalog import Catalog, newer
+from flagdata.lake.durable import disk_errors, put_if_absent
+from flagdata.lake.objects import STORES, Objects
+from flagdata.lake.refs import MAIN, Refs, View
+from flagdata.lake.transaction import Transaction
+from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
+
+_MARKER = "lake.json"
+_MARKER_SCHEMA = "flagdata.lake/1"
+
+
+class Lake:
+    """A lake in a folder; make it by `create` or `open`. Cheap, picklable, keeps nothing open.
+
+    The catalog must not be used in a forked child of a process that used it (it says so); objects may be read anywhere.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.catalog = Catalog(path / "catalog")
+        self.objects = Objects(path)
+        self.refs = Refs(path / "refs")
+        self.staging = path / "staging"
+
+    @classmethod
+    def create(cls, path: Path | str) -> Lake:
+        """Make an empty lake in the folder `path`, which may exist if it is empty.
+
+        Raises:
+            ConflictError: a lake, or anything else, is there.
+        """
+        lake = cls(Path(path).absolute())
+        with disk_errors("creating a lake", lake.path):
+            if lake.path.exists() and (not lake.path.is_dir() or any(lake.path.iterdir())):
+                what = "a lake" if (lake.path / _MARKER).exists() else "something else"
+                raise ConflictError(
+                    f"there is {what} already", where=str(lake.path), fix="choose an empty or new folder"
+                )
+            lake.path.mkdir(parents=True, exist_ok=True)
+            for store in STORES:
+                (lake.path / store).mkdir()
+            lake.staging.mkdir()
+            lake.refs.make_folders()
+            lake.catalog.create({"message": "create the lake", "code_version": provenance.code_version()})
+            marker = {
+                "schema": _MARKER_SCHEMA,
+                "format_version": FORMAT_VERSION,
+                "lake": uuid.uuid4().hex,
+                "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            }
+            if not put_if_absent(lake.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode()):
+                raise ConflictError("another process made a lake there", where=str(lake.path), fix="open that one")
+        return lake
+
+    @classmethod
+    def open(cls, path: Path | str) -> Lake:
+        """The lake in the folder `path`.
+
+        Raises:
+            NotFoundError: no lake there.
+            ConflictError: written by a newer format.
+            CorruptError: its marker cannot be read.
+        """
+        lake = cls(Path(path).absolute())
+        marker = lake.path / _MARKER
+        try:
+            content = json.loads(marker.read_text())
+            version = int(content["format_version"])
+        except (FileNotFoundError, NotADirectoryError):
+            raise NotFoundError(
+                "there is no lake here", where=str(lake.path), fix="make one with flagdata init, or name one by --lake"
+            ) from None
+        except (ValueError, KeyError, TypeError):
+            raise CorruptError(
+                "the lake's marker cannot be read", where=str(marker), fix="restore it from a copy"
+            ) from None
+        if version > FORMAT_VERSION:
+            raise newer(f"it has format {version}", lake.path)
+        return lake
+
+    @contextmanager
+    def transaction(self, message: str, *, branch: str = MAIN) -> Iterator[Transaction]:
+        """Collect objects and rows; publish all of them when the block ends, nothing when it raises.
+
+        Raises:
+            UnknownNameError: no such branch.
+            ConflictError: other processes kept committing for two minutes.
+            FlagdataError: no space, no permission; nothing was published.
+        """
+        transaction = Transaction(
+            catalog=self.catalog, objects=self.objects, staging=self.staging, branch=branch, message=message,
+            identities=lambda: self._identities(branch), row=lambda identity: self.artifact(identity, at=branch),
+        )  # fmt: skip
+        try:
+            yield transaction
+            transaction._commit()
+        finally:
+            transaction._close()
+
+    def rows(
+        self, where: str | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
+    ) -> pa.Table:
+        """Rows of the catalog in the order of commit, then start, then frame.
+
+        Args:
+            where: an SQL expression over the columns of `schema.CATALOG`, as DuckDB reads it ("kind = 'clip' and
+                wind between 3 and 6"; the column "end" needs its quotes).
+            at: tag, branch, version number or commit id; the head of main if `None`.
+            columns: which to return, in this order; all if `None`.
+
+        Raises:
+            UsageError: the expression is not one, or reads anything but the catalog.
+            UnknownNameError: no such ref or column.
+        """
+        table = self.table(self.view(at))
+        if where is not None:
+            table = _filter(table, where)
+        if columns is None:
+            return table
+        for column in columns:
+            if column not in CATALOG:
+                raise UnknownNameError.of("column", column, CATALOG)
+        return table.select(list(columns))
+
+    def artifact(self, artifact: str, *, at: str | None = None) -> Artifact:
+        """The artifact of that id, or of an id that begins so if only one does.
+
+        Raises:
+            NotFoundError: none, or several.
+        """
+        table = self.table(self.view(at))
+        matches = [
+            row for row, known in enumerate(table["artifact"].to_pylist()) if artifact and known.startswith(artifact)
+        ]
+        if len(matches) != 1:
+            what = f"{len(matches)} artifacts begin with {artifact!r}" if matches else f"no artifact {artifact!r}"
+            raise NotFoundError(what, where=str(self.path), fix="flagdata ls lists them")
+        return Artifact.from_row(table.slice(matches[0], 1).to_pylist()[0])
+
+    def object_path(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
+        """Where an object lies: a file for "mcap/…", a folder for "zarr/…".
+
+        Raises:
+            InputError: not an object's name.
+            NotFoundError: it is not there.
+        """
+        return self.objects.existing(object)
+
+    def resolve(self, at: str | None) -> int:
+        """The Delta version a ref stands for (for a tag of a branch, the branch's).
+
+        Raises:
+            UnknownNameError: no such ref.
+        """
+        return self.view(at)[0].version
+
+    def tag(self, name: str, *, at: str | None = None) -> None:
+        """Name what `at` shows, for good.
+
+        Raises:
+            UsageError: a name that cannot be one.
+            ConflictError: the name is taken.
+        """
+        self.refs.put("tags", name, self.view(at))
+
+    def branch(self, name: str, *, at: str | None = None) -> None:
+        """Begin a branch from what `at` shows.
+
+        Raises:
+            UsageError: a name that cannot be one.
+            ConflictError: the name is taken.
+        """
+        self.refs.put("branches", name, self.view(at))
+
+    def view(self, at: str | None) -> View:
+        """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
+        return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits)
+
+    def table(self, view: View) -> pa.Table:
+        """All rows of a view; an identity on several branches is taken from the first."""
+        parts = []
+        for part in view:
+            rows = self.catalog.rows(part.version)
+            parts.append(rows.filter(pc.field("branch") == part.branch))
+        if len(parts) == 1:
+            return parts[0]
+        return pa.concat_tables(reversed(parts))
+
+    def _identities(self, branch: str) -> tuple[int, frozenset[str]]:
+        head = self.catalog.head()
+        table = self.table(self.refs.view(branch, head))
+        return head, frozenset(table["artifact"].to_pylist())
+
+    def _commits(self) -> dict[str, tuple[int, str]]:
+        return {e["commit"]: (e["version"], e["branch"]) for e in self.catalog.history() if "commit" in e}
+
+
+def _filter(table: pa.Table, where: str) -> pa.Table:
+    import duckdb
+
+    with duckdb.connect(":memory:", config={"enable_external_access": "false"}) as connection:
+        connection.execute("SET TimeZone = 'UTC'")
+        try:
+            return connection.from_arrow(table).filter(where).to_arrow_table().cast(catalog_schema())
+        except duckdb.Error as error:
+            reason = str(error).strip().splitlines()
+            raise UsageError(
+                f"the filter is not an SQL expression over the catalog: {' '.join(reason)}",
+                where=where,
+                fix="columns are those of flagdata ls --json; texts go in single quotes, the column end in double",
+            ) from None

@@ -1,0 +1,173 @@
+"""Immutable objects under the hash of their content: single MCAP files, and Zarr folders."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from flagdata.errors import CorruptError, InputError, NotFoundError
+from flagdata.lake.artifact import OBJECT_NAME
+from flagdata.lake.durable import flush_file, flush_folder
+from flagdata.provenance import file_hash
+
+STORES = {"mcap": ".mcap", "zarr": ".zarr"}
+_READ_ONLY = 0o444
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredObject:
+    """An object in the store: its name in the catalog, where it is, and its size [B]."""
+
+    name: str
+    path: Path
+    size: int
+    modified: float
+
+
+def files_of(path: Path) -> list[Path]:
+    """The regular files of an object, sorted by relative path; the file itself if it is one.
+
+    Raises:
+        InputError: a symbolic link or special file, whose content the hash would not cover.
+    """
+    if path.is_symlink() or not path.exists():
+        raise InputError("not a file or folder", where=str(path), fix="give the object itself, not a link to it")
+    if path.is_file():
+        return [path]
+    found = []
+    for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
+        if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
+            raise InputError("a link or special file inside an object", where=str(entry), fix="store plain files only")
+        if entry.is_file():
+            found.append(entry)
+    return found
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\\n" sorted by path.
+
+    The folder's form is what `sha256sum` prints, so that it can be checked without this package. Empty folders and
+    file modes do not count.
+    """
+    if path.is_file():
+        return file_hash(path)
+    total = hashlib.sha256()
+    for entry in files_of(path):
+        total.update(f"{file_hash(entry)}  {entry.relative_to(path).as_posix()}\n".encode())
+    return total.hexdigest()
+
+
+class Objects:
+    """The stores `mcap/` and `zarr/` of a lake at `root`."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def path(self, name: str) -> Path:
+        """Where the object called `name` is, whether or not it is there.
+
+        Raises:
+            InputError: not an object name; nothing outside the two stores can be named.
+        """
+        if not OBJECT_NAME.fullmatch(name):
+            raise InputError(
+                f"{name!r} is not an object name", where=str(self.root), fix="give mcap/<sha256> or zarr/<treehash>"
+            )
+        store, _, digest = name.partition("/")
+        return self.root / store / f"{digest}{STORES[store]}"
+
+    def existing(self, name: str) -> Path:
+        """Where the object is.
+
+        Raises:
+            NotFoundError: it is not there.
+        """
+        path = self.path(name)
+        if not path.exists():
+            raise NotFoundError(f"object {name} is missing", where=str(path), fix="run flagdata doctor")
+        return path
+
+    def name_of(self, staged: Path) -> str:
+        """The name the content at `staged` will have.
+
+        Raises:
+            InputError: neither an .mcap file nor a folder, or empty.
+        """
+        files = files_of(staged)
+        if staged.is_file() and staged.suffix != ".mcap":
+            raise InputError("not an .mcap file", where=str(staged), fix="objects are .mcap files and Zarr folders")
+        if sum(f.stat().st_size for f in files) == 0:
+            raise InputError("the object is empty", where=str(staged), fix="write it before putting it")
+        return f"{'mcap' if staged.is_file() else 'zarr'}/{content_hash(staged)}"
+
+    def publish(self, staged: Path, name: str) -> None:
+        """Move `staged`, whose name was computed by `name_of`, to its place; durable when it returns.
+
+        An object of that name that is there and whole is kept and `staged` removed; one that does not hash to its
+        name is replaced, so that ingesting again heals a damaged lake.
+        """
+        for entry in files_of(staged):
+            flush_file(entry)
+            entry.chmod(_READ_ONLY)
+        if staged.is_dir():
+            for folder in [staged, *(p for p in staged.rglob("*") if p.is_dir())]:
+                flush_folder(folder)
+        target = self.path(name)
+        if target.exists():
+            if self.is_whole(name):
+                os.utime(target)
+                self.remove(staged)
+                return
+            if target.is_dir():
+                damaged = staged.with_name(f"damaged-{target.name}")
+                target.rename(damaged)
+        staged.rename(target)
+        flush_folder(target.parent)
+
+    def is_whole(self, name: str) -> bool:
+        """Whether the object is there and its content hashes to its name."""
+        path = self.path(name)
+        try:
+            return path.exists() and content_hash(path) == name.partition("/")[2]
+        except InputError:
+            return False
+
+    def check(self, name: str) -> None:
+        """Re-hash one object.
+
+        Raises:
+            NotFoundError: it is not there.
+            CorruptError: its bytes are not what its name says.
+        """
+        path = self.existing(name)
+        if not self.is_whole(name):
+            raise CorruptError(
+                f"the bytes of {name} have changed since they were written",
+                where=str(path),
+                fix="ingest the source again (it replaces the object), or restore it from a copy",
+            )
+
+    def __iter__(self) -> Iterator[StoredObject]:
+        """Everything in the stores that has an object's name."""
+        for store, suffix in STORES.items():
+            for path in sorted((self.root / store).iterdir()):
+                name = f"{store}/{path.name.removesuffix(suffix)}"
+                if path.name.endswith(suffix) and OBJECT_NAME.fullmatch(name):
+                    yield StoredObject(name=name, path=path, size=size_of(path), modified=path.stat().st_mtime)
+
+    @staticmethod
+    def remove(path: Path) -> None:
+        """Delete a file or folder of the store or of staging."""
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all files in a folder."""
+    return sum(f.stat().st_size for f in files_of(path))

@@ -1,0 +1,163 @@
+"""Tags and branches: small JSON files, put only if absent. Delta has neither.
+
+A view is what a ref shows: for each branch of its line, that branch's rows at one version of the table. A branch's
+view is its own rows at the head, and its parent's view at the version it forked from; so `main` may go on without the
+branch noticing. Every row names the branch it was committed on. A tag stores its whole view and stays what it was.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake.durable import disk_errors, put_if_absent
+
+MAIN = "main"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_COMMIT = re.compile(r"c[0-9a-f]{16}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slice:
+    """The rows of one branch at one version."""
+
+    branch: str
+    version: int
+
+
+View = tuple[Slice, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ref:
+    """A tag (its view is fixed) or a branch (its view is what it forked from, without its own rows)."""
+
+    name: str
+    created: str
+    view: View
+
+
+def check_name(name: str, *, noun: str) -> str:
+    """`name`, if it can name a tag or branch.
+
+    Raises:
+        UsageError: characters that are not allowed, or a name that could be taken for a version or commit.
+    """
+    if not _NAME.fullmatch(name):
+        raise UsageError(
+            f"{name!r} cannot name a {noun}",
+            fix="use up to 100 letters, digits, dots, dashes and underscores, beginning with a letter or digit",
+        )
+    if name.isdecimal() or _COMMIT.fullmatch(name) or name.endswith(".json"):
+        raise UsageError(
+            f"{name!r} cannot name a {noun}: it looks like a version, commit or file", fix="add a word to it"
+        )
+    return name
+
+
+class Refs:
+    """The folder `refs/` of a lake."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def make_folders(self) -> None:
+        for kind in ("tags", "branches"):
+            (self.root / kind).mkdir(parents=True)
+
+    def tags(self) -> dict[str, Ref]:
+        """All tags by name."""
+        return self._all("tags")
+
+    def branches(self) -> dict[str, Ref]:
+        """All branches but `main`, by name."""
+        return self._all("branches")
+
+    def put(self, kind: str, name: str, view: View) -> None:
+        """Create a tag or branch.
+
+        Args:
+            kind: "tags" or "branches".
+
+        Raises:
+            ConflictError: the name is taken, by a tag or by a branch.
+        """
+        check_name(name, noun=kind.removesuffix("s"))
+        other = "branches" if kind == "tags" else "tags"
+        content = {
+            "schema": "flagdata.ref/1",
+            "name": name,
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "view": [{"branch": s.branch, "version": s.version} for s in view],
+        }
+        path = self.root / kind / f"{name}.json"
+        with disk_errors(f"creating the ref {name}", path):
+            taken = name == MAIN or (self.root / other / f"{name}.json").exists()
+            if taken or not put_if_absent(path, (json.dumps(content, indent=2) + "\n").encode()):
+                raise ConflictError(
+                    f"there is a tag or branch {name!r} already",
+                    where=str(path),
+                    fix="choose another name; tags never move",
+                )
+
+    def view(self, branch: str, head: int) -> View:
+        """What a branch shows when the table is at version `head`.
+
+        Raises:
+            UnknownNameError: no such branch.
+        """
+        if branch == MAIN:
+            return (Slice(branch=MAIN, version=head),)
+        known = self.branches()
+        if branch not in known:
+            raise UnknownNameError.of("branch", branch, [MAIN, *known], where=str(self.root))
+        return (Slice(branch=branch, version=head), *known[branch].view)
+
+    def _all(self, kind: str) -> dict[str, Ref]:
+        return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}
+
+    @staticmethod
+    def _read(path: Path) -> Ref:
+        try:
+            content: dict[str, Any] = json.loads(path.read_text())
+            view = tuple(Slice(branch=s["branch"], version=int(s["version"])) for s in content["view"])
+            return Ref(name=content["name"], created=content["created"], view=view)
+        except (ValueError, KeyError, TypeError):
+            raise CorruptError("the ref cannot be read", where=str(path), fix="restore it from a copy") from None
+
+
+def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapping[str, tuple[int, str]]]) -> View:
+    """The view of a tag, branch, version number, or commit id; `None` is the head of main.
+
+    Args:
+        commits: gives commit id → (version, branch); called only when `at` has the form of a commit id.
+
+    Raises:
+        UnknownNameError: neither; suggests the nearest name.
+        NotFoundError: a version beyond the newest.
+    """
+    if at is None:
+        return refs.view(MAIN, head)
+    if at.isdecimal():
+        if int(at) > head:
+            raise NotFoundError(f"there is no version {at}", fix=f"the newest is {head}")
+        return (Slice(branch=MAIN, version=int(at)),)
+    if _COMMIT.fullmatch(at):
+        known = commits()
+        if at not in known:
+            raise UnknownNameError.of("commit", at, known)
+        version, branch = known[at]
+        return refs.view(branch, version)
+    tags = refs.tags()
+    if at in tags:
+        return tags[at].view
+    branches = refs.branches()
+    if at == MAIN or at in branches:
+        return refs.view(at, head)
+    raise UnknownNameError.of("tag, branch or commit", at, [MAIN, *tags, *branches])

@@ -1,0 +1,187 @@
+"""A transaction: objects put first, rows collected, one Delta append publishes them all or nothing."""
+
+from __future__ import annotations
+
+import random
+import secrets
+import shutil
+import time
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pyarrow as pa
+
+from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.catalog import Catalog, Moved
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.leases import Lease
+from flagdata.lake.objects import Objects, size_of
+from flagdata.provenance import code_version
+from flagdata.schema import catalog_schema
+
+_PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
+_FIRST_WAIT = 0.01  # s
+_LONGEST_WAIT = 0.5  # s
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommitResult:
+    """What a transaction did.
+
+    Attributes:
+        version: of the table after it; the head it found when there was nothing new.
+        commit: commit id, `None` when there was nothing new.
+        added: ids of rows it published, in order.
+        existing: ids that were on the branch already, so nothing was published for them.
+    """
+
+    version: int
+    commit: str | None
+    added: tuple[str, ...]
+    existing: tuple[str, ...]
+
+
+class Transaction:
+    """Made by `Lake.transaction`; use it as a context manager.
+
+    Order of events, each durable before the next: objects are written in staging, flushed, and renamed to their content
+    hash (`put`); leaving the block writes all rows as one Parquet file and puts one log entry. A crash before that
+    leaves only what nothing refers to. *Acknowledged means that the with-block was left without an exception*: a
+    process that dies during the commit may or may not have published, and finds out by ingesting again.
+
+    Idempotence holds in a race too: an append is accepted only at the version whose identities were checked. When two
+    processes add the same identity at once, one publishes it, the other is told, looks again, and reports it as
+    existing. No reader ever sees an identity twice on one branch.
+    """
+
+    def __init__(
+        self, *, catalog: Catalog, objects: Objects, staging: Path, branch: str, message: str,
+        identities: Callable[[], tuple[int, frozenset[str]]], row: Callable[[str], Artifact],
+    ) -> None:  # fmt: skip
+        if not message.strip():
+            raise UsageError("the commit has no message", fix="say in a few words what it brings in")
+        self.branch = branch
+        self.message = message
+        self.result: CommitResult | None = None
+        self._catalog = catalog
+        self._objects = objects
+        self._identities = identities
+        self._row = row
+        self._pending: dict[str, Artifact] = {}
+        self._existing: list[str] = []
+        with disk_errors("starting a transaction", staging):
+            self._lease = Lease(staging)
+        self._known = self._identities()[1]
+
+    def staging(self, suffix: str) -> Path:
+        """A fresh path with `suffix` (".mcap", ".zarr"), nothing at it yet; removed with the transaction."""
+        return self._lease.folder / f"{uuid.uuid4().hex}{suffix}"
+
+    def put(self, path: Path) -> str:
+        """Store a finished .mcap file or Zarr folder for good, and return its object name.
+
+        What lies in this transaction's staging is moved, anything else copied. Content that is stored already is kept
+        once.
+
+        Raises:
+            InputError: neither an .mcap file nor a folder of plain files, or empty.
+            FlagdataError: no space, no permission.
+        """
+        self._open_only()
+        with disk_errors("storing an object", path):
+            if self._lease.folder not in path.parents:
+                path = self._copy(path)
+            name = self._objects.name_of(path)
+            with self._lease.holding(name):
+                self._objects.publish(path, name)
+        return name
+
+    def add(self, artifact: Artifact) -> bool:
+        """Publish a row with this transaction; False when its identity is on the branch, or in this transaction.
+
+        Raises:
+            NotFoundError: its object was not put, or a parent is neither on the branch nor in this transaction.
+        """
+        self._open_only()
+        identity = artifact.id
+        if identity in self._known or identity in self._pending:
+            if identity not in self._existing:
+                self._existing.append(identity)
+            return False
+        size = artifact.object_bytes
+        if artifact.object is not None:
+            with self._lease.holding(artifact.object):
+                stored = self._objects.existing(artifact.object)
+            if size is None:
+                size = size_of(stored)
+        for parent in artifact.parents:
+            if parent not in self._known and parent not in self._pending:
+                raise NotFoundError(
+                    f"its parent {parent} is not on branch {self.branch!r}",
+                    where=f"{artifact.kind} {artifact.name!r}",
+                    fix="add the parent first",
+                )
+        self._pending[identity] = replace(artifact, branch=self.branch, object_bytes=size)
+        return True
+
+    def find(self, artifact_id: str) -> Artifact | None:
+        """The artifact of that full id if it is in this transaction or on the branch, else `None`."""
+        if artifact_id in self._pending:
+            return self._pending[artifact_id]
+        return self._row(artifact_id) if artifact_id in self._known else None
+
+    def _commit(self) -> None:
+        with disk_errors("committing", self._catalog.path):
+            self.result = self._publish()
+
+    def _close(self) -> None:
+        self._lease.close()
+
+    def _publish(self) -> CommitResult:
+        created = datetime.now(UTC)
+        deadline = time.monotonic() + _PATIENCE
+        wait = _FIRST_WAIT
+        commit = f"c{secrets.token_hex(8)}"
+        while True:
+            version, known = self._identities()
+            late = [identity for identity in self._pending if identity in known]
+            fresh = [replace(a, created=created) for identity, a in self._pending.items() if identity not in known]
+            existing = (*self._existing, *late)
+            if not fresh:
+                return CommitResult(version=version, commit=None, added=(), existing=existing)
+            rows = pa.Table.from_pylist([a.row() for a in fresh], schema=catalog_schema())
+            info = {
+                "commit": commit, "message": self.message, "branch": self.branch, "rows": str(len(fresh)),
+                "code_version": code_version(),
+            }  # fmt: skip
+            try:
+                version = self._catalog.append(rows, base=version, info=info)
+            except Moved:
+                if time.monotonic() > deadline:
+                    raise ConflictError(
+                        f"other processes kept committing for {_PATIENCE:.0f} s",
+                        where=str(self._catalog.path),
+                        fix="try again",
+                    ) from None
+                time.sleep(random.uniform(0, wait))
+                wait = min(2 * wait, _LONGEST_WAIT)
+                continue
+            return CommitResult(version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing)
+
+    def _copy(self, path: Path) -> Path:
+        inside = self.staging(path.suffix)
+        if path.is_dir():
+            shutil.copytree(path, inside, symlinks=True)
+        elif path.is_file():
+            shutil.copyfile(path, inside)
+        else:
+            raise NotFoundError("there is no such file or folder", where=str(path), fix="write the object first")
+        return inside
+
+    def _open_only(self) -> None:
+        if self.result is not None:
+            raise UsageError("the transaction has been committed", fix="open another")

@@ -1,0 +1,107 @@
+"""What a user of the lake relies on: rows and objects appear together, once, and are found again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake import Artifact, Lake
+from flagdata.schema import Kind, catalog_schema
+
+
+def put_text(lake: Lake, text: str, *, branch: str = "main") -> str:
+    with lake.transaction(f"ingest {text}", branch=branch) as tx:
+        path = tx.staging(".mcap")
+        path.write_text(text)
+        name = tx.put(path)
+        artifact = Artifact(kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2])
+        tx.add(artifact)
+    return artifact.id
+
+
+@pytest.fixture
+def lake(tmp_path: Path) -> Lake:
+    return Lake.create(tmp_path / "lake")
+
+
+def test_a_committed_row_and_its_object_are_found_by_a_fresh_handle(lake: Lake) -> None:
+    identity = put_text(lake, "gusts")
+    again = Lake.open(lake.path)
+    artifact = again.artifact(identity[:8])
+    assert artifact.name == "gusts"
+    assert artifact.id == identity
+    assert artifact.object is not None
+    assert again.object_path(artifact.object).read_text() == "gusts"
+    assert artifact.object_bytes == len("gusts")
+    assert again.rows().schema.equals(catalog_schema(), check_metadata=True)
+
+
+def test_an_exception_inside_the_block_publishes_nothing(lake: Lake) -> None:
+    def fail_half_way() -> None:
+        with lake.transaction("half") as tx:
+            path = tx.staging(".mcap")
+            path.write_text("x")
+            tx.add(Artifact(kind=Kind.WIND, name="x", object=tx.put(path)))
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail_half_way()
+    assert lake.rows().num_rows == 0
+    assert [p.name for p in lake.staging.iterdir() if p.is_dir()] == []
+
+
+def test_the_same_identity_is_published_once(lake: Lake) -> None:
+    first = put_text(lake, "gusts")
+    before = lake.resolve(None)
+    assert put_text(lake, "gusts") == first
+    assert lake.resolve(None) == before
+    assert lake.rows().num_rows == 1
+
+
+def test_a_tag_keeps_showing_what_it_named(lake: Lake) -> None:
+    put_text(lake, "a")
+    lake.tag("v1")
+    put_text(lake, "b")
+    assert lake.rows(at="v1", columns=["name"]).to_pylist() == [{"name": "a"}]
+    assert lake.rows(columns=["name"]).to_pylist() == [{"name": "a"}, {"name": "b"}]
+    with pytest.raises(ConflictError):
+        lake.tag("v1")
+
+
+def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lake: Lake) -> None:
+    put_text(lake, "a")
+    lake.branch("try")
+    put_text(lake, "b")
+    put_text(lake, "c", branch="try")
+    assert [r["name"] for r in lake.rows(at="try").to_pylist()] == ["a", "c"]
+    assert [r["name"] for r in lake.rows().to_pylist()] == ["a", "b"]
+
+
+def test_a_filter_selects_by_sql_and_a_bad_one_is_a_usage_error(lake: Lake) -> None:
+    put_text(lake, "a")
+    put_text(lake, "b")
+    assert lake.rows("name = 'b' and \"end\" is null")["name"].to_pylist() == ["b"]
+    for bad in (
+        "nmae = 'b'",
+        "1=1) union select 1",
+        "name = 'b'; drop table x",
+        "",
+        "exists (from read_csv('/etc/passwd'))",
+    ):
+        with pytest.raises(UsageError):
+            lake.rows(bad)
+
+
+def test_unknown_refs_are_refused_with_the_nearest_name(lake: Lake) -> None:
+    lake.tag("release-1")
+    with pytest.raises(UnknownNameError, match="release-1"):
+        lake.rows(at="relase-1")
+    with pytest.raises(NotFoundError):
+        lake.rows(at="99")
+
+
+def test_a_row_whose_object_was_never_put_is_refused(lake: Lake) -> None:
+    with pytest.raises(NotFoundError), lake.transaction("dangling") as tx:
+        tx.add(Artifact(kind=Kind.WIND, name="x", object="mcap/" + "0" * 64))
