@@ -28,7 +28,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "doctor": ("flagdata.commands.lake:doctor", "Find and explain what is wrong with a lake."),
     "gc": ("flagdata.commands.lake:gc", "Delete what nothing refers to."),
     "recover": ("flagdata.commands.lake:recover", "Salvage a record that was cut off."),
-    "demo": ("flagdata.commands.demo:demo", "Make a small field recording and take it through everything."),
+    "demo": ("measure.demo.command:demo", "Make a small field recording and take it through everything."),
 }
 
 

@@ -22,9 +22,9 @@ from flagdata.rng import stream
 from measure.demo.flag import DrawnFlag
 from sim.wind.spectral import VonKarman
 
-_BEFORE = 120.0  # s of wind logged before the camera starts
+BEFORE = 120.0  # s of wind logged before the camera starts
 _AFTER = 30.0
-_WIND_RATE = 20  # Hz at which the true wind is made
+WIND_RATE = 20  # Hz at which the true wind is made
 _ZONE = timezone(timedelta(hours=2))
 
 
@@ -67,7 +67,7 @@ class Field:
 
     Attributes:
         clock_offset: what must be added to the camera's clock to reach the anemometer's [s].
-        wind: true speed at the flag [m/s] at `_WIND_RATE`, starting `_BEFORE` seconds before the first frame.
+        wind: true speed at the flag [m/s] at `WIND_RATE`, starting `BEFORE` seconds before the first frame.
     """
 
     video: Path
@@ -79,14 +79,14 @@ class Field:
 def make_field(recipe: FieldRecipe, folder: Path, *, advance: Callable[[int], None]) -> Field:
     """Write `flag.mp4` and `anemometer.csv` into `folder`; `advance` is called with the number of frames done."""
     offset = float(stream(recipe.seed, "clock").uniform(-recipe.largest_offset, recipe.largest_offset))
-    duration = _BEFORE + recipe.duration + _AFTER
-    wind = recipe.wind.series(stream(recipe.seed, "wind"), duration=duration, rate=_WIND_RATE)
+    duration = BEFORE + recipe.duration + _AFTER
+    wind = recipe.wind.series(stream(recipe.seed, "wind"), duration=duration, rate=WIND_RATE)
     start = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
     video, log = folder / "flag.mp4", folder / "anemometer.csv"
-    times = np.arange(round(recipe.duration * recipe.frame_rate)) / recipe.frame_rate + _BEFORE
-    at_frames = np.interp(times, np.arange(len(wind)) / _WIND_RATE, wind)
+    times = np.arange(round(recipe.duration * recipe.frame_rate)) / recipe.frame_rate + BEFORE
+    at_frames = np.interp(times, np.arange(len(wind)) / WIND_RATE, wind)
     _write_video(video, recipe, at_frames, start, advance)
-    _write_log(log, recipe, wind, start + timedelta(seconds=offset - _BEFORE))
+    _write_log(log, recipe, wind, start + timedelta(seconds=offset - BEFORE))
     return Field(video=video, log=log, clock_offset=offset, wind=wind)
 
 
@@ -113,10 +113,10 @@ def _write_log(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], start
     with a gap, and a reading that sticks. `start` is the logger's time at the first value of `wind`."""
     rng = stream(recipe.seed, "anemometer")
     first = start.replace(microsecond=0) + timedelta(seconds=2)  # the logger stamps its own whole seconds
-    seconds = len(wind) // _WIND_RATE - 2
+    seconds = len(wind) // WIND_RATE - 2
     edges = (first - start).total_seconds() + np.arange(-1, seconds)
-    total = np.concatenate([[0.0], np.cumsum(_cups(wind, recipe.distance_constant)) / _WIND_RATE])
-    speed = np.diff(np.interp(edges, np.arange(len(total)) / _WIND_RATE, total))
+    total = np.concatenate([[0.0], np.cumsum(_cups(wind, recipe.distance_constant)) / WIND_RATE])
+    speed = np.diff(np.interp(edges, np.arange(len(total)) / WIND_RATE, total))
     speed = np.where(speed < recipe.threshold, 0.0, speed + 0.05 * rng.standard_normal(seconds))
     speed = np.round(np.maximum(speed, 0.0) / recipe.resolution) * recipe.resolution
     gap = int(rng.integers(seconds // 4, seconds // 2))
@@ -139,6 +139,6 @@ def _cups(wind: NDArray[np.float64], distance_constant: float) -> NDArray[np.flo
     reading = np.empty_like(wind)
     now = wind[0]
     for i, u in enumerate(wind):
-        now += (u - now) * min(1.0, abs(u) / (distance_constant * _WIND_RATE))
+        now += (u - now) * min(1.0, abs(u) / (distance_constant * WIND_RATE))
         reading[i] = now
     return reading

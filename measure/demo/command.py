@@ -1,0 +1,115 @@
+"""`flagdata demo`: the main job end to end on data made on the spot, by the same commands a user types."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import click
+
+from flagdata.console import progress, say
+from flagdata.errors import ConflictError, FlagdataError
+
+_MARK = ".flagdata-demo"
+
+
+@dataclass(kw_only=True)
+class Transcript:
+    """Runs verbs of the command line in a folder and keeps what was typed and printed."""
+
+    folder: Path
+    entries: list[tuple[str, str]] = field(default_factory=list)
+
+    def run(self, *arguments: str) -> str:
+        """Run `flagdata ARGUMENTS` in the folder; its stdout. What it says on stderr passes through.
+
+        Raises:
+            FlagdataError: when it does not exit with 0.
+        """
+        typed = shlex.join(("flagdata", *arguments))
+        say(f"\n$ {typed}")
+        done = subprocess.run(
+            [sys.executable, "-m", "flagdata.cli", *arguments],
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+        if done.returncode:
+            raise FlagdataError(
+                f"`{typed}` ended with {done.returncode}", where=str(self.folder), fix="see its message above"
+            )
+        self.entries.append((typed, done.stdout))
+        return done.stdout
+
+    def show(self, *arguments: str) -> str:
+        """`run`, and its stdout printed for the person who watches."""
+        printed = self.run(*arguments)
+        click.echo(printed, nl=False)
+        return printed
+
+    def read(self, *arguments: str) -> dict[str, Any]:
+        """`run` with --json, decoded; left out of the transcript, which is for people."""
+        printed = json.loads(self.run(*arguments, "--json"))
+        self.entries.pop()
+        return printed
+
+
+@click.command()
+@click.option("--out", "out", type=click.Path(path_type=Path), default=Path("out/demo"), show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Of all that is random.")
+@click.option(
+    "--minutes", type=click.FloatRange(2, 120), default=10.0, show_default=True, help="Length of the video it makes."
+)
+def demo(out: Path, seed: int, minutes: float) -> None:
+    """Make a small field recording and take it through everything, to a page that opens in a browser."""
+    from measure.demo.field import FieldRecipe, make_field
+    from measure.demo.page import write_page
+
+    began = time.monotonic()
+    _fresh(out)
+    recipe = FieldRecipe(seed=seed, duration=minutes * 60)
+    say(f"A flag is filmed for {minutes:g} minutes; an anemometer runs beside it on a clock of its own.")
+    with progress(round(recipe.duration * recipe.frame_rate), label="filming", unit="frame") as advance:
+        made = make_field(recipe, out, advance=advance)
+
+    shell = Transcript(folder=out)
+    shell.show("init", "lake")
+    shell.show("ingest", "flag.mp4", "--crop", "auto", "--session", "demo", "--lake", "lake")
+    shell.show(
+        "ingest", "anemometer.csv", "--sensor", "demo-cup", "--zone", "+02:00", "--session", "demo", "--lake", "lake"
+    )
+    artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
+    shell.show(
+        "align", artifacts["camera"][:10], artifacts["wind"][:10], "--by", "estimate", "--plot", "alignment.png",
+        "--lake", "lake",
+    )  # fmt: skip
+    shell.show("tag", "demo", "--lake", "lake")
+    shell.show("ls", "--lake", "lake")
+    shell.show("query", "--where", "kind = 'clip' and wind between 4 and 6", "--limit", "5", "--at", "demo",
+               "--lake", "lake")  # fmt: skip
+    shell.show("verify", "--lake", "lake")
+
+    page = write_page(out, made=made, at="demo", transcript=shell.entries, seconds=time.monotonic() - began)
+    say(f"\nOpen {page}")
+
+
+def _fresh(folder: Path) -> None:
+    """An empty folder, replacing only what an earlier demonstration left."""
+    if folder.exists() and any(folder.iterdir()):
+        if not (folder / _MARK).exists():
+            raise ConflictError(
+                "the folder is not empty and was not made by a demonstration",
+                where=str(folder),
+                fix="name another one by --out",
+            )
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / _MARK).touch()

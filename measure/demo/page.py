@@ -1,0 +1,176 @@
+"""The demonstration's page: wind, alignment, clips with their ground truth, findings and the commands, in one file."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jinja2 import Environment, StrictUndefined
+from PIL import Image
+
+import flagdata
+from flagdata.align.clock import ClockModel
+from flagdata.dataset.sample import Sample
+from flagdata.lake import Lake
+from flagdata.provenance import code_version
+from flagdata.record import Record
+from flagdata.schema import CLIP_FRAMES, FRAME_RATE
+from flagdata.timebase import NANOSECONDS
+from measure.demo.field import BEFORE, WIND_RATE, Field
+from models.spectral import SpectralDecomposition
+
+_SHOWN = 6
+_Z90 = 1.6449  # half-width of a 90 % interval of a Gaussian, in σ
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovered:
+    """The clock offset found against the hidden one; seconds."""
+
+    offset: float
+    low: float
+    high: float
+    confidence: float
+    truth: float
+
+    @property
+    def error(self) -> float:
+        return abs(self.offset - self.truth)
+
+    @property
+    def covered(self) -> bool:
+        return self.low <= self.truth <= self.high
+
+
+def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple[str, str]], seconds: float) -> Path:
+    """Write `index.html` (self-contained) into `folder` from the lake inside it; returns its path."""
+    lake = Lake.open(folder / "lake")
+    (row,) = lake.rows("kind = 'recording'", at=at).to_pylist()
+    record = Record.open(lake.object_path(row["object"]))
+    pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
+    order = np.argsort([pairs[i].wind for i in range(len(pairs))])
+    shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
+    reasons = Counter(refusal.reason for refusal in pairs.refused)
+    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
+        files("measure.demo").joinpath("page.html.j2").read_text(encoding="utf-8")
+    )
+    wind_image, caption = _wind_plot(record, lake, at, made)
+    target = folder / "index.html"
+    target.write_text(
+        page.render(
+            minutes=f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",
+            seconds=seconds,
+            clock=recovered(row, made),
+            images={"wind": wind_image, "alignment": _data_url((folder / "alignment.png").read_bytes(), "image/png")},
+            wind_caption=caption,
+            counts={
+                "pairs": len(pairs),
+                "refused": len(pairs.refused),
+                "reasons": ", ".join(f"{count} × {reason}" for reason, count in reasons.items()),
+            },
+            clips=[_clip_card(sample) for sample in shown],
+            findings=_findings(lake, at),
+            transcript=transcript,
+            version=f"flagdata {code_version()}",
+        ),
+        encoding="utf-8",
+    )
+    return target
+
+
+def recovered(recording: dict[str, Any], made: Field) -> Recovered:
+    """The recording's clock at mid-recording beside the truth the generator kept."""
+    clock = ClockModel.from_json(recording["clock_model"])
+    middle = (recording["start"] + recording["end"]) // 2
+    device = middle - round(recording["clock_offset"] * NANOSECONDS)
+    offset = (int(clock.to_common(device)) - device) / NANOSECONDS
+    half = _Z90 * float(clock.sigma(device))
+    return Recovered(
+        offset=offset,
+        low=offset - half,
+        high=offset + half,
+        confidence=clock.confidence,
+        truth=made.clock_offset,
+    )
+
+
+def _clip_card(sample: Sample) -> dict[str, Any]:
+    return {
+        "image": _animation(sample.clip),
+        "wind": sample.wind,
+        "sigma": sample.wind_sigma,
+        "clock_sigma": sample.clock_sigma,
+        "coverage": sample.coverage,
+        "frequency": dominant_frequency(sample.clip),
+    }
+
+
+def dominant_frequency(clip: torch.Tensor) -> float:
+    """Peak frequency [Hz] of a (1, time, height, width) clip, weighted by power over a four times coarser picture."""
+    coarse = torch.nn.functional.avg_pool2d(clip.float(), 4)
+    power, frequency = SpectralDecomposition(rate=FRAME_RATE)(coarse[None])[0]
+    return float((power * frequency).sum() / power.sum())
+
+
+def _animation(clip: torch.Tensor) -> str:
+    """The clip as an endless WebP in a data URL, at its own speed."""
+    images = [Image.fromarray(frame).resize((200, 200)) for frame in clip[0].numpy()]
+    buffer = io.BytesIO()
+    images[0].save(
+        buffer, "WEBP", save_all=True, append_images=images[1:], duration=round(1000 / FRAME_RATE), loop=0, quality=70
+    )
+    return _data_url(buffer.getvalue(), "image/webp")
+
+
+def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, str]:
+    from matplotlib.figure import Figure
+
+    logged = record.wind_1hz()
+    if logged is None:
+        raise ValueError("a recording of the demonstration holds wind")
+    zero = int(record.frame_times[0])
+    clips = lake.rows("kind = 'clip'", at=at, columns=["end", "wind", "wind_sigma"]).to_pylist()
+    ends = np.array([(clip["end"] - zero) / NANOSECONDS for clip in clips])
+    wind = np.array([np.nan if clip["wind"] is None else clip["wind"] for clip in clips])
+    sigma = np.array([np.nan if clip["wind"] is None else clip["wind_sigma"] for clip in clips])
+    figure = Figure(figsize=(9.5, 3.4), layout="constrained")
+    axes = figure.subplots()
+    truth = np.arange(len(made.wind)) / WIND_RATE - BEFORE
+    axes.plot(truth, made.wind, color="0.82", linewidth=0.6, label="true wind at the flag")
+    axes.plot(
+        (logged.time - zero) / NANOSECONDS, logged.speed, color="#2b6f8f", linewidth=0.8, label="anemometer, 1 Hz"
+    )
+    axes.fill_between(ends, wind - sigma, wind + sigma, color="#c4622d", alpha=0.35, linewidth=0)
+    axes.plot(ends, wind, color="#c4622d", linewidth=1.4, label="ground truth of the clips (minute mean ± σ)")
+    axes.set(
+        xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", xlim=(truth[0], truth[-1]), ylim=(0, None)
+    )
+    axes.legend(loc="lower right", fontsize=8, ncols=3)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=130)
+    caption = (
+        f"{len(logged.time)} one-second means on the common clock; the gap and the stretch that stuck are left out of "
+        f"the averages. {len(clips)} clips of {CLIP_FRAMES} frames."
+    )
+    return _data_url(buffer.getvalue(), "image/png"), caption
+
+
+def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:
+    found = []
+    for row in lake.rows("kind in ('camera', 'wind')", at=at, columns=["source_name", "report"]).to_pylist():
+        report = json.loads(row["report"])
+        found += [{"source": row["source_name"], **finding} for finding in report["findings"]]
+    return found
+
+
+def _data_url(data: bytes, media_type: str) -> str:
+    return f"data:{media_type};base64,{base64.b64encode(data).decode()}"

@@ -1,0 +1,12 @@
+"""`make bench`: speed, with accuracy beside it and a peer in the same run."""
+
+from __future__ import annotations
+
+from tests.evidence import run_all
+
+BENCHMARKS = {
+    "pairs": "tests.benchmarks.bench_pairs",
+}
+
+if __name__ == "__main__":
+    run_all("bench", BENCHMARKS)

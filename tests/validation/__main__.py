@@ -1,0 +1,10 @@
+"""`make validate`: slow evidence on data no one here wrote, or on ensembles too large for a test."""
+
+from __future__ import annotations
+
+from tests.evidence import run_all
+
+VALIDATIONS: dict[str, str] = {}
+
+if __name__ == "__main__":
+    run_all("validate", VALIDATIONS)
