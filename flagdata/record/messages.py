@@ -25,8 +25,9 @@ __all__ = [
     "TruthParameters",
     "WindMean",
     "WindSample",
+    "data_field",
     "descriptor_set",
-    "payload_span",
+    "payload",
     "set_timestamp",
     "timestamp_of",
 ]
@@ -187,20 +188,21 @@ def _varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
 
 
 _FIXED: Mapping[int, int] = {1: 8, 5: 4}
-DATA_FIELD = 2  # `data` of foxglove.CompressedImage and foxglove.CompressedVideo
 
 
-def payload_span(message: bytes | memoryview, *, start: int, end: int) -> tuple[int, int]:
-    """Where the `data` bytes of a CompressedImage or CompressedVideo lie in `message[start:end]`, without a copy.
+def data_field(kind: Any) -> int:
+    """Number of the field `data` of CompressedImage or CompressedVideo (it differs)."""
+    return kind.DESCRIPTOR.fields_by_name["data"].number
 
-    Returns:
-        first and one past the last index into `message`.
+
+def payload(message: memoryview, *, field: int) -> memoryview:
+    """The bytes of one length-delimited field of a protobuf message, without a copy.
 
     Raises:
-        CorruptError: not such a message, or a length that leads out of it.
+        CorruptError: not a protobuf message, without that field, or a length that leads out of it.
     """
-    at = start
-    found: tuple[int, int] | None = None
+    at, end = 0, len(message)
+    found: memoryview | None = None
     try:
         while at < end:
             tag, at = _varint(message, at)
@@ -209,8 +211,8 @@ def payload_span(message: bytes | memoryview, *, start: int, end: int) -> tuple[
                 length, at = _varint(message, at)
                 if at + length > end:
                     break
-                if tag >> 3 == DATA_FIELD:
-                    found = (at, at + length)
+                if tag >> 3 == field:
+                    found = message[at : at + length]
                 at += length
             elif wire == 0:
                 _, at = _varint(message, at)
@@ -219,8 +221,8 @@ def payload_span(message: bytes | memoryview, *, start: int, end: int) -> tuple[
             else:
                 break
         else:
-            if found and at == end:
+            if found is not None and at == end:
                 return found
     except IndexError:
         pass
-    raise CorruptError("a frame's message is not a CompressedImage or CompressedVideo", fix="run flagdata verify")
+    raise CorruptError(f"a frame's message is not a protobuf with bytes in field {field}", fix="run flagdata verify")

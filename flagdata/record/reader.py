@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
 from flagdata.record import container, messages
 from flagdata.record.metadata import sensor_of
-from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX
+from flagdata.record.video import decode, is_key
+from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX, Coding, encode_jpeg
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindAverage, WindSeries
 
 SPAN_SLACK = 256 << 10
 """Bytes of other topics that one read of neighbouring frames may take along."""
+_CODINGS: dict[Coding, Any] = {Coding.JPEG: messages.CompressedImage, Coding.H264: messages.CompressedVideo}
 _VERIFY = "run flagdata verify"
 
 
@@ -79,6 +81,23 @@ class Record:
     def _frames(self) -> container.Messages:
         return self._messages(TOPIC_IMAGE)
 
+    @functools.cached_property
+    def coding(self) -> Coding:
+        """How the frames are stored.
+
+        Raises:
+            NotFoundError: the record has no frames.
+            InputError: frames of a schema that is neither.
+        """
+        where = str(self.path)
+        if TOPIC_IMAGE not in self._summary.channels:
+            raise NotFoundError("the record has no frames", where=where, fix="name a camera or recording artifact")
+        schema = self._schema(TOPIC_IMAGE)
+        names = {kind.DESCRIPTOR.full_name: coding for coding, kind in _CODINGS.items()}
+        if schema not in names:
+            raise InputError(f"{TOPIC_IMAGE} holds {schema}", where=where, fix=f"write it as one of {', '.join(names)}")
+        return names[schema]
+
     @property
     def frame_count(self) -> int:
         return len(self._frames)
@@ -100,6 +119,8 @@ class Record:
             NotFoundError: the record has no such frames.
             CorruptError: a frame that cannot be decoded, or of another size than the first.
         """
+        if self.coding is Coding.H264:
+            return self._video_frames(first, count)
         pictures = self._payloads(first, count)
         where = str(self.path)
         try:
@@ -118,16 +139,19 @@ class Record:
         return out[..., 0]
 
     def jpeg(self, index: int) -> bytes:
-        """The stored JPEG of one frame.
+        """One frame as JPEG: the stored bytes, or the decoded frame encoded anew where the record is H.264.
 
         Raises:
             NotFoundError: the record has no such frame.
         """
+        if self.coding is Coding.H264:
+            return encode_jpeg(self._video_frames(index, 1)[0])
         return bytes(self._payloads(index, 1)[0])
 
     def timestamps(self, first: int, count: int) -> NDArray[np.int64]:
         """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages."""
-        decoded = [messages.CompressedImage.FromString(bytes(m)) for m in self._read(self._frames, first, count)]
+        kind = _CODINGS[self.coding]
+        decoded = [kind.FromString(bytes(part)) for part in self._read(self._frames, first, count)]
         return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
 
     def wind(self) -> WindSeries | None:
@@ -199,13 +223,26 @@ class Record:
             f"no attachment {name!r}", where=str(self.path), fix=f"there are: {', '.join(self.attachments) or 'none'}"
         )
 
+    def _video_frames(self, first: int, count: int) -> NDArray[np.uint8]:
+        key = first
+        pictures = self._payloads(first, count)
+        while not is_key(pictures[0]):
+            if key == 0:
+                raise CorruptError(f"no key frame up to frame {first}", where=str(self.path), fix=_VERIFY)
+            key -= 1
+            pictures[:0] = self._payloads(key, 1)
+        return np.stack(decode(pictures, where=str(self.path))[first - key :])
+
+    def _schema(self, topic: str) -> str:
+        schema = self._summary.schemas.get(self._summary.channels[topic].schema_id)
+        return schema.name if schema else "messages without a schema"
+
     def _messages(self, topic: str) -> container.Messages:
         return container.read_messages(self._file, self._summary, topic, where=str(self.path))
 
     def _payloads(self, first: int, count: int) -> list[memoryview]:
-        parts = self._read(self._frames, first, count)
-        spans = [messages.payload_span(part, start=0, end=len(part)) for part in parts]
-        return [part[start:end] for part, (start, end) in zip(parts, spans, strict=True)]
+        field = messages.data_field(_CODINGS[self.coding])
+        return [messages.payload(part, field=field) for part in self._read(self._frames, first, count)]
 
     def _read(self, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
         if count < 1 or first < 0:
@@ -227,10 +264,9 @@ class Record:
         ]
 
     def _decode(self, topic: str, kind: Any, table: container.Messages) -> list[Any]:
-        schema = self._summary.schemas.get(self._summary.channels[topic].schema_id)
-        if schema is None or schema.name != kind.DESCRIPTOR.full_name:
+        if self._schema(topic) != kind.DESCRIPTOR.full_name:
             raise InputError(
-                f"{topic} holds {schema.name if schema else 'messages without a schema'}",
+                f"{topic} holds {self._schema(topic)}",
                 where=str(self.path),
                 fix=f"write it as {kind.DESCRIPTOR.full_name}",
             )

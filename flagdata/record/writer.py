@@ -23,6 +23,7 @@ from flagdata.align.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, UsageError
 from flagdata.record import messages
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
+from flagdata.record.video import VideoEncoder
 from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
@@ -45,6 +46,15 @@ class Chunking(StrEnum):
     """Chunks of 256 KiB, and one at least every second of log time, for a file written while recording."""
 
 
+class Coding(StrEnum):
+    """How frames are stored."""
+
+    JPEG = "jpeg"
+    """foxglove.CompressedImage: every frame reached alone."""
+    H264 = "h264"
+    """foxglove.CompressedVideo: for archives, see `flagdata.record.video`."""
+
+
 _CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
 
 
@@ -58,6 +68,7 @@ class RecordWriter:
         path: the file to create; it must not exist.
         metadata: MCAP metadata records, name → key → value ("camera", "provenance", …).
         chunking: see `Chunking`.
+        coding: see `Coding`.
         quality: JPEG quality of frames given as arrays, 1 to 100.
 
     Raises:
@@ -70,6 +81,7 @@ class RecordWriter:
         *,
         metadata: Mapping[str, Mapping[str, str]],
         chunking: Chunking = Chunking.COMMITTED,
+        coding: Coding = Coding.JPEG,
         quality: int = JPEG_QUALITY,
     ) -> None:
         if not 1 <= quality <= 100:
@@ -77,6 +89,8 @@ class RecordWriter:
         self.path = path
         self._quality = quality
         self._chunking = chunking
+        self._coding = coding
+        self._video: VideoEncoder | None = None
         try:
             self._stream = path.open("xb")
         except FileExistsError:
@@ -115,16 +129,17 @@ class RecordWriter:
             log_time: instant on the common clock [UTC ns]; greater than the last frame's.
             publish_time: instant on the camera's own clock [UTC ns].
             timestamp: mid-exposure on the common clock [UTC ns].
-            image: (height, width) uint8 gray, encoded as JPEG here; or the bytes of a JPEG, kept as they are.
+            image: (height, width) uint8 gray, encoded here; or, where coding is JPEG, the bytes of a JPEG, kept as
+                they are.
 
         Raises:
             InputError: an array of another shape or type, bytes that are no JPEG, or time that does not increase.
         """
         self._check_order(log_time, publish_time)
-        data = image if isinstance(image, bytes) else encode_jpeg(image, quality=self._quality)
-        if data[:2] != b"\xff\xd8":
-            raise InputError("a frame's bytes are not a JPEG", fix="give a (height, width) uint8 array or JPEG bytes")
-        message = messages.CompressedImage(frame_id=FRAME_ID, format="jpeg", data=data)
+        if self._coding is Coding.JPEG:
+            message = messages.CompressedImage(frame_id=FRAME_ID, format="jpeg", data=self._jpeg(image))
+        else:
+            message = messages.CompressedVideo(frame_id=FRAME_ID, format="h264", data=self._picture(image))
         messages.set_timestamp(message.timestamp, timestamp)
         self._message(TOPIC_IMAGE, message, log_time=log_time, publish_time=publish_time)
 
@@ -201,6 +216,21 @@ class RecordWriter:
                 name, data, media_type = f"{name}.gz", packed, media_type + GZIP_SUFFIX
         self._writer.add_attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data)
 
+    def _jpeg(self, image: NDArray[np.uint8] | bytes) -> bytes:
+        if not isinstance(image, bytes):
+            return encode_jpeg(image, quality=self._quality)
+        if not (image.startswith(b"\xff\xd8") and image.endswith(b"\xff\xd9")):
+            raise InputError("a frame's bytes are not a JPEG", fix="give a (height, width) uint8 array or a whole JPEG")
+        return image
+
+    def _picture(self, image: NDArray[np.uint8] | bytes) -> bytes:
+        if isinstance(image, bytes):
+            raise InputError("an H.264 record takes arrays, not bytes", fix="decode the frame first")
+        if self._video is None:
+            _check_image(image)
+            self._video = VideoEncoder(height=image.shape[0], width=image.shape[1])
+        return self._video.encode(image)
+
     def _metadata(self, name: str, values: Mapping[str, str]) -> None:
         if name in self._names:
             raise ConflictError(f"metadata {name!r} is there already", where=str(self.path), fix="write it once")
@@ -268,8 +298,12 @@ def encode_jpeg(image: NDArray[np.uint8], *, quality: int = JPEG_QUALITY) -> byt
     Raises:
         InputError: another shape or type.
     """
+    _check_image(image)
+    return simplejpeg.encode_jpeg(np.ascontiguousarray(image)[..., None], quality=quality, colorspace="GRAY")
+
+
+def _check_image(image: NDArray[np.uint8]) -> None:
     if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:
         raise InputError(
             f"a frame of shape {image.shape} and type {image.dtype}", fix="give a (height, width) uint8 gray image"
         )
-    return simplejpeg.encode_jpeg(np.ascontiguousarray(image)[..., None], quality=quality, colorspace="GRAY")
