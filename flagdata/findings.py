@@ -27,6 +27,7 @@ class Finding:
         where: the first place it occurs ("line 812", "frame 31"), if it has one.
         count: how many rows, frames or seconds it concerns, 1 if it is about the whole.
         value: a number a program may want (the offset found, the worst error), SI.
+        fix: what the user can do about it, where something can be done.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Finding:
     where: str | None = None
     count: int = 1
     value: float | None = None
+    fix: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -44,6 +46,7 @@ class Finding:
             "where": self.where,
             "count": self.count,
             "value": self.value,
+            "fix": self.fix,
         }
 
 
