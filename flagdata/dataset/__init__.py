@@ -1,0 +1,1 @@
+"""Typed, synchronized pairs of clips and ground truth, out of the lake."""
