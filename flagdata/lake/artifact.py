@@ -8,10 +8,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any
 
 from flagdata import provenance
-from flagdata.errors import InputError
+from flagdata.errors import CorruptError, InputError
 from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
 
 OBJECT_NAME = re.compile(r"(mcap|zarr)/[0-9a-f]{64}")
@@ -97,12 +98,12 @@ class Artifact:
     def _bad(self, column: str, value: object, wanted: str) -> InputError:
         return InputError(f"{column} is {value!r}", where=f"artifact {self.name!r}", fix=f"give {wanted}")
 
-    @property
+    @cached_property
     def recipe_hash(self) -> str:
         """SHA-256 of the recipe's canonical JSON."""
         return provenance.recipe_hash(self.recipe)
 
-    @property
+    @cached_property
     def id(self) -> str:
         """Identity: what went in and what it is a part of; 32 hexadecimal digits of a SHA-256.
 
@@ -140,8 +141,16 @@ class Artifact:
 
         Raises:
             InputError: a row whose values break the rules above.
+            CorruptError: a row whose identity is not that of its content.
         """
         names = {f.name for f in dataclasses.fields(cls)}
         values = {column: value for column, value in row.items() if column in names}
         values["recipe"] = json.loads(row["recipe"]) if row.get("recipe") else {}
-        return cls(**values)
+        artifact = cls(**values)
+        if artifact.id != row["artifact"]:
+            raise CorruptError(
+                f"the row of {row['artifact']} describes another artifact, {artifact.id}",
+                where=f"artifact {artifact.name!r}",
+                fix="run flagdata doctor",
+            )
+        return artifact

@@ -18,6 +18,7 @@ from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog, newer
 from flagdata.lake.durable import disk_errors, put_if_absent
+from flagdata.lake.leases import keeping_collectors_out
 from flagdata.lake.objects import STORES, Objects
 from flagdata.lake.refs import MAIN, Refs, View
 from flagdata.lake.transaction import Transaction
@@ -179,7 +180,8 @@ class Lake:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
-        self.refs.put("tags", name, self.view(at))
+        with keeping_collectors_out(self.staging):
+            self.refs.put("tags", name, self.view(at))
 
     def branch(self, name: str, *, at: str | None = None) -> None:
         """Begin a branch from what `at` shows.
@@ -188,7 +190,8 @@ class Lake:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
-        self.refs.put("branches", name, self.view(at))
+        with keeping_collectors_out(self.staging):
+            self.refs.put("branches", name, self.view(at))
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""

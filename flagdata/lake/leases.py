@@ -2,10 +2,10 @@
 
 A transaction owns one folder in `staging/`. Its file `lease` is locked (flock) for as long as the process lives: the
 kernel drops the lock when the process ends, however it ends, so a lock that can be taken proves that the owner is dead.
-Object names are written to the lease before the object is looked for or moved to its place. That step and a
-collection's "read leases, read catalog, delete" exclude each other by the lock `staging/.collect`, shared by the
-former, exclusive for the latter. A collector therefore either sees the lease, or finds the row committed, or comes
-before the transaction looked for the object.
+An object's name is written to the lease before the object is looked for or moved to its place. That step, a commit and
+the making of a ref take the lock `staging/.collect` shared; a collection takes it exclusively while it reads leases,
+then the catalog, and deletes. A collector therefore either sees the lease, or finds the row committed, or comes before
+the transaction looked for the object.
 
 Locks work between processes of one machine, and over file systems that carry flock between machines (NFS 4, Lustre).
 """
@@ -42,7 +42,7 @@ class Lease:
     """The staging folder of one running transaction."""
 
     def __init__(self, staging: Path) -> None:
-        with _locked(staging / _COLLECT, fcntl.LOCK_SH):
+        with keeping_collectors_out(staging):
             self.folder = staging / uuid.uuid4().hex
             self.folder.mkdir()
             self._file = (self.folder / _LEASE).open("w", encoding="utf-8")
@@ -50,11 +50,14 @@ class Lease:
             owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat()}
             self._line(json.dumps(owner))
 
+    def hold(self, object_name: str) -> None:
+        """Note that the transaction relies on the object; called while collectors are kept out."""
+        self._line(object_name)
+
     @contextmanager
-    def holding(self, object_name: str) -> Iterator[None]:
-        """Note that the transaction relies on the object, then keep collectors out during the block."""
-        with _locked(self.folder.parent / _COLLECT, fcntl.LOCK_SH):
-            self._line(object_name)
+    def keeping_collectors_out(self) -> Iterator[None]:
+        """No collection runs during the block."""
+        with keeping_collectors_out(self.folder.parent):
             yield
 
     def close(self) -> None:
@@ -68,8 +71,16 @@ class Lease:
 
 
 @contextmanager
+def keeping_collectors_out(staging: Path) -> Iterator[None]:
+    """No collection runs during the block; any number of writers may."""
+    with _locked(staging / _COLLECT, fcntl.LOCK_SH):
+        yield
+
+
+@contextmanager
 def collecting(staging: Path) -> Iterator[None]:
-    """Keep transactions from starting or putting objects during the block."""
+    """No transaction starts, puts an object or commits, and no ref is made, during the block; it works on a lake one
+    may only read."""
     with _locked(staging / _COLLECT, fcntl.LOCK_EX):
         yield
 
@@ -102,6 +113,8 @@ def _try_lock(descriptor: int) -> bool:
 
 @contextmanager
 def _locked(path: Path, mode: int) -> Iterator[None]:
-    with path.open("a") as file:
+    if not path.exists():
+        path.touch()
+    with path.open() as file:
         fcntl.flock(file, mode)
         yield

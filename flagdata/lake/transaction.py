@@ -96,7 +96,8 @@ class Transaction:
             if self._lease.folder not in path.parents:
                 path = self._copy(path)
             name = self._objects.name_of(path)
-            with self._lease.holding(name):
+            with self._lease.keeping_collectors_out():
+                self._lease.hold(name)
                 self._objects.publish(path, name)
         return name
 
@@ -114,7 +115,8 @@ class Transaction:
             return False
         size = artifact.object_bytes
         if artifact.object is not None:
-            with self._lease.holding(artifact.object):
+            with self._lease.keeping_collectors_out():
+                self._lease.hold(artifact.object)
                 stored = self._objects.existing(artifact.object)
             if size is None:
                 size = size_of(stored)
@@ -136,6 +138,9 @@ class Transaction:
 
     def _commit(self) -> None:
         with disk_errors("committing", self._catalog.path):
+            if self._pending:
+                with self._lease.keeping_collectors_out():
+                    self._catalog.merge_small_files()
             self.result = self._publish()
 
     def _close(self) -> None:
@@ -159,7 +164,8 @@ class Transaction:
                 "code_version": code_version(),
             }  # fmt: skip
             try:
-                version = self._catalog.append(rows, base=version, info=info)
+                with self._lease.keeping_collectors_out():
+                    version = self._catalog.append(rows, base=version, info=info)
             except Moved:
                 if time.monotonic() > deadline:
                     raise ConflictError(
