@@ -1,0 +1,76 @@
+"""What a camera source is to the rest: facts read before decoding, then pictures in the order of presentation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Protocol
+
+from flagdata.findings import Finding
+from flagdata.ingest.camera.geometry import Orientation
+from flagdata.ingest.camera.luma import Luma
+from flagdata.ingest.camera.stamps import Timing
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceFacts:
+    """What is known of a camera source once its first frame is decoded.
+
+    Attributes:
+        container, codec, pixel_format: names as FFmpeg has them.
+        width, height: of the stored picture [px].
+        aspect: width / height of a stored pixel.
+        interlaced: whether the first frame says it is.
+        metadata: of the container and of its video stream, keys lower-cased; the stream's win.
+        recorded: the camera's wall-clock time inside the video stream, if it writes one there.
+        sequence: whether the stamps were made from `sequence_fps`.
+        findings: what opening it found.
+    """
+
+    container: str
+    codec: str
+    pixel_format: str
+    width: int
+    height: int
+    aspect: Fraction
+    orientation: Orientation
+    interlaced: bool
+    timing: Timing
+    metadata: Mapping[str, str]
+    recorded: str | None
+    sequence: bool
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """A decoded picture whose luma is taken only when it is needed.
+
+    Attributes:
+        stamp: in ticks of the source's timing, `None` where the file has none.
+    """
+
+    stamp: int | None
+    luma: Callable[[], Luma]
+
+
+class Source(Protocol):
+    """A camera file or image sequence, open."""
+
+    @property
+    def facts(self) -> SourceFacts: ...
+
+    def pictures(self) -> Iterator[Picture]:
+        """Decoded pictures in order of presentation; once."""
+        ...
+
+    def samples(self, runs: int, length: int) -> Iterator[list[Picture]]:
+        """About `runs` short runs of at most `length` consecutive pictures, spread over it; any number of times."""
+        ...
+
+    def damage(self) -> list[Finding]:
+        """What could not be decoded; complete when `pictures` has ended."""
+        ...
+
+    def close(self) -> None: ...

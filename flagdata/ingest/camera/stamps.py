@@ -1,0 +1,198 @@
+"""Stamps of a file's frames: what their rate is, and a strictly increasing sequence out of imperfect ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding, Severity
+from flagdata.timebase import NANOSECONDS
+
+T = TypeVar("T")
+
+_REORDER = 32  # more than any codec's reordering depth (16 in H.264 and H.265)
+_RESET = 1.0  # s; a step back by more is a clock that started anew, not a slip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """The stamps of a whole file, as its packets state them, before any frame is decoded.
+
+    Attributes:
+        tick: seconds of one stamp unit.
+        origin: stamp of the first frame; instants are counted from it.
+        period: ticks from frame to frame: the mean where the rate is constant, the median where it varies.
+        variable: more than one frame in a hundred is off that rate by more than the stamps' own rounding.
+        span: ticks from the first to the last stamp.
+        shortest, longest: steps between neighbouring stamps [ticks].
+        count: frames with a stamp.
+        missing: frames without one.
+    """
+
+    tick: Fraction
+    origin: int
+    period: Fraction
+    variable: bool
+    span: int
+    shortest: int
+    longest: int
+    count: int
+    missing: int
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames a second as the container states them."""
+        return 1 / (self.period * self.tick)
+
+    @property
+    def duration(self) -> float:
+        """From the first stamp to the last [s]."""
+        return float(self.span * self.tick)
+
+
+def survey(stamps: NDArray[np.int64], *, tick: Fraction, missing: int, fallback_rate: Fraction | None) -> Timing:
+    """What the stamps say, (n,) in the order of the file.
+
+    The period of a constant-rate file is the mean step, with steps over missing frames counted as the whole number of
+    periods they are: exact where the median step is rounded to the container's ticks (33 or 34 ms in Matroska).
+
+    Args:
+        fallback_rate: frames a second where there are fewer than two stamps.
+    """
+    ordered = np.unique(stamps)
+    steps = np.diff(ordered)
+    if len(steps) == 0:
+        period = 1 / (fallback_rate * tick) if fallback_rate else Fraction(1) / (25 * tick)
+        origin = int(ordered[0]) if len(ordered) else 0
+        return Timing(
+            tick=tick, origin=origin, period=period, variable=False, span=0, shortest=0, longest=0,
+            count=len(stamps), missing=missing,
+        )  # fmt: skip
+    median = float(np.median(steps))
+    whole = np.maximum(np.rint(steps / median), 1)
+    near = whole <= 1000
+    mean = Fraction(int(steps[near].sum()), int(whole[near].sum()))
+    off = np.abs(steps - np.rint(steps / float(mean)) * float(mean))
+    # Two stamps, each rounded to a tick, put a step off by less than a whole one.
+    allowed = max(1.0, 0.01 * float(mean))
+    variable = bool(np.mean(off > allowed) > 0.01)
+    period = Fraction(round(median)) if variable else mean
+    head = np.sort(stamps[:_REORDER])
+    return Timing(
+        tick=tick,
+        origin=int(head[0]),
+        period=period,
+        variable=variable,
+        span=int(ordered[-1] - head[0]),
+        shortest=int(steps.min()),
+        longest=int(steps.max()),
+        count=len(stamps),
+        missing=missing,
+    )
+
+
+class StampRepair(Generic[T]):
+    """Makes strictly increasing instants of the stamps of decoded frames; reports what it had to do.
+
+    - no stamp: one period after its predecessor;
+    - the same stamp as before: two frames cannot share an instant, the later is left out;
+    - a single stamp out of order: the frame that lies farther from where the period puts it is left out;
+    - a jump back by more than a second: the clock started anew and nothing says when, so what follows is left out until
+      the stamps pass the last good one;
+    - a jump forward is a gap, and kept as such.
+
+    Holds one frame, to know whether its successor agrees with it.
+
+    Args:
+        period: expected step [ns].
+    """
+
+    def __init__(self, *, period: int) -> None:
+        self._period = period
+        self._last: int | None = None
+        self._held: tuple[int, T] | None = None
+        self._seen = 0
+        self._where: dict[str, int] = {}
+        self._counts: dict[str, int] = {}
+
+    def push(self, stamp: int | None, item: T) -> Iterator[tuple[int, T]]:
+        """Offer the next decoded frame; yields the frame before it once its stamp is settled."""
+        index = self._seen
+        self._seen += 1
+        if self._held is None:
+            if stamp is None:
+                self._note("stamps-missing", index)
+                stamp = 0 if self._last is None else self._last + self._period
+            self._held = (stamp, item)
+            return
+        held, _ = self._held
+        if stamp is None:
+            self._note("stamps-missing", index)
+            stamp = held + self._period
+        if stamp > held:
+            yield from self.finish()
+            self._held = (stamp, item)
+        elif stamp == held:
+            self._note("stamps-duplicate", index)
+        elif held - stamp > _RESET * NANOSECONDS and not self._held_is_the_odd_one(stamp):
+            self._note("clock-reset", index)
+        elif self._held_is_the_odd_one(stamp):
+            self._note("stamps-disordered", index - 1)
+            self._held = (stamp, item)
+        else:
+            self._note("stamps-disordered", index)
+
+    def finish(self) -> Iterator[tuple[int, T]]:
+        """Yields the frame still held."""
+        if self._held is not None:
+            self._last = self._held[0]
+            yield self._held
+            self._held = None
+
+    def _held_is_the_odd_one(self, stamp: int) -> bool:
+        if self._held is None or self._last is None or stamp <= self._last:
+            return False
+        return abs(self._held[0] - self._last - self._period) > abs(stamp - self._last - 2 * self._period)
+
+    def _note(self, kind: str, index: int) -> None:
+        self._where.setdefault(kind, index)
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+
+    def findings(self) -> list[Finding]:
+        told = {
+            "stamps-missing": (
+                Severity.WARNING,
+                "frames have no time stamp; each was put one frame period after its predecessor",
+            ),
+            "stamps-duplicate": (
+                Severity.WARNING,
+                "frames repeat the time stamp of their predecessor and were left out",
+            ),
+            "stamps-disordered": (
+                Severity.WARNING,
+                "frames have a time stamp out of order and were left out",
+            ),
+            "clock-reset": (
+                Severity.ERROR,
+                "frames after the camera's clock started anew have no known time and were left out",
+            ),
+        }  # fmt: skip
+        return [
+            Finding(
+                kind=kind, severity=severity, what=f"{self._counts[kind]} {text}",
+                where=f"frame {self._where[kind]}", count=self._counts[kind],
+            )
+            for kind, (severity, text) in told.items()
+            if kind in self._counts
+        ]  # fmt: skip
+
+
+def nanoseconds(ticks: int, *, tick: Fraction, scale: Fraction) -> int:
+    """`ticks` × `tick` × `scale` in nanoseconds, rounded to the nearest, half up."""
+    factor = tick * scale * NANOSECONDS
+    return (2 * ticks * factor.numerator + factor.denominator) // (2 * factor.denominator)

@@ -1,0 +1,118 @@
+"""When a recording began: from the user, or from metadata with what is known of their habits, never from guesses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+from flagdata.errors import TimeError
+from flagdata.findings import Finding, Severity
+from flagdata.timebase import NANOSECONDS, from_wall, iso, parse, zone
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Instant of the first frame on the camera's clock.
+
+    Attributes:
+        instant: [UTC ns].
+        source: "option", or "metadata: <key>".
+        sigma: standard uncertainty of reading it off the file [s], the camera's clock error not included; `None` for
+            the user's own figure.
+    """
+
+    instant: int
+    source: str
+    sigma: float | None
+    findings: tuple[Finding, ...] = ()
+
+
+_WHOLE_SECOND = 1 / 12**0.5  # σ of an instant cut to whole seconds
+_EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock (epochs of 1904, 1970 and 1980)
+
+
+def find_start(
+    option: int | None,
+    metadata: Mapping[str, str],
+    *,
+    recorded: str | None,
+    place: str | None,
+    duration: float,
+    where: str,
+) -> Start:
+    """The start of a recording.
+
+    In order: `option`; `com.apple.quicktime.creationdate`, which names its zone and means the start; the wall-clock
+    time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`, which should be
+    UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the recording's end.
+    Neither the file's name nor its modification time is used.
+
+    Args:
+        recorded: ISO 8601 wall-clock time from within the video stream, with a zone or without.
+        place: zone of the camera's clock, for times without one.
+        duration: of the recording [s].
+
+    Raises:
+        TimeError: nothing usable was found.
+    """
+    if option is not None:
+        return Start(instant=option, source="option", sigma=None)
+    passed_over: list[Finding] = []
+    default = zone(place, where="zone") if place else None
+
+    apple = metadata.get("com.apple.quicktime.creationdate")
+    if apple:
+        try:
+            return _checked(
+                parse(apple, default=default, where=where), "com.apple.quicktime.creationdate", _WHOLE_SECOND
+            )
+        except TimeError as error:
+            passed_over.append(_passed("com.apple.quicktime.creationdate", apple, error))
+    if recorded:
+        try:
+            return _checked(parse(recorded, default=default, where=where), "recording time in the video", _WHOLE_SECOND)
+        except TimeError as error:
+            passed_over.append(_passed("recording time in the video", recorded, error))
+    created = metadata.get("creation_time")
+    if created:
+        try:
+            return _from_creation_time(created, place=place, duration=duration, where=where)
+        except TimeError as error:
+            passed_over.append(_passed("creation_time", created, error))
+    tried = "; ".join(f.what for f in passed_over) or "its metadata name none"
+    raise TimeError(
+        f"nothing says when the recording began: {tried}",
+        where=where,
+        fix="give --start with a zone, e.g. --start 2026-05-01T12:00:00+02:00",
+    )
+
+
+def _from_creation_time(text: str, *, place: str | None, duration: float, where: str) -> Start:
+    if place is None:
+        instant = parse(text, default=zone("UTC"), where=where)
+        what = f"the start is creation_time {text} taken as UTC and as the start of the recording"
+    else:
+        # The camera wrote its wall clock and the container calls it UTC.
+        wall = datetime.fromisoformat(iso(parse(text, default=zone("UTC"), where=where))[:19])
+        instant = from_wall(wall, zone(place), where=where)
+        what = f"the start is creation_time {text} taken as wall-clock time in {place}, at the start of the recording"
+    sigma = (1 / 12 + duration**2 / 12) ** 0.5
+    finding = Finding(
+        kind="start-unsure",
+        severity=Severity.WARNING,
+        what=f"{what}; some cameras write the end of it (then it is {duration:.1f} s early) and some local time",
+        value=sigma,
+    )
+    start = _checked(instant, "creation_time", sigma)
+    return Start(instant=start.instant, source=start.source, sigma=sigma, findings=(finding,))
+
+
+def _checked(instant: int, key: str, sigma: float) -> Start:
+    if instant < _EARLIEST:
+        raise TimeError(f"{iso(instant)} is an unset clock", fix="give --start")
+    return Start(instant=instant, source=f"metadata: {key}", sigma=sigma)
+
+
+def _passed(key: str, text: str, error: TimeError) -> Finding:
+    return Finding(kind="start-passed-over", severity=Severity.NOTE, what=f"{key} {text!r} is unusable ({error.what})")

@@ -1,0 +1,243 @@
+"""A camera file as a stream of gray squares on an exact grid of instants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+
+from flagdata.errors import InputError, LimitError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
+from flagdata.ingest.camera.grid import GridReport, Resampler
+from flagdata.ingest.camera.options import CameraOptions, exact
+from flagdata.ingest.camera.source import Picture, Source
+from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
+from flagdata.ingest.camera.start import find_start
+from flagdata.ingest.camera.video import VideoSource
+from flagdata.signals import CameraInfo, Frame
+from flagdata.timebase import NANOSECONDS
+
+
+class CameraStream:
+    """A `FrameStream`: opened by `open_camera`, read once, in constant memory, closed by its `with` block."""
+
+    def __init__(self, source: Source, path: Path, options: CameraOptions) -> None:
+        self._source = source
+        self._options = options
+        self._opening: list[Finding] = list(source.facts.findings)
+        self._closing: list[Finding] = []
+        self._started = False
+        facts, timing = source.facts, source.facts.timing
+        self._scale = Fraction(1)
+        if options.true_fps is not None:
+            self._scale = timing.rate / exact(options.true_fps)
+            self._opening.append(_rescaled(timing.variable, self._scale, options.true_fps, float(timing.rate)))
+        duration = timing.duration * float(self._scale)
+        if duration > options.limits.duration:
+            raise LimitError(
+                f"the time stamps span {duration:.0f} s, beyond the limit of {options.limits.duration:.0f} s",
+                where=str(path), fix="the stamps are damaged; repair the container, or raise the limit",
+            )  # fmt: skip
+        start = find_start(
+            options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=duration,
+            where=str(path),
+        )  # fmt: skip
+        self._opening += start.findings
+        width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
+        crop = settle_crop(options.crop, width=width, height=height)
+        self._geometry = Geometry(
+            width=facts.width, height=facts.height, aspect=facts.aspect, orientation=facts.orientation, crop=crop,
+            size=options.size,
+        )  # fmt: skip
+        self._period = nanoseconds(1, tick=timing.tick * timing.period, scale=self._scale)
+        self._shift = round((options.exposure or 0.0) / 2 * NANOSECONDS)
+        self.info = CameraInfo(
+            container=facts.container,
+            codec=facts.codec,
+            width=width,
+            height=height,
+            container_rate=float(timing.rate),
+            true_rate=float(timing.rate / self._scale),
+            variable_rate=timing.variable,
+            rotation=facts.orientation.clockwise,
+            start=start.instant,
+            start_from=start.source,
+            duration=duration,
+            crop=crop.as_tuple(),
+        )
+        self._opening += self._standing_findings()
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        return (*self._opening, *self._closing)
+
+    def __enter__(self) -> CameraStream:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._source.close()
+
+    def __iter__(self) -> Iterator[Frame]:
+        if self._started:
+            raise UsageError("a camera stream is read once", fix="open the file again")
+        self._started = True
+        return self._frames()
+
+    def _frames(self) -> Iterator[Frame]:
+        repair: StampRepair[Picture] = StampRepair(period=self._period)
+        if self._options.rate == "native":
+            report = GridReport()
+            for stamp, picture in self._repaired(repair):
+                report.sources += 1
+                report.picks += 1
+                report.used += 1
+                yield self._frame(self.info.start + stamp, picture, error=0)
+        else:
+            grid = self._grid(exact(self._options.rate))
+            report = grid.report
+            for stamp, picture in self._repaired(repair):
+                for pick in grid.push(stamp, picture):
+                    yield self._frame(self.info.start + pick.time, pick.source, error=pick.error)
+            for pick in grid.finish():
+                yield self._frame(self.info.start + pick.time, pick.source, error=pick.error)
+            self._closing += _grid_findings(report, float(grid.rate))
+        self._closing += repair.findings()
+        self._closing += self._source.damage()
+
+    def _grid(self, rate: Fraction) -> Resampler[Picture]:
+        grid_period = Fraction(NANOSECONDS) / rate
+        given = self._options.tolerance
+        tolerance = (
+            max(grid_period / 2, Fraction(3, 4) * self._period) if given is None else Fraction(given) * NANOSECONDS
+        )
+        return Resampler(start=0, rate=rate, tolerance=int(tolerance), tail=self._period // 2)
+
+    def _repaired(self, repair: StampRepair[Picture]) -> Iterator[tuple[int, Picture]]:
+        """Source pictures with strictly increasing instants, counted from the start [ns]."""
+        timing = self._source.facts.timing
+        for picture in self._source.pictures():
+            stamp = None
+            if picture.stamp is not None:
+                stamp = nanoseconds(picture.stamp - timing.origin, tick=timing.tick, scale=self._scale)
+            yield from repair.push(stamp, picture)
+        yield from repair.finish()
+
+    def _frame(self, time: int, picture: Picture, *, error: int) -> Frame:
+        luma = picture.luma()
+        image = self._geometry.render(luma.image, black=luma.black, white=luma.white)
+        return Frame(time=time + self._shift, image=image, stamp_error=error / NANOSECONDS)
+
+    def _standing_findings(self) -> list[Finding]:
+        found = []
+        if self._geometry.padded:
+            chosen = self._options.crop != "whole"
+            found.append(
+                Finding(
+                    kind="letterboxed",
+                    severity=Severity.NOTE if chosen else Severity.WARNING,
+                    what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is not square and was padded with "
+                    "black" + ("" if chosen else "; no crop was chosen, so the flag may be small or off centre"),
+                )
+            )
+        if self._options.exposure is None:
+            half = self._period / 2 / NANOSECONDS
+            found.append(
+                Finding(
+                    kind="exposure-unknown", severity=Severity.NOTE,
+                    what=f"the exposure time is unknown: stamps count as mid-exposure, to within {half * 1e3:.3g} ms",
+                    value=half,
+                )
+            )  # fmt: skip
+        if self.info.variable_rate:
+            timing = self._source.facts.timing
+            tick = float(timing.tick * self._scale) * 1e3
+            found.append(
+                Finding(
+                    kind="variable-rate", severity=Severity.NOTE,
+                    what=f"the frame rate varies: {timing.shortest * tick:.3g} to {timing.longest * tick:.3g} ms from "
+                    "frame to frame",
+                    value=float(timing.longest * timing.tick * self._scale),
+                )
+            )  # fmt: skip
+        return found
+
+
+def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
+    what = (
+        f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled by {float(scale):.6g}"
+    )
+    if variable:
+        return Finding(
+            kind="true-rate-of-variable", severity=Severity.WARNING,
+            what=f"{what}; its frame rate varies, so the mean of it was set to the true one", value=float(scale),
+        )  # fmt: skip
+    return Finding(kind="true-rate", severity=Severity.NOTE, what=what, value=float(scale))
+
+
+def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
+    found = [
+        Finding(
+            kind="resampled", severity=Severity.NOTE,
+            what=f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time stamp; worst "
+            f"stamp error {report.worst_error / 1e6:.3f} ms",
+            count=report.picks, value=report.worst_error / NANOSECONDS,
+        )
+    ]  # fmt: skip
+    if report.left_out:
+        found.append(
+            Finding(
+                kind="frames-missing", severity=Severity.WARNING,
+                what=f"{report.left_out} of the instants have no source frame near and were left out, in {report.gaps} "
+                f"gaps of up to {report.longest_gap / NANOSECONDS:.3f} s",
+                where=f"grid frame {report.first_left_out}", count=report.left_out,
+                value=report.longest_gap / NANOSECONDS,
+            )
+        )  # fmt: skip
+    if report.repeats:
+        found.append(
+            Finding(
+                kind="frames-repeated", severity=Severity.WARNING,
+                what=f"{report.repeats} frames show the same source frame as the one before: the camera is slower than "
+                f"{rate:g} Hz or its frames are uneven",
+                count=report.repeats,
+            )
+        )  # fmt: skip
+    if report.used and report.unused > report.sources // 2:
+        found.append(
+            Finding(
+                kind="frames-dropped", severity=Severity.NOTE,
+                what=f"{report.unused} of {report.sources} source frames fall between the instants and are not used; "
+                "the native rate keeps them",
+                count=report.unused,
+            )
+        )  # fmt: skip
+    return found
+
+
+def open_camera(path: Path | str, options: CameraOptions | None = None) -> CameraStream:
+    """Open a camera file or image sequence, settle its options, and decode its first frame.
+
+    Raises:
+        NotFoundError, InputError, LimitError, TimeError, UsageError: with what to do about it.
+    """
+    path = Path(path)
+    options = options or CameraOptions()
+    source = open_source(path, options)
+    try:
+        return CameraStream(source, path, options)
+    except BaseException:
+        source.close()
+        raise
+
+
+def open_source(path: Path, options: CameraOptions) -> Source:
+    if path.is_dir():
+        raise InputError("a folder is not a video", where=str(path), fix="give the video file")
+    return VideoSource(path, options)
