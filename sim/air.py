@@ -1,0 +1,103 @@
+"""Forces of the air on the cloth, as named models.
+
+`QuadraticNormal` is the reference simulator's (ArcSim 0.2.1): on a face of rest area a with deformed unit normal n,
+with w = wind − face velocity, w_n = w·n and w_t = w − w_n n,
+
+    ρ a |w_n| w_n n + c a w_t,
+
+a third on each corner. There is no ½ and no drag coefficient: ρ is a parameter, 1 kg/m³ by default, not the air's
+density.
+
+`Stokes` is what the paper's text says (Runia et al. 2020, section 4.1; Wejchert and Haumann 1991): a sphere's drag
+6 π R η w on every mass. The text leaves R open; here R = √(A/π) with A the rest area that belongs to the vertex, so
+that the total does not depend on orientation but, as for any such model, on the mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from flagdata.errors import InputError
+from flagdata.registry import Registry
+from sim.cloth import Cloth, gather_sum
+
+# Dynamic viscosity of air at 288.15 K, U.S. Standard Atmosphere 1976, table 4.
+_VISCOSITY = 1.789e-5
+
+
+class AirForce(Protocol):
+    """A model of the air's force on the cloth."""
+
+    def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N] for a wind (3, batch) [m/s]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuadraticNormal:
+    """The reference simulator's wind.
+
+    Attributes:
+        density: ρ [kg/m³], null value 0.
+        drag: c of the linear tangential part [kg/(m² s)], null value 0.
+    """
+
+    density: float = 1.0
+    drag: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("density", self.density), ("drag", self.drag)):
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(
+                    f"{name} {value!r} is negative or not finite", where="wind force", fix="give at least 0"
+                )
+
+    def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N] for a wind (3, batch) [m/s]."""
+        x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+        normal = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
+        length = (normal * normal).sum(1, keepdim=True).sqrt()
+        normal = normal / length.clamp(min=torch.finfo(position.dtype).tiny)
+        v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
+        relative = wind - (v0 + v1 + v2) / 3
+        across = (relative * normal).sum(1, keepdim=True)
+        third = (cloth.areas / 3)[:, None, None]
+        push = third * (self.density * across.abs() * across * normal + self.drag * (relative - across * normal))
+        return gather_sum([push, push, push], cloth.face_slots)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stokes:
+    """The paper's text: 6 π R η times the relative velocity, on every vertex.
+
+    Attributes:
+        viscosity: η [Pa·s], null value 0.
+    """
+
+    viscosity: float = _VISCOSITY
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.viscosity) and self.viscosity >= 0):
+            raise InputError(
+                f"viscosity {self.viscosity!r} is negative or not finite", where="wind force", fix="give at least 0"
+            )
+
+    def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N] for a wind (3, batch) [m/s]."""
+        areas = torch.tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
+        coefficient = 6 * math.pi * self.viscosity * (areas / math.pi).sqrt()
+        return coefficient[:, None, None] * (wind - velocity)
+
+
+AIR_FORCES = Registry(
+    "wind force",
+    {
+        "quadratic-normal": "sim.air:QuadraticNormal",
+        "stokes": "sim.air:Stokes",
+    },
+)

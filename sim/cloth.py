@@ -1,0 +1,162 @@
+"""A batch of cloths on one mesh as tensors: everything the forces need that does not change during a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import InputError
+from sim.material import Material
+from sim.mesh import Mesh
+from sim.tables import GRIDS, Evaluation, StrainGrid, bending_segments, direction_rows, sample_stretching
+
+_COLUMN = 0.2  # 1 / tables.CURVATURE_SPACING
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloth:
+    """Constants of a batch. Batch innermost; every member has its own material on the shared mesh.
+
+    Attributes:
+        mesh: the rest state.
+        materials: one for each member.
+        evaluation: how the tables are read.
+        faces: (face, 3) indices.
+        gradients: (face, 2, 3) shape derivatives [1/m].
+        areas: (face,) rest areas [m²].
+        hinges: (hinge, 4) indices, see `Mesh.hinges`.
+        hinge_shape: (hinge,) S = l²/(2(a0 + a1)).
+        hinge_column: (hinge,) fold angle → curvature in table columns, 0.1 l/(a0 + a1) [1/rad].
+        hinge_rows: (hinge, 3) weights of the bending rows.
+        mass: (vertex, batch) lumped [kg].
+        samples: (table, n00, n11, n01, 4) stretching stiffness [N/m].
+        table_of: (batch,) table of each member.
+        grid: where the samples are.
+        segments: (3, 5, batch) bending [N·m].
+        damping: (batch,) d [s].
+        face_slots: (vertex, k) rows of the stacked corner forces (3·face, …) to sum at each vertex, padded with 3·face.
+        hinge_slots: the same for (4·hinge, …), padded with 4·hinge.
+    """
+
+    mesh: Mesh
+    materials: tuple[Material, ...]
+    evaluation: Evaluation
+    faces: Tensor
+    gradients: Tensor
+    areas: Tensor
+    hinges: Tensor
+    hinge_shape: Tensor
+    hinge_column: Tensor
+    hinge_rows: Tensor
+    mass: Tensor
+    samples: Tensor
+    table_of: Tensor
+    grid: StrainGrid
+    segments: Tensor
+    damping: Tensor
+    face_slots: Tensor
+    hinge_slots: Tensor
+
+    @classmethod
+    def build(
+        cls,
+        mesh: Mesh,
+        materials: Sequence[Material],
+        *,
+        evaluation: Evaluation = Evaluation.ARCSIM,
+        dtype: torch.dtype = torch.float32,
+        device: torch.device | str = "cpu",
+    ) -> Cloth:
+        """Constants for one member a material.
+
+        Raises:
+            InputError: no materials.
+        """
+        if not materials:
+            raise InputError("a batch without members", where="cloth", fix="give one material for each member")
+
+        def real(values: NDArray[np.float64]) -> Tensor:
+            return torch.tensor(values, dtype=dtype, device=device)
+
+        def index(values: NDArray[np.int64]) -> Tensor:
+            return torch.tensor(values, dtype=torch.int64, device=device)
+
+        tables: dict[bytes, int] = {}
+        table_of = [tables.setdefault(m.stretching.tobytes(), len(tables)) for m in materials]
+        samples = [sample_stretching(np.frombuffer(key).reshape(6, 4), evaluation) for key in tables]
+        density = np.array([m.density for m in materials])
+        lengths, hinge_areas = mesh.hinge_lengths, mesh.hinge_areas
+        return cls(
+            mesh=mesh,
+            materials=tuple(materials),
+            evaluation=evaluation,
+            faces=index(mesh.faces),
+            gradients=real(mesh.gradients),
+            areas=real(mesh.areas),
+            hinges=index(mesh.hinges),
+            hinge_shape=real(lengths**2 / (2 * hinge_areas)),
+            hinge_column=real(0.5 * _COLUMN * lengths / hinge_areas),
+            hinge_rows=real(direction_rows(mesh.hinge_directions)),
+            mass=real(mesh.vertex_areas[:, None] * density),
+            samples=real(np.stack(samples)),
+            table_of=index(np.array(table_of)),
+            grid=GRIDS[evaluation],
+            segments=real(bending_segments(materials)),
+            damping=real(np.array([m.damping for m in materials])),
+            face_slots=index(incidence(mesh.faces, mesh.vertex_count)),
+            hinge_slots=index(incidence(mesh.hinges, mesh.vertex_count)),
+        )
+
+    @property
+    def batch(self) -> int:
+        return len(self.materials)
+
+    @property
+    def dtype(self) -> torch.dtype:
+        return self.mass.dtype
+
+    @property
+    def device(self) -> torch.device:
+        return self.mass.device
+
+
+def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int64]:
+    """Which corners of which elements meet at each vertex.
+
+    Args:
+        elements: (element, corner) vertex indices.
+
+    Returns:
+        (vertex, k) indices `corner * len(elements) + element` in ascending order, padded with `elements.size`.
+    """
+    vertex = elements.T.ravel()
+    order = np.argsort(vertex, kind="stable")
+    counts = np.bincount(vertex, minlength=vertex_count)
+    slots = np.full((vertex_count, max(int(counts.max(initial=0)), 1)), elements.size, dtype=np.int64)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    rank = np.arange(len(vertex)) - np.repeat(starts, counts)
+    slots[vertex[order], rank] = order
+    return slots
+
+
+def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
+    """Sum corner contributions at the vertices, in a fixed order: no atomics, so the same bits every time.
+
+    Args:
+        corners: one (element, 3, batch) tensor for each corner.
+        slots: (vertex, k) from `incidence`.
+
+    Returns:
+        (vertex, 3, batch).
+    """
+    zero = torch.zeros_like(corners[0][:1])
+    stacked = torch.cat([*corners, zero])
+    total = stacked[slots[:, 0]]
+    for k in range(1, slots.shape[1]):
+        total = total + stacked[slots[:, k]]
+    return total

@@ -1,0 +1,154 @@
+"""Cloth materials: area density, measured stretching and bending tables, internal damping.
+
+The tables are those of Wang, O'Brien and Ramamoorthi (ACM TOG 30(4):71, 2011); how they are evaluated is in
+`sim.tables`. Catalog entries are TOML files of `catalogs/materials`, with their source beside the numbers.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flagdata.errors import InputError, UnknownNameError
+
+STRETCHING_SHAPE = (6, 4)
+BENDING_SHAPE = (3, 5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """One cloth.
+
+    Attributes:
+        name: what errors and reports call it.
+        source: where the numbers are from.
+        density: mass per rest area [kg/m²].
+        stretching: (6, 4) [N/m]; columns k0 (uu·uu), k1 (uu·vv), k2 (vv·vv), k3 (uv·uv); row 0 at zero strain, rows 1–5
+            at full strain with the larger principal strain at 0, 22.5, 45, 67.5 and 90° from u.
+        bending: (3, 5) [N·m]; rows for edges at 0, 45, 90° from u; columns at curvature 0, 5, 10, 15, 20 1/m.
+        damping: d [s], stiffness-proportional (Kelvin–Voigt): the strain E is replaced by E + d dE/dt in the elastic
+            forces. The default reproduces what backward Euler with 0.5 ms steps does implicitly (d = h/2).
+
+    Raises:
+        InputError: wrong shapes, values that are not finite, a density that is not positive, negative damping, negative
+            bending stiffness, or a direct stiffness (k0, k2 of a row) that is negative.
+    """
+
+    name: str
+    source: str
+    density: float
+    stretching: NDArray[np.float64]
+    bending: NDArray[np.float64]
+    damping: float = 0.25e-3
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stretching", self._table(self.stretching, STRETCHING_SHAPE, "stretching"))
+        object.__setattr__(self, "bending", self._table(self.bending, BENDING_SHAPE, "bending"))
+        if not (math.isfinite(self.density) and self.density > 0):
+            raise self._error(f"density {self.density!r} is not positive", "give the mass per area in kg/m²")
+        if not (math.isfinite(self.damping) and self.damping >= 0):
+            raise self._error(f"damping {self.damping!r} is negative or not finite", "give d in seconds, 0 for none")
+        if self.bending.min() < 0:
+            raise self._error("a bending stiffness is negative", "give N·m, all at least 0")
+        if self.stretching[:, [0, 2]].min() < 0:
+            raise self._error("a direct stretching stiffness (k0 or k2) is negative", "give N/m, all at least 0")
+
+    def _error(self, what: str, fix: str) -> InputError:
+        return InputError(what, where=f"material {self.name!r}", fix=fix)
+
+    def _table(self, values: ArrayLike, shape: tuple[int, int], what: str) -> NDArray[np.float64]:
+        try:
+            table = np.array(values, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise self._error(f"{what} is not a table of numbers", f"give {shape[0]} rows of {shape[1]}") from error
+        if table.shape != shape:
+            raise self._error(f"{what} has shape {table.shape}", f"give {shape[0]} rows of {shape[1]}")
+        if not np.isfinite(table).all():
+            raise self._error(f"{what} holds a value that is not finite", "give finite numbers")
+        table.setflags(write=False)
+        return table
+
+    @classmethod
+    def from_mapping(cls, content: Mapping[str, Any], *, name: str) -> Material:
+        """A material from a parsed catalog file.
+
+        Raises:
+            InputError: missing, unknown or ill-typed keys.
+        """
+        known = {"title", "source", "density", "stretching", "bending", "damping"}
+        unknown = sorted(set(content) - known)
+        missing = sorted({"source", "density", "stretching", "bending"} - set(content))
+        where = f"material {name!r}"
+        if unknown:
+            raise InputError(
+                f"unknown keys {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(known))}"
+            )
+        if missing:
+            raise InputError(f"keys missing: {', '.join(missing)}", where=where, fix="add them")
+        numbers = {key: content[key] for key in ("density", "damping") if key in content}
+        wrong = [key for key, value in numbers.items() if isinstance(value, bool) or not isinstance(value, int | float)]
+        if wrong:
+            raise InputError(f"{', '.join(wrong)} must be a number", where=where, fix="write it without quotes")
+        return cls(
+            name=name, source=str(content["source"]), stretching=content["stretching"], bending=content["bending"],
+            **{key: float(value) for key, value in numbers.items()},
+        )  # fmt: skip
+
+    def scaled(self, *, density: float = 1.0, stretching: float = 1.0, bending: float = 1.0) -> Material:
+        """This material with its density and tables multiplied."""
+        return replace(
+            self,
+            density=self.density * density,
+            stretching=self.stretching * stretching,
+            bending=self.bending * bending,
+        )
+
+    def thickened(self, factor: float) -> Material:
+        """`factor` layers as one: density, stretching and bending multiplied together (ArcSim's `thicken`)."""
+        return self.scaled(density=factor, stretching=factor, bending=factor)
+
+
+def isotropic(
+    *, name: str, density: float, stretching: float, shear: float, bending: float, damping: float = 0.0
+) -> Material:
+    """A sheet of constant stiffness without Poisson effect, for comparison with closed forms.
+
+    Args:
+        density: [kg/m²].
+        stretching: membrane stiffness Y h of the force per width [N/m], as it acts (the tables' factor 2 is taken out).
+        shear: coefficient k3 of the shear term 2 k3 G01², as it acts [N/m].
+        bending: flexural rigidity B of the tables [N·m].
+        damping: d [s].
+    """
+    row = [stretching / 2, 0.0, stretching / 2, shear / 2]
+    return Material(
+        name=name, source="constant stiffness", density=density, damping=damping,
+        stretching=np.tile(row, (6, 1)), bending=np.full(BENDING_SHAPE, bending),
+    )  # fmt: skip
+
+
+def names() -> list[str]:
+    """Names of the catalog's materials, sorted."""
+    folder = files("catalogs") / "materials"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+@functools.cache
+def named(name: str) -> Material:
+    """A material of the catalog.
+
+    Raises:
+        UnknownNameError: with the nearest name that is there.
+    """
+    if name not in names():
+        raise UnknownNameError.of("material", name, names())
+    text = (files("catalogs") / "materials" / f"{name}.toml").read_text(encoding="utf-8")
+    return Material.from_mapping(tomllib.loads(text), name=name)

@@ -1,0 +1,22 @@
+"""What changes during a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """Positions and velocities (vertex, 3, batch) [m, m/s] at one time [s] since the start of the run."""
+
+    position: Tensor
+    velocity: Tensor
+    time: float = 0.0
+
+    def healthy(self, *, speed_limit: float = 300.0) -> Tensor:
+        """(batch,) bool: finite, and no vertex faster than the limit [m/s], which only divergence reaches."""
+        finite = torch.isfinite(self.position).all(0).all(0) & torch.isfinite(self.velocity).all(0).all(0)
+        return finite & ((self.velocity**2).sum(1).amax(0) < speed_limit**2)

@@ -1,0 +1,95 @@
+"""All forces on a batch of cloths: the equations of motion that the integrators solve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from sim import bending, membrane
+from sim.air import AirForce
+from sim.cloth import Cloth
+from sim.handles import Handles
+from sim.state import State
+from sim.wind import Wind
+
+
+class Effect(Protocol):
+    """A force the base model lacks."""
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N] at a time [s], for a wind (3, batch) [m/s]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """A batch: m a = membrane + bending + gravity + air + handle springs + effects.
+
+    Attributes:
+        cloth: mesh and materials.
+        gravity: (3, batch) [m/s²].
+        wind: the undisturbed air.
+        air: how it pushes.
+        handles: how the cloth is held.
+        held: (held,) the handles' vertices.
+        anchors: (held, 3, batch) where they are tied at zero offset [m].
+        effects: what else acts.
+    """
+
+    cloth: Cloth
+    gravity: Tensor
+    wind: Wind
+    air: AirForce
+    handles: Handles
+    held: Tensor
+    anchors: Tensor
+    effects: tuple[Effect, ...] = ()
+
+    def internal(self, position: Tensor, velocity: Tensor) -> Tensor:
+        """Membrane and bending, elastic and damping: (vertex, 3, batch) [N]."""
+        return membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
+
+    def external(self, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """Gravity, air and effects: (vertex, 3, batch) [N]."""
+        wind = self.wind.velocity(time)
+        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, position, velocity, wind)
+        for effect in self.effects:
+            total = total + effect.force(self.cloth, time, position, velocity, wind)
+        return total
+
+    def targets(self, time: float) -> Tensor:
+        """(held, 3, batch) where the handles are at a time [m]."""
+        offset = torch.as_tensor(self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device)
+        return self.anchors + offset[:, None]
+
+    def springs(self, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """Force of the handle springs with the cloth's damping: (held, 3, batch) [N]."""
+        stretch = position[self.held] - self.targets(time) + self.cloth.damping * velocity[self.held]
+        return -self.handles.stiffness * stretch
+
+    def force(self, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """All forces: (vertex, 3, batch) [N]. Rigid handles add none."""
+        total = self.internal(position, velocity) + self.external(time, position, velocity)
+        if self.handles.vertices and not self.handles.rigid:
+            total = total.index_add(0, self.held, self.springs(time, position, velocity))
+        return total
+
+    def energies(self, state: State) -> dict[str, Tensor]:
+        """Kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].
+
+        Gravity's is relative to the origin; stretching and bending are exact for constant stiffness.
+        """
+        mass = self.cloth.mass
+        result = {
+            "kinetic": (mass * (state.velocity**2).sum(1)).sum(0) / 2,
+            "stretching": membrane.energy(self.cloth, state.position),
+            "bending": bending.energy(self.cloth, state.position),
+            "gravity": -(mass * (state.position * self.gravity).sum(1)).sum(0),
+        }
+        if self.handles.vertices and not self.handles.rigid:
+            stretch = state.position[self.held] - self.targets(state.time)
+            result["handles"] = self.handles.stiffness * (stretch**2).sum((0, 1)) / 2
+        return result
