@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
@@ -43,6 +44,9 @@ _INFO_PREFIX = "flagdata."
 _LOG_NAME = "{:020d}.json"
 _MERGE_AT = 32
 _SMALL = 4 << 20  # B
+_PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
+_FIRST_WAIT = 0.01  # s
+_LONGEST_WAIT = 0.5  # s
 _user_pid: int | None = None
 
 
@@ -67,6 +71,26 @@ def _in_one_process(function: Callable[P, T]) -> Callable[P, T]:
         return function(*args, **kwargs)
 
     return guarded
+
+
+def persist(attempt: Callable[[], T], *, where: Path) -> T:
+    """Run `attempt` until it does not raise `Moved`, with random waits that grow.
+
+    Raises:
+        ConflictError: after two minutes of others always being faster.
+    """
+    deadline = time.monotonic() + _PATIENCE
+    wait = _FIRST_WAIT
+    while True:
+        try:
+            return attempt()
+        except Moved:
+            if time.monotonic() > deadline:
+                raise ConflictError(
+                    f"other processes kept committing for {_PATIENCE:.0f} s", where=str(where), fix="try again"
+                ) from None
+            time.sleep(random.uniform(0, wait))
+            wait = min(2 * wait, _LONGEST_WAIT)
 
 
 class Catalog:
@@ -131,18 +155,26 @@ class Catalog:
         Raises:
             Moved: `base` is no longer the newest version; nothing was published.
         """
-        table = self._open(base)
-        missing = [name for name in CATALOG if name not in {f.name for f in table.schema().fields}]
-        if missing:
-            self._evolve(table, missing)
-            raise Moved
-        self._commit(table, rows, removed=(), info=info)
+        table = self._writable(base)
+        self._commit(table, rows, removed=(), rows_change=True, info=info)
+        return base + 1
+
+    @_in_one_process
+    def replace(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
+        """Publish `rows` as all there is at version `base + 1`; earlier versions stay.
+
+        Raises:
+            Moved: `base` is no longer the newest version; nothing was published.
+        """
+        table = self._writable(base)
+        files = pa.table(table.get_add_actions(flatten=True))["path"].to_pylist()
+        self._commit(table, rows, removed=files, rows_change=True, info=info)
         return base + 1
 
     @_in_one_process
     def merge_small_files(self) -> None:
         """Rewrite the small files as one if there are many; left to the next commit if another writer comes between."""
-        table = self._open(None)
+        table = self._open(self.head())
         files = pa.table(table.get_add_actions(flatten=True)).select(["path", "size_bytes"]).to_pylist()
         small = [f["path"] for f in files if f["size_bytes"] < _SMALL]
         if len(small) < _MERGE_AT:
@@ -150,7 +182,7 @@ class Catalog:
         rows = pa.concat_tables(self._conform(pq.read_table(self.path / name)) for name in small)
         info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
         with suppress(Moved):
-            self._commit(table, rows, removed=small, info=info)
+            self._commit(table, rows, removed=small, rows_change=False, info=info)
 
     def untracked_files(self) -> list[Path]:
         """Parquet files that no version refers to: written by a process that died before, or lost, its commit."""
@@ -175,14 +207,15 @@ class Catalog:
             for entry in self._open(None).history()
         ]
 
-    def _commit(self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], info: Mapping[str, str]) -> None:
+    def _commit(
+        self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]
+    ) -> None:
         version = table.version() + 1
         path = self.path / f"{uuid.uuid4().hex}.parquet"
         pq.write_table(rows, path, compression="zstd")
         flush_file(path)
         flush_folder(self.path)
         now = time.time_ns() // 1_000_000
-        rows_change = not removed
         added = AddAction(
             path=path.name,
             size=path.stat().st_size,
@@ -224,6 +257,16 @@ class Catalog:
             raise CorruptError(
                 f"the catalog's log cannot be read: {error}", where=str(self.path), fix="run flagdata doctor"
             ) from None
+
+    def _writable(self, version: int) -> DeltaTable:
+        """The table at `version`, if it has all columns of this format; else they are added, and `Moved` is raised."""
+        table = self._open(version)
+        present = {field.name for field in table.schema().fields}
+        missing = [name for name in CATALOG if name not in present]
+        if missing:
+            self._evolve(table, missing)
+            raise Moved
+        return table
 
     def _read(self, table: DeltaTable) -> pa.Table:
         try:

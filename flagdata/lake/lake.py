@@ -16,7 +16,7 @@ from flagdata import provenance
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog, newer
+from flagdata.lake.catalog import Catalog, newer, persist
 from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.leases import keeping_collectors_out
 from flagdata.lake.objects import STORES, Objects
@@ -192,6 +192,49 @@ class Lake:
         """
         with keeping_collectors_out(self.staging):
             self.refs.put("branches", name, self.view(at))
+
+    def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> int:
+        """Take rows off a branch, in one commit; returns its version.
+
+        Tags made before keep showing them. Their objects stay for as long as a tag or another branch needs them, and
+        then for the grace period of garbage collection.
+
+        Args:
+            artifacts: full ids.
+
+        Raises:
+            NotFoundError: one that was not committed on this branch itself (but maybe on its parent).
+            ConflictError: a row that stays on the branch was made from one of them.
+        """
+        leaving = frozenset(artifacts)
+        info = {"message": message, "branch": branch, "withdrawn": str(len(leaving))}
+
+        def attempt() -> int:
+            head = self.catalog.head()
+            shown = self.table(self.refs.view(branch, head))
+            own = set(shown.filter(pc.field("branch") == branch)["artifact"].to_pylist())
+            if leaving - own:
+                raise NotFoundError(
+                    f"{', '.join(sorted(leaving - own))} was not committed on branch {branch!r}",
+                    where=str(self.path),
+                    fix="give full ids of rows that flagdata ls shows with this branch",
+                )
+            for row in shown.select(["artifact", "name", "parents"]).to_pylist():
+                if row["artifact"] not in leaving and leaving & set(row["parents"]):
+                    raise ConflictError(
+                        f"{row['name']!r} ({row['artifact']}) was made from what would be withdrawn",
+                        where=str(self.path),
+                        fix="withdraw it too",
+                    )
+            drop = (pc.field("branch") == branch) & pc.field("artifact").isin(sorted(leaving))
+            return self.catalog.replace(self.catalog.rows(head).filter(~drop), base=head, info=info)
+
+        with disk_errors("withdrawing", self.path), keeping_collectors_out(self.staging):
+            return persist(attempt, where=self.catalog.path)
+
+    def unpublished_files(self) -> list[Path]:
+        """Files that a process left which died while it wrote to the catalog or the refs."""
+        return [*self.catalog.untracked_files(), *self.refs.scratch_files()]
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""

@@ -91,6 +91,14 @@ class Objects:
             raise NotFoundError(f"object {name} is missing", where=str(path), fix="run flagdata doctor")
         return path
 
+    def size(self, name: str) -> int:
+        """Bytes of the object.
+
+        Raises:
+            NotFoundError: it is not there.
+        """
+        return size_of(self.existing(name))
+
     def name_of(self, staged: Path) -> str:
         """The name the content at `staged` will have.
 
@@ -110,6 +118,7 @@ class Objects:
         An object of that name that is there and whole is kept and `staged` removed; one that does not hash to its
         name is replaced, so that ingesting again heals a damaged lake.
         """
+        os.utime(staged)  # age counts from here
         for entry in files_of(staged):
             flush_file(entry)
             entry.chmod(_READ_ONLY)

@@ -119,6 +119,10 @@ class Refs:
             raise UnknownNameError.of("branch", branch, [MAIN, *known], where=str(self.root))
         return (Slice(branch=branch, version=head), *known[branch].view)
 
+    def scratch_files(self) -> list[Path]:
+        """What a process left that died while it made a ref."""
+        return sorted(self.root.glob("*/.*"))
+
     def _all(self, kind: str) -> dict[str, Ref]:
         return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}
 

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import random
 import secrets
 import shutil
-import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pyarrow as pa
 
-from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog, Moved
+from flagdata.lake.catalog import Catalog, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease
 from flagdata.lake.objects import Objects, size_of
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
-
-_PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
-_FIRST_WAIT = 0.01  # s
-_LONGEST_WAIT = 0.5  # s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,13 +114,7 @@ class Transaction:
                 stored = self._objects.existing(artifact.object)
             if size is None:
                 size = size_of(stored)
-        for parent in artifact.parents:
-            if parent not in self._known and parent not in self._pending:
-                raise NotFoundError(
-                    f"its parent {parent} is not on branch {self.branch!r}",
-                    where=f"{artifact.kind} {artifact.name!r}",
-                    fix="add the parent first",
-                )
+        self._check_parents([artifact], self._known)
         self._pending[identity] = replace(artifact, branch=self.branch, object_bytes=size)
         return True
 
@@ -148,35 +136,38 @@ class Transaction:
 
     def _publish(self) -> CommitResult:
         created = datetime.now(UTC)
-        deadline = time.monotonic() + _PATIENCE
-        wait = _FIRST_WAIT
         commit = f"c{secrets.token_hex(8)}"
-        while True:
+
+        def attempt() -> CommitResult:
             version, known = self._identities()
-            late = [identity for identity in self._pending if identity in known]
             fresh = [replace(a, created=created) for identity, a in self._pending.items() if identity not in known]
-            existing = (*self._existing, *late)
+            existing = (*self._existing, *(identity for identity in self._pending if identity in known))
             if not fresh:
                 return CommitResult(version=version, commit=None, added=(), existing=existing)
+            self._check_parents(fresh, known)
             rows = pa.Table.from_pylist([a.row() for a in fresh], schema=catalog_schema())
             info = {
-                "commit": commit, "message": self.message, "branch": self.branch, "rows": str(len(fresh)),
+                "commit": commit,
+                "message": self.message,
+                "branch": self.branch,
+                "rows": str(len(fresh)),
                 "code_version": code_version(),
-            }  # fmt: skip
-            try:
-                with self._lease.keeping_collectors_out():
-                    version = self._catalog.append(rows, base=version, info=info)
-            except Moved:
-                if time.monotonic() > deadline:
-                    raise ConflictError(
-                        f"other processes kept committing for {_PATIENCE:.0f} s",
-                        where=str(self._catalog.path),
-                        fix="try again",
-                    ) from None
-                time.sleep(random.uniform(0, wait))
-                wait = min(2 * wait, _LONGEST_WAIT)
-                continue
+            }
+            with self._lease.keeping_collectors_out():
+                version = self._catalog.append(rows, base=version, info=info)
             return CommitResult(version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing)
+
+        return persist(attempt, where=self._catalog.path)
+
+    def _check_parents(self, artifacts: Iterable[Artifact], known: frozenset[str]) -> None:
+        for artifact in artifacts:
+            for parent in artifact.parents:
+                if parent not in known and parent not in self._pending:
+                    raise NotFoundError(
+                        f"its parent {parent} is not on branch {self.branch!r}",
+                        where=f"{artifact.kind} {artifact.name!r}",
+                        fix="add the parent first",
+                    )
 
     def _copy(self, path: Path) -> Path:
         inside = self.staging(path.suffix)

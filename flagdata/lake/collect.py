@@ -1,0 +1,73 @@
+"""Garbage collection: delete what nothing refers to, and what no running transaction holds.
+
+Kept are all objects that a branch or tag shows, that a row withdrawn less than the grace period ago points to, that a
+living transaction has put or looked up, and whatever is younger than the grace period. Staging folders go as soon as
+their owner is dead, which its lock proves. All files of the catalog that some version is made of stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from flagdata.errors import CorruptError
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.lake import Lake
+from flagdata.lake.leases import collecting, leases
+from flagdata.lake.marking import mark
+from flagdata.lake.objects import Objects, size_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Garbage:
+    """What can go: names of objects, other paths (staging folders, unpublished files), and their size [B] in all."""
+
+    objects: tuple[str, ...]
+    leftovers: tuple[Path, ...]
+    size: int
+
+
+def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
+    """What `collect` would delete now.
+
+    Raises:
+        CorruptError: a ref cannot be read, so what it needs is unknown.
+    """
+    with collecting(lake.staging):
+        return _find(lake, grace)
+
+
+def collect(lake: Lake, *, grace: timedelta) -> Garbage:
+    """Delete the garbage and say what it was. Transactions wait while it works; none loses anything.
+
+    Raises:
+        CorruptError: a ref cannot be read, so what it needs is unknown; nothing was deleted.
+    """
+    with collecting(lake.staging), disk_errors("collecting", lake.path):
+        found = _find(lake, grace)
+        for name in found.objects:
+            lake.objects.remove(lake.objects.path(name))
+        for path in found.leftovers:
+            Objects.remove(path)
+    return found
+
+
+def _find(lake: Lake, grace: timedelta) -> Garbage:
+    states = leases(lake.staging)  # before the catalog: a lease that is gone by now has its rows committed
+    marked = mark(lake, grace=grace)
+    if marked.findings:
+        first = marked.findings[0]
+        raise CorruptError(
+            f"what is needed cannot be told: {first.what}", where=first.where, fix=first.fix or "run flagdata doctor"
+        )
+    held = {name for state in states if state.alive for name in state.objects}
+    limit = (datetime.now(UTC) - grace).timestamp()
+    objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]
+    leftovers = [state.folder for state in states if not state.alive]
+    leftovers += [path for path in lake.unpublished_files() if path.stat().st_mtime <= limit]
+    return Garbage(
+        objects=tuple(o.name for o in objects),
+        leftovers=tuple(leftovers),
+        size=sum(o.size for o in objects) + sum(size_of(path) for path in leftovers),
+    )

@@ -1,0 +1,195 @@
+"""Finding what is wrong with a lake: `doctor` by its structure, `verify` by re-hashing every byte."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pyarrow as pa
+
+from flagdata.errors import FlagdataError
+from flagdata.findings import Finding, Severity
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.lake import Lake
+from flagdata.lake.leases import LeaseState, collecting, leases
+from flagdata.lake.marking import Marked, mark
+from flagdata.lake.objects import STORES, StoredObject
+from flagdata.schema import FORMAT_VERSION
+
+GRACE = timedelta(hours=24)
+"""How long what nothing refers to is left alone."""
+
+
+def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
+    """All that is wrong with the lake's structure; contents are `verify`'s.
+
+    Errors are damage: rows without object or parent, objects of another size than recorded, refs that cannot be read,
+    rows of a newer format. Warnings are what a crash leaves and `gc` removes. Notes are younger than `grace`, and
+    nothing to act on.
+    """
+    stored = list(lake.objects)
+    with collecting(lake.staging):
+        states = leases(lake.staging)
+    # The catalog last: what was put by now is held by a lease seen above, or committed below, or left behind.
+    marked = mark(lake, grace=grace)
+    findings = [*marked.findings, *_rows(lake, marked)]
+    if not marked.findings:
+        held = {name for state in states if state.alive for name in state.objects}
+        needed = marked.objects | held
+        findings += [_orphan(found, grace) for found in stored if found.name not in needed]
+    findings += _strays(lake)
+    findings += [_abandoned(state) for state in states if not state.alive]
+    findings += [_unpublished(path, grace) for path in lake.unpublished_files()]
+    return tuple(findings)
+
+
+def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] = lambda _: None) -> tuple[Finding, ...]:
+    """Re-hash the objects called `names`; a finding for each that is missing or has changed.
+
+    Args:
+        advance: called with the size [B] of each object done.
+    """
+    findings = []
+    for name in names:
+        try:
+            lake.objects.check(name)
+        except FlagdataError as error:
+            kind = "object-missing" if error.kind == "not-found" else "object-changed"
+            findings.append(
+                Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+            )
+        advance(1)
+    return tuple(findings)
+
+
+def object_names(lake: Lake) -> list[str]:
+    """Every object that is stored or that a ref needs, sorted.
+
+    Raises:
+        CorruptError: a ref that cannot be read.
+    """
+    needed = {
+        name
+        for ref in ("main", *lake.refs.branches(), *lake.refs.tags())
+        for name in lake.rows(at=ref, columns=["object"])["object"].drop_null().to_pylist()
+    }
+    return sorted(needed | {stored.name for stored in lake.objects})
+
+
+def sampled(names: Sequence[str], count: int) -> list[str]:
+    """`count` of them at random, others each time, so that repeated checks come round to all."""
+    return sorted(random.SystemRandom().sample(list(names), min(count, len(names))))
+
+
+def is_healthy(findings: Sequence[Finding]) -> bool:
+    """Whether there is nothing to act on."""
+    return all(f.severity is Severity.NOTE for f in findings)
+
+
+def _rows(lake: Lake, marked: Marked) -> list[Finding]:
+    findings: list[Finding] = []
+    seen: set[str] = set()
+    for ref, table in marked.refs.items():
+        ids = table["artifact"].to_pylist()
+        known = set(ids)
+        if len(known) < len(ids):
+            findings.append(
+                Finding(
+                    kind="identity-twice",
+                    severity=Severity.ERROR,
+                    what=f"{len(ids) - len(known)} rows have an identity that another row has",
+                    where=f"ref {ref}",
+                    fix="this is a defect of the lake: keep a copy and report it",
+                )
+            )
+        fresh = table.filter(pa.array([identity not in seen for identity in ids], type=pa.bool_()))
+        seen |= known
+        for row in fresh.to_pylist():
+            findings += _row(lake, row, known, ref)
+    return findings
+
+
+def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str) -> list[Finding]:
+    where = f"{row['kind']} {row['name']!r}, artifact {row['artifact']}, ref {ref}"
+
+    def error(kind: str, what: str, fix: str) -> Finding:
+        return Finding(kind=kind, severity=Severity.ERROR, what=what, where=where, fix=fix)
+
+    if int(str(row["format_version"])) > FORMAT_VERSION:
+        return [error("newer-format", f"written by format {row['format_version']}", "install the newer flagdata")]
+    try:
+        artifact = Artifact.from_row(row)
+    except FlagdataError as problem:
+        return [error("row-malformed", problem.what, "withdraw the artifact and ingest its source again")]
+    findings = [
+        error("parent-missing", f"its parent {parent} is not there", "ingest the parent again")
+        for parent in artifact.parents
+        if parent not in known
+    ]
+    if artifact.recording is not None and artifact.recording not in known:
+        findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
+    if artifact.object is not None:
+        again = "ingest its source again, or restore the object from a copy"
+        path = lake.objects.path(artifact.object)
+        if not path.exists():
+            findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))
+        elif (
+            artifact.object_bytes is not None and (size := lake.objects.size(artifact.object)) != artifact.object_bytes
+        ):
+            what = f"its object has {size} bytes instead of {artifact.object_bytes}"
+            findings.append(
+                error("object-size", what, f"{again}; flagdata recover saves what a cut-off record still has")
+            )
+    return findings
+
+
+def _orphan(stored: StoredObject, grace: timedelta) -> Finding:
+    old = stored.modified <= (datetime.now(UTC) - grace).timestamp()
+    return Finding(
+        kind="orphan",
+        severity=Severity.WARNING if old else Severity.NOTE,
+        what=f"no row refers to {stored.name} ({stored.size} B): its ingest did not finish, or its rows were withdrawn",
+        where=str(stored.path),
+        value=float(stored.size),
+        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it once it is {grace} old",
+    )
+
+
+def _strays(lake: Lake) -> list[Finding]:
+    known = {stored.path for stored in lake.objects}
+    strays = [p for store in STORES for p in sorted((lake.path / store).iterdir()) if p not in known]
+    return [
+        Finding(
+            kind="stray-file",
+            severity=Severity.WARNING,
+            what="not an object: its name is not a content hash",
+            where=str(path),
+            fix="move it away; flagdata did not put it there",
+        )
+        for path in strays
+    ]
+
+
+def _abandoned(state: LeaseState) -> Finding:
+    records = sorted(state.folder.glob("*.mcap"))
+    saved = f"; to save its unfinished record first: flagdata recover {records[0]}" if records else ""
+    return Finding(
+        kind="staging-left",
+        severity=Severity.WARNING,
+        what=f"a transaction ended without finishing ({state.owner})",
+        where=str(state.folder),
+        fix=f"run flagdata gc{saved}",
+    )
+
+
+def _unpublished(path: Path, grace: timedelta) -> Finding:
+    old = path.stat().st_mtime <= (datetime.now(UTC) - grace).timestamp()
+    return Finding(
+        kind="write-left",
+        severity=Severity.WARNING if old else Severity.NOTE,
+        what="written by a process that ended before it could publish it",
+        where=str(path),
+        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it once it is {grace} old",
+    )
