@@ -16,6 +16,7 @@ import duckdb
 import pyarrow as pa
 
 from flagdata.errors import UnknownNameError, UsageError
+from flagdata.lake.refs import View
 from flagdata.schema import CATALOG, Field, Kind
 
 # name → (what it is, SQL over the stored columns). `start` and `end` stay exact to the nanosecond beside them.
@@ -45,12 +46,12 @@ _TEXT_AS_INSTANT = re.compile(r"Could not convert string '\d{4}-\d\d.*' to INT64
 _RESERVED_END = re.compile(r'syntax error at or near "(?:end|END)"')
 
 
-class Rows(Protocol):
-    """What a query needs of a lake: its catalog at a ref."""
+class Catalogued(Protocol):
+    """What a query needs of a lake: what a ref shows, and the rows of that."""
 
-    def rows(
-        self, where: str | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
-    ) -> pa.Table: ...
+    def view(self, at: str | None) -> View: ...
+
+    def table(self, view: View) -> pa.Table: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,8 +107,7 @@ class Selection:
         self._connection = duckdb.connect(":memory:", config=_SEALED)
         with _explained(request):
             self._connection.register("stored", catalog)
-            derived = ", ".join(f"{sql} AS {name}" for name, (_, sql) in DERIVED.items())
-            self._connection.execute(f"CREATE VIEW catalog AS SELECT *, {derived} FROM stored")
+            self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns()} FROM stored")
             self._connection.execute("SET TimeZone = 'UTC'")
             self._connection.execute("SET lock_configuration = true")
             self._relation = self._sql(request.sql) if request.sql is not None else self._filtered(request)
@@ -167,8 +167,20 @@ class Selection:
         return pa.field(field.name, known.type, metadata={"unit": known.unit, "about": known.about})
 
 
+def _view_columns() -> str:
+    """The catalog as SQL sees it. A NaN is an unknown value, but DuckDB sorts NaN above every number, so that
+    "wind > 3" would hold for it: it becomes NULL."""
+    stored = [
+        f'CASE WHEN isnan("{name}") THEN NULL ELSE "{name}" END AS "{name}"'
+        if pa.types.is_floating(field.type)
+        else f'"{name}"'
+        for name, field in CATALOG.items()
+    ]
+    return ", ".join([*stored, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())])
+
+
 def select(
-    lake: Rows,
+    lake: Catalogued,
     where: str | None = None,
     *,
     at: str | None = None,
@@ -181,12 +193,12 @@ def select(
 
     Raises:
         UsageError: SQL that cannot be run; the message carries DuckDB's reason and, for a misspelt column, its name.
-        NotFoundError: no such ref.
+        UnknownNameError: no such ref.
     """
     request = Request(
         where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit
     )
-    return Selection(lake.rows(at=at), request).table()
+    return Selection(lake.table(lake.view(at)), request).table()
 
 
 @contextmanager

@@ -89,10 +89,11 @@ def query(
     from flagdata.query import Request, Selection
 
     lake = Lake.open(lake_path)
-    version = lake.resolve(at)
+    view = lake.view(at)
+    version = view[0].version
     names = None if columns is None else tuple(name.strip() for name in columns.split(","))
     request = Request(where=where, sql=sql, columns=names, order=order, limit=limit)
-    catalog = lake.rows(at=str(version))
+    catalog = lake.table(view)
     if arrow is not None:
         count = write_arrow(Selection(catalog, request), arrow)
         say(f"{count:,} rows of version {version} → {arrow}")

@@ -8,6 +8,7 @@ import pyarrow as pa
 import pytest
 
 from flagdata.errors import UnknownNameError, UsageError
+from flagdata.lake.refs import Slice, View
 from flagdata.query import COLUMNS, Request, Selection, select
 from flagdata.schema import CATALOG, catalog_schema
 
@@ -34,9 +35,14 @@ CATALOG_ROWS = [
 
 
 class HandWritten:
-    def rows(self, where: str | None = None, *, at: str | None = None, columns: object = None) -> pa.Table:
-        assert where is None
-        return pa.Table.from_pylist(CATALOG_ROWS, schema=catalog_schema())
+    def view(self, at: str | None) -> View:
+        return (Slice(branch="main", version=3),)
+
+    def table(self, view: View) -> pa.Table:
+        return TABLE
+
+
+TABLE = pa.Table.from_pylist(CATALOG_ROWS, schema=catalog_schema())
 
 
 def numbers(table: pa.Table) -> list[int]:
@@ -47,6 +53,13 @@ def test_a_filter_keeps_exactly_the_rows_it_holds_for() -> None:
     assert numbers(select(HandWritten(), "kind = 'clip' and wind between 3 and 6")) == [3, 4]
     assert numbers(select(HandWritten(), "list_contains(quality, 'stale')")) == [3]
     assert numbers(select(HandWritten(), "(parameters->>'density')::double < 0.3")) == [4]
+
+
+def test_an_unknown_number_is_not_above_any_threshold() -> None:
+    nameless = row(6, wind=float("nan"), start=NOON, end=NOON)
+    catalog = pa.Table.from_pylist([*CATALOG_ROWS, nameless], schema=catalog_schema())
+    assert numbers(Selection(catalog, Request(where="wind > 5")).table()) == [4]
+    assert numbers(Selection(catalog, Request(where="kind = 'clip' and wind is null")).table()) == [6, 5]
 
 
 def test_without_an_order_rows_come_by_kind_start_and_identity_with_unknown_starts_last() -> None:
@@ -96,7 +109,7 @@ def test_sql_groups_and_counts() -> None:
 
 
 def test_the_limit_cuts_rows_and_the_total_does_not_count_it() -> None:
-    selection = Selection(HandWritten().rows(), Request(where="kind = 'clip'", limit=2))
+    selection = Selection(TABLE, Request(where="kind = 'clip'", limit=2))
     assert numbers(selection.table()) == [2, 3]
     assert selection.total() == 4
 

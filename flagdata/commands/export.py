@@ -1,0 +1,64 @@
+"""`flagdata export`: copies of a selection for other ecosystems."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flagdata.console import document, json_option, lake_option, progress, say
+
+
+@click.command()
+@click.argument("format_name", metavar="FORMAT")
+@click.option("--to", "target", required=True, type=click.Path(path_type=Path), help="New folder to write.")
+@click.option("--where", metavar="EXPR", help="SQL condition as in flagdata query; all rows by default.")
+@click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
+@click.option("--frames", metavar="FORM", help="webdataset: jpg (default) or npy; parquet: none (default) or jpg.")
+@click.option("--shard-bytes", type=click.IntRange(min=1), help="webdataset, parquet: size of a file at most.")
+@click.option("--shuffle", type=int, metavar="SEED", help="webdataset: order the samples at random.")
+@click.option("--crf", type=int, help="mp4: constant rate factor, 0 (lossless) to 51; 18 by default.")
+@json_option
+@lake_option
+def export(
+    format_name: str,
+    target: Path,
+    where: str | None,
+    at: str | None,
+    frames: str | None,
+    shard_bytes: int | None,
+    shuffle: int | None,
+    crf: int | None,
+    as_json: bool,
+    lake_path: str,
+) -> None:
+    """Write a selection as WebDataset shards, Parquet, MP4 + CSV or MCAP subsets.
+
+    FORMAT is webdataset, parquet, mp4 or mcap. The folder appears whole or not at all, and its manifest.json names the
+    version, the filter and the hash of every file:
+
+    \b
+      flagdata export webdataset --where "kind = 'clip'" --at v1 --to shards/train
+      flagdata export parquet --to catalog
+    """
+    from flagdata.export import Export
+    from flagdata.export import export as run
+    from flagdata.lake import Lake
+
+    given = {"frames": frames, "shard_bytes": shard_bytes, "shuffle": shuffle, "crf": crf}
+    request = Export(
+        format=format_name,
+        where=where,
+        at=at,
+        options={name: value for name, value in given.items() if value is not None},
+    )
+    with progress(None, label=f"export {format_name}", unit="artifact") as advance:
+        result = run(Lake.open(lake_path), request, target, advance=advance)
+    manifest = result.manifest
+    if as_json:
+        document("export-result", {"folder": str(target), "manifest": manifest})
+        return
+    files = manifest["files"]
+    size = sum(file["bytes"] for file in files)
+    say(f"{manifest['artifacts']:,} artifacts of version {manifest['version']} in {len(files):,} files, {size:,} B")
+    click.echo(target)

@@ -1,0 +1,158 @@
+"""MP4 + CSV: H.264 with the frames' own times, and the wind beside it, for people and for any video tool.
+
+Frame times become presentation times in whole microseconds after the first frame (an MP4 track counts its steps in 32
+bits, so nanoseconds would overflow at a gap of 4.3 s); <artifact>.frames.csv has them exactly.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+import av
+import numpy as np
+from av.video.codeccontext import VideoCodecContext
+from av.video.reformatter import ColorRange
+from av.video.stream import VideoStream
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.export.source import IDENTITY, TRUTH, Entry, Source
+from flagdata.schema import CATALOG, Kind
+from flagdata.timebase import iso
+
+MICROSECOND = Fraction(1, 1_000_000)
+WIND_HEADER = ("time", "wind_speed [m/s]", "wind_sigma [m/s]", "wind_direction [rad from, cw from north]", "samples")
+FRAMES_HEADER = ("frame", "pts [us]", "time", "device_time")
+INDEX_COLUMNS = (*(name for name in IDENTITY if name != "parents"), "start", "end", *TRUTH)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mp4:
+    """Files <artifact>.mp4, <artifact>.frames.csv, <artifact>.wind.csv (where there is wind), and index.csv.
+
+    Attributes:
+        crf: constant rate factor of x264: 0 is lossless, 51 is worst.
+    """
+
+    kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
+
+    crf: int = 18
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.crf <= 51:
+            raise UsageError(f"a rate factor of {self.crf}", where="--crf", fix="give 0 (lossless) to 51")
+
+    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+        frames = 0
+        index: list[list[Any]] = []
+        for entry in source.entries():
+            if not entry.count:
+                raise InputError(
+                    "a record without frames makes no video", where=entry.key, fix="leave it out by --where"
+                )
+            name = f"{entry.key}.mp4"
+            _encode(entry, folder / name, self.crf)
+            _write_csv(folder / f"{entry.key}.frames.csv", FRAMES_HEADER, _frame_rows(entry))
+            wind = _wind_rows(entry)
+            if wind is not None:
+                _write_csv(folder / f"{entry.key}.wind.csv", WIND_HEADER, wind)
+            index.append([name, *(_text(entry.row[column]) for column in INDEX_COLUMNS)])
+            frames += entry.count
+            advance(1)
+        header = ["file", *(f"{c} [{CATALOG[c].unit}]" if CATALOG[c].unit else c for c in INDEX_COLUMNS)]
+        _write_csv(folder / "index.csv", header, index)
+        return {"videos": len(source), "frames": frames, "time_base": "1/1000000 s from the first frame"}
+
+
+def presentation_times(times: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Microseconds (n,) after the first frame, rounded; `times` (n,) in UTC ns.
+
+    Raises:
+        InputError: two frames within one microsecond.
+    """
+    pts = (times - times[0] + 500) // 1000
+    if np.any(np.diff(pts) <= 0):
+        raise InputError("frames closer than a microsecond", fix="export to MCAP, which keeps nanoseconds")
+    return pts
+
+
+def _encode(entry: Entry, path: Path, crf: int) -> None:
+    pts = presentation_times(entry.frame_times)
+    rate = Fraction(entry.row["rate"] or 25).limit_denominator(1001)
+    options = {"movflags": "+faststart", "video_track_timescale": str(MICROSECOND.denominator)}
+    with av.open(str(path), "w", format="mp4", options=options) as container:
+        container.metadata["creation_time"] = iso(int(entry.frame_times[0]))
+        container.metadata["comment"] = f"flagdata artifact {entry.key}"
+        stream: VideoStream | None = None
+        instants = iter(pts.tolist())
+        for images in entry.images():
+            if stream is None:
+                stream = container.add_stream("libx264", rate=rate)
+                _configure(stream, images.shape[1:], crf, where=entry.key)
+            for image in images:
+                frame = _luma_frame(image)
+                frame.pts = next(instants)
+                container.mux(stream.encode(frame))
+        if stream is not None:
+            container.mux(stream.encode(None))
+
+
+def _configure(stream: VideoStream, shape: Sequence[int], crf: int, *, where: str) -> None:
+    height, width = shape
+    if height % 2 or width % 2:
+        raise InputError(f"frames of {width}×{height}", where=where, fix="H.264 needs even sizes; ingest with one")
+    context: VideoCodecContext = stream.codec_context
+    context.width, context.height, context.pix_fmt = width, height, "yuv420p"
+    context.time_base = MICROSECOND
+    context.color_range = ColorRange.JPEG
+    # One thread: the bytes then do not depend on the machine. No B-frames: packets are in order of presentation.
+    context.options = {"crf": str(crf), "preset": "medium", "bf": "0", "threads": "1"}
+
+
+def _luma_frame(image: NDArray[np.uint8]) -> av.VideoFrame:
+    """A gray image (height, width) as the full-range luma of a picture without colour."""
+    height, width = image.shape
+    planar = np.full((height * 3 // 2, width), 128, dtype=np.uint8)
+    planar[:height] = image
+    frame = av.VideoFrame.from_ndarray(planar, format="yuv420p")
+    frame.color_range = ColorRange.JPEG
+    frame.time_base = MICROSECOND
+    return frame
+
+
+def _frame_rows(entry: Entry) -> Iterable[Sequence[object]]:
+    times, device = entry.frame_times, entry.device_frame_times
+    pts = presentation_times(times)
+    for index, (at, time, own) in enumerate(zip(pts.tolist(), times.tolist(), device.tolist(), strict=True)):
+        yield index, at, iso(time), iso(own)
+
+
+def _wind_rows(entry: Entry) -> list[tuple[object, ...]] | None:
+    wind = entry.record.wind_1hz()
+    if wind is None:
+        return None
+    begin, end = entry.wind_span
+    inside = np.nonzero((wind.time >= begin) & (wind.time <= end))[0]
+    return [
+        (iso(int(wind.time[i])), *(_text(float(v[i])) for v in (wind.speed, wind.sigma, wind.direction)), wind.count[i])
+        for i in inside.tolist()
+    ]
+
+
+def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    with path.open("x", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def _text(value: Any) -> Any:
+    """A cell: floats so that they read back exactly, unknown ones empty, lists by semicolons."""
+    if isinstance(value, float):
+        return repr(value) if np.isfinite(value) else ""
+    return ";".join(map(str, value)) if isinstance(value, list) else value

@@ -1,0 +1,140 @@
+"""One export: rows chosen at a pinned version, one format's files, a manifest, and a folder that appears whole."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import pyarrow as pa
+
+from flagdata.errors import NotFoundError, UsageError
+from flagdata.export.source import Source, Store
+from flagdata.export.target import fresh_folder, write_manifest
+from flagdata.provenance import code_version, digest, recipe_hash
+from flagdata.query import Request, Selection
+from flagdata.registry import Registry
+from flagdata.schema import FORMAT_VERSION, Kind
+
+FORMATS = Registry(
+    "export format",
+    {
+        "webdataset": "flagdata.export.webdataset:WebDataset",
+        "parquet": "flagdata.export.parquet:Parquet",
+        "mp4": "flagdata.export.mp4:Mp4",
+        "mcap": "flagdata.export.mcap:Mcap",
+    },
+)
+
+
+class Exporter(Protocol):
+    """A format: a frozen dataclass whose fields are its options.
+
+    Attributes:
+        kinds: of rows it can write.
+    """
+
+    kinds: ClassVar[frozenset[Kind]]
+
+    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+        """Write `source` into the empty `folder`, the same bytes for the same rows; call `advance` by rows done.
+
+        Returns:
+            what the manifest says about the content: counts, units, conventions.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export:
+    """What to export.
+
+    Attributes:
+        format: a name of `FORMATS`.
+        where: filter as in `flagdata.query`; `None` is every row.
+        at: ref; `None` is the head of main.
+        options: of the format, by name; what is not named keeps its default.
+    """
+
+    format: str
+    where: str | None = None
+    at: str | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def exporter(self) -> Exporter:
+        """The format with its options.
+
+        Raises:
+            UnknownNameError: no such format.
+            UsageError: an option that this format does not take.
+        """
+        made = FORMATS[self.format]
+        known = [f.name for f in dataclasses.fields(made)]
+        for name in self.options:
+            if name not in known:
+                takes = ", ".join(known) or "none"
+                raise UsageError(
+                    f"{self.format} takes no option {name!r}", where="export", fix=f"its options are: {takes}"
+                )
+        return made(**self.options)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportResult:
+    folder: Path
+    manifest: Mapping[str, Any]
+
+
+def export(
+    lake: Store, request: Export, target: Path, *, advance: Callable[[int], None] = lambda count: None
+) -> ExportResult:
+    """Write a selection of a lake into the new folder `target`.
+
+    Raises:
+        ConflictError: `target` exists.
+        NotFoundError: no rows.
+        UsageError: rows of a kind that the format cannot write; options it does not take.
+    """
+    exporter = request.exporter()
+    view = lake.view(request.at)
+    version = view[0].version
+    rows = Selection(lake.table(view), Request(where=request.where)).table()
+    _check_kinds(rows, request.format, exporter.kinds)
+    if request.where is not None and not rows.num_rows:
+        raise NotFoundError("no rows match", where=request.where, fix="try the filter with flagdata query")
+    if not rows.num_rows:
+        raise NotFoundError("no rows", where=f"version {version}", fix="see flagdata ls")
+    recipe = {
+        "format": request.format, "options": dataclasses.asdict(exporter), "version": version,  # pyright: ignore[reportArgumentType]
+        "where": request.where,
+    }  # fmt: skip
+    with fresh_folder(target) as folder:
+        content = exporter.write(Source(store=lake, rows=rows), folder, advance)
+        manifest = write_manifest(
+            folder,
+            {
+                **recipe,
+                "at": request.at,
+                "recipe_hash": recipe_hash(recipe),
+                "code_version": code_version(),
+                "format_version": FORMAT_VERSION,
+                "artifacts": rows.num_rows,
+                "artifacts_hash": digest("\n".join(sorted(rows["artifact"].to_pylist()))),
+                "kinds": dict(sorted(Counter(rows["kind"].to_pylist()).items())),
+                **content,
+            },
+        )
+    return ExportResult(folder=target, manifest=manifest)
+
+
+def _check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:
+    others = Counter(kind for kind in rows["kind"].to_pylist() if kind not in kinds)
+    if others:
+        found = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(others.items()))
+        first = next(kind for kind in Kind if kind in kinds)
+        raise UsageError(
+            f"{name} cannot hold {found}", where="--where", fix=f"restrict the filter, e.g. kind = '{first}'"
+        )

@@ -1,0 +1,175 @@
+"""What an exporter is given: catalog rows at one version, and the frames and wind behind them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError
+from flagdata.lake.refs import View
+from flagdata.record import Coding, Record
+from flagdata.record.writer import encode_jpeg
+from flagdata.schema import CATALOG, TRUTH_WINDOW
+from flagdata.signals import Instants
+from flagdata.timebase import NANOSECONDS, iso
+
+# Columns that say what a sample is and where it comes from; written beside the data by every format.
+IDENTITY = (
+    "artifact", "kind", "name", "object", "parents", "recipe_hash", "code_version", "seed",
+    "recording", "session", "day", "frame_first", "frame_count", "rate",
+)  # fmt: skip
+TRUTH = (
+    "wind", "wind_sigma", "wind_coverage", "wind_staleness",
+    "clock_method", "clock_offset", "clock_drift", "clock_sigma", "quality",
+)  # fmt: skip
+
+
+class Store(Protocol):
+    """What an export needs of a lake."""
+
+    def view(self, at: str | None) -> View: ...
+
+    def table(self, view: View) -> pa.Table: ...
+
+    def object_path(self, object: str) -> Path: ...  # noqa: A002 - the catalog's name for it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One catalog row and the part of its record that it stands for.
+
+    Attributes:
+        row: the catalog row, column → value.
+        path: of the record.
+        record: the record.
+        first: index of the first frame in the record.
+        count: number of frames; 0 for a record without any.
+    """
+
+    row: Mapping[str, Any]
+    path: Path
+    record: Record
+    first: int
+    count: int
+
+    @property
+    def key(self) -> str:
+        """The identity: file names and sample keys are made of it."""
+        return self.row["artifact"]
+
+    @property
+    def is_slice(self) -> bool:
+        """Whether the row names frames of its object, as clips do, instead of all of it."""
+        return self.row["frame_first"] is not None
+
+    @property
+    def frame_times(self) -> Instants:
+        """(count,) instants of the frames on the common clock, UTC ns."""
+        return self.record.frame_times[self.first : self.first + self.count]
+
+    @property
+    def device_frame_times(self) -> Instants:
+        """(count,) instants of the frames on the camera's own clock, UTC ns."""
+        return self.record.device_frame_times[self.first : self.first + self.count]
+
+    @property
+    def wind_span(self) -> tuple[int, int]:
+        """First and last instant [UTC ns] of the wind that belongs to it: from a truth window before the first frame
+        to the last frame; everything where there are no frames."""
+        if not self.count:
+            return -(2**63), 2**63 - 1
+        times = self.frame_times
+        return int(times[0]) - round(TRUTH_WINDOW * NANOSECONDS), int(times[-1])
+
+    def images(self, size: int = 64) -> Iterator[NDArray[np.uint8]]:
+        """The frames decoded, in order, as arrays (at most `size`, height, width) gray."""
+        for begin in range(0, self.count, size):
+            yield self.record.frames(self.first + begin, min(size, self.count - begin))
+
+    def jpegs(self) -> Iterator[bytes]:
+        """The frames as JPEG, in order: the stored bytes, or decoded and encoded anew where the record is H.264."""
+        if self.count and self.record.coding is Coding.H264:
+            for images in self.images():
+                yield from map(encode_jpeg, images)
+        else:
+            yield from map(self.record.jpeg, range(self.first, self.first + self.count))
+
+    def label(self) -> dict[str, Any]:
+        """Identity, ground truth with σ, times and parameters as strict JSON; unknown numbers are null."""
+        row = self.row
+        times = self.frame_times
+        return {
+            "schema": "flagdata.sample/1",
+            **{name: _strict(row[name]) for name in (*IDENTITY, *TRUTH)},
+            "start": row["start"],
+            "end": row["end"],
+            "start_time": None if row["start"] is None else iso(row["start"]),
+            "end_time": None if row["end"] is None else iso(row["end"]),
+            "frame_times": times.tolist(),
+            "parameters": None if row["parameters"] is None else json.loads(row["parameters"]),
+        }
+
+
+def label_units() -> dict[str, str]:
+    """Units of the numbers in `Entry.label`, for the manifest."""
+    named = {name: CATALOG[name].unit for name in (*IDENTITY, *TRUTH, "start", "end") if CATALOG[name].unit}
+    return {**named, "frame_times": "ns"}
+
+
+def _strict(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """The rows of one export, in their order.
+
+    Attributes:
+        store: the lake.
+        rows: with all columns of `schema.CATALOG`.
+    """
+
+    store: Store
+    rows: pa.Table
+
+    def __len__(self) -> int:
+        return self.rows.num_rows
+
+    def entries(self, order: np.ndarray | None = None) -> Iterator[Entry]:
+        """The rows with their records, in order or in the order of the indices given. One record is open at a time.
+
+        Raises:
+            CorruptError: a row without an object, or that reaches beyond its record.
+        """
+        table = self.rows if order is None else self.rows.take(pa.array(order))
+        opened: tuple[str, Record] | None = None
+        for batch in table.to_batches(max_chunksize=1024):
+            for row in batch.to_pylist():
+                name = row["object"]
+                if name is None:
+                    raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
+                if opened is None or opened[0] != name:
+                    opened = (name, Record.open(self.store.object_path(name)))
+                yield self._entry(row, opened[1])
+
+    def _entry(self, row: Mapping[str, Any], record: Record) -> Entry:
+        present = len(record.frame_times)
+        whole = row["frame_first"] is None
+        first = 0 if whole else row["frame_first"]
+        count = present if whole or row["frame_count"] is None else row["frame_count"]
+        if first + count > present:
+            raise CorruptError(
+                f"frames {first} to {first + count - 1} of a record that has {present}",
+                where=row["artifact"],
+                fix="run flagdata verify",
+            )
+        path = self.store.object_path(row["object"])
+        return Entry(row=row, path=path, record=record, first=first, count=count)

@@ -1,0 +1,124 @@
+"""What holds for every export format: a folder that is whole or absent, a manifest that is true, refusals."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+import pytest
+
+from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
+from flagdata.export import FORMATS, Export, export
+from flagdata.export.target import fresh_folder
+from flagdata.lake import Artifact, Lake
+from flagdata.schema import Kind
+
+CLIPS = "kind = 'clip'"
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_the_manifest_names_every_file_with_its_hash(name: str, known: Any, tmp_path: Path) -> None:
+    result = export(known.lake, Export(format=name, where=CLIPS), tmp_path / "out")
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert manifest == result.manifest
+    listed = {file["path"]: (file["bytes"], file["sha256"]) for file in manifest["files"]}
+    found = {
+        path.relative_to(tmp_path / "out").as_posix(): (
+            path.stat().st_size,
+            hashlib.sha256(path.read_bytes()).hexdigest(),
+        )
+        for path in (tmp_path / "out").rglob("*")
+        if path.is_file() and path.name != "manifest.json"
+    }
+    assert listed == found
+    assert (manifest["format"], manifest["where"], manifest["artifacts"]) == (name, CLIPS, 3)
+    assert manifest["version"] == known.lake.resolve(None)
+    assert manifest["kinds"] == {"clip": 3}
+    assert {"schema", "recipe_hash", "code_version", "options"} <= set(manifest)
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_exporting_the_same_version_again_gives_the_same_bytes(name: str, known: Any, tmp_path: Path) -> None:
+    manifests = []
+    for folder in ("a", "b"):
+        export(known.lake, Export(format=name, where=CLIPS), tmp_path / folder)
+        manifests.append((tmp_path / folder / "manifest.json").read_bytes())
+    assert manifests[0] == manifests[1]
+
+
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_progress_counts_every_artifact_once(name: str, known: Any, tmp_path: Path) -> None:
+    done: list[int] = []
+    export(known.lake, Export(format=name, where=CLIPS), tmp_path / "out", advance=done.append)
+    assert sum(done) == 3
+
+
+def test_a_folder_that_is_there_is_left_alone(known: Any, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").write_text("mine")
+    with pytest.raises(ConflictError, match="exists"):
+        export(known.lake, Export(format="parquet"), tmp_path / "out")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine.txt"]
+
+
+def test_a_failed_export_leaves_nothing_behind(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        with fresh_folder(tmp_path / "out") as folder:
+            (folder / "half.tar").write_bytes(b"half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_target_made_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    def raced() -> None:
+        with fresh_folder(tmp_path / "out") as folder:
+            (folder / "file").write_bytes(b"x")
+            (tmp_path / "out").mkdir()
+
+    with pytest.raises(ConflictError):
+        raced()
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["webdataset", "mp4", "mcap"])
+def test_rows_that_a_format_cannot_hold_are_refused_with_the_filter_to_write(name: str, tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    with lake.transaction("a model") as tx:
+        tx.add(Artifact(kind=Kind.MODEL, name="regressor"))
+    with pytest.raises(UsageError, match="1 of kind model") as caught:
+        export(lake, Export(format=name), tmp_path / "out")
+    assert "kind = '" in caught.value.fix
+
+
+def test_nothing_to_export_is_an_error(known: Any, tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match="no rows match"):
+        export(known.lake, Export(format="parquet", where="wind > 100"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_format_is_answered_with_the_nearest(known: Any, tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'parquet'"):
+        export(known.lake, Export(format="parket"), tmp_path / "out")
+
+
+def test_an_option_of_another_format_is_refused(known: Any, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="takes no option 'crf'"):
+        export(known.lake, Export(format="parquet", options={"crf": 3}), tmp_path / "out")
+
+
+def test_an_export_at_a_tag_does_not_see_later_rows(tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    for number in range(2):
+        with lake.transaction(f"model {number}") as tx:
+            tx.add(Artifact(kind=Kind.MODEL, name=f"model {number}", seed=number))
+        if number == 0:
+            lake.tag("first")
+    manifest = export(lake, Export(format="parquet", at="first"), tmp_path / "out").manifest
+    assert pl.read_parquet(tmp_path / "out" / "rows" / "*.parquet")["name"].to_list() == ["model 0"]
+    assert manifest["at"] == "first"
