@@ -39,6 +39,15 @@ CHANNELS: dict[str, Channel] = {
     "apparent_wind_direction": Channel(
         dims=("time",), unit="rad", frame="from, clockwise from the platform's bow", about="apparent wind angle"
     ),
+    "theoretical_wind_speed": Channel(
+        dims=("time",),
+        unit="m/s",
+        frame="moving platform",
+        about="wind speed an instrument computed as if its moving platform stood still (NMEA MWV,T)",
+    ),
+    "theoretical_wind_direction": Channel(
+        dims=("time",), unit="rad", frame="from, clockwise from the platform's bow", about="its direction"
+    ),
     "wind_x": Channel(dims=("time",), unit="m/s", frame="sensor, towards +x", about="wind component of a sonic"),
     "wind_y": Channel(dims=("time",), unit="m/s", frame="sensor, towards +y", about="wind component of a sonic"),
     "wind_z": Channel(dims=("time",), unit="m/s", frame="sensor, upwards", about="vertical wind"),
@@ -49,6 +58,19 @@ CHANNELS: dict[str, Channel] = {
     "platform_heading": Channel(
         dims=("time",), unit="rad", frame="clockwise from true north", about="heading of a moving platform"
     ),
+    "wind_speed_estimate": Channel(
+        dims=("time",),
+        unit="m/s",
+        frame="horizontal",
+        about="wind speed someone derived from a tracked flag: no reading",
+    ),
+    "tracked_rms": Channel(dims=("time",), unit="px", frame="image", about="RMS displacement of tracked points"),
+    "tracked_points": Channel(dims=("time",), unit="1", frame="image", about="number of points tracked"),
+    "tracking_quality": Channel(dims=("time",), unit="1", frame="image", about="the tracker's own confidence, 0 to 1"),
+    "flutter_frequency": Channel(
+        dims=("time",), unit="Hz", frame="", about="main frequency of a tracked flag's motion"
+    ),
+    "deflection_angle": Channel(dims=("time",), unit="rad", frame="image", about="mean angle of a tracked flag"),
     "image": Channel(dims=("time", "height", "width"), unit="1", frame="y down, x right", about="8-bit gray frames"),
     "positions": Channel(dims=("time", "vertex", "xyz"), unit="m", frame="right-handed, z up", about="mesh vertices"),
     "faces": Channel(dims=("face", "corner"), unit="1", frame="counter-clockwise front", about="vertex indices"),
@@ -78,6 +100,8 @@ class SampleFlag(IntFlag):
     """The instrument's own diagnostic says so."""
     TIME_UNSURE = 32
     """The time stamp was repaired or interpolated (see the report)."""
+    ALIASED = 64
+    """A frequency at the Nyquist limit of the frames it was found in: it may be another one."""
 
 
 UNUSABLE = SampleFlag.STALE | SampleFlag.OUT_OF_RANGE | SampleFlag.MISSING | SampleFlag.SENSOR_FAULT

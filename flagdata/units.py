@@ -56,6 +56,8 @@ UNITS: dict[str, Unit] = {
     "ft": Unit(si="m", scale=0.3048),
     "s": Unit(si="s", scale=1.0),
     "ms": Unit(si="s", scale=1e-3),
+    "Hz": Unit(si="Hz", scale=1.0),
+    "px": Unit(si="px", scale=1.0),
 }
 
 # Spellings seen in instrument exports, lower-cased and without blanks, → the table's name. Beaufort is left out on
@@ -71,7 +73,7 @@ SPELLINGS: dict[str, str] = {
     "°f": "degF", "ºf": "degF", "f": "degF", "fahrenheit": "degF", "degf": "degF", "deg_f": "degF",
     "k": "K", "kelvin": "K",
     "mb": "hPa", "mbar": "hPa", "hpa": "hPa", "kpa": "kPa", "pa": "Pa", "inhg": "inHg",
-    "percent": "%", "%rh": "%",
+    "percent": "%", "%rh": "%", "hz": "Hz",
 }  # fmt: skip
 
 

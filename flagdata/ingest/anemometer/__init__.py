@@ -1,0 +1,9 @@
+"""Anemometer logs of any vendor → `WindLog`: SI, UTC nanoseconds, one direction convention, every defect reported."""
+
+from flagdata.ingest.anemometer.averaging import average
+from flagdata.ingest.anemometer.log import read_log
+from flagdata.ingest.anemometer.options import Limits, WindOptions
+from flagdata.ingest.anemometer.sniff import sniff
+from flagdata.ingest.anemometer.sniffing import Guess
+
+__all__ = ["Guess", "Limits", "WindOptions", "average", "read_log", "sniff"]

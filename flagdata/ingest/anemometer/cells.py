@@ -1,0 +1,97 @@
+"""From cells of text to numbers, in bulk, with a reason for each cell that is none."""
+
+# pyarrow.compute makes its functions at import, where a type checker cannot see them.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from flagdata.ingest.anemometer.recipe import MISSING
+
+_NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?$"
+_INFINITE = r"^[+-]?(inf|infinity|1\.#inf0*)$"
+
+
+class Cell(IntEnum):
+    """What a cell held."""
+
+    NUMBER = 0
+    MISSING = 1
+    UNREADABLE = 2
+    INFINITE = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numbers:
+    """A column.
+
+    Attributes:
+        value: (n,) float64, NaN unless `state` is NUMBER.
+        state: (n,) uint8 of `Cell`.
+        decimals: most digits after the decimal mark, which tells the resolution of the display.
+    """
+
+    value: NDArray[np.float64]
+    state: NDArray[np.uint8]
+    decimals: int
+
+
+def numbers(cells: Sequence[str], *, decimal: str = ".", missing: Sequence[str] = ()) -> Numbers:
+    """Read a column of cells.
+
+    Args:
+        decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
+        missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
+    """
+    text = pc.utf8_trim_whitespace(pa.array(cells, pa.string()))
+    if decimal == ",":
+        pointed = pc.match_substring(text, ".")
+        text = pc.if_else(pointed, "?", pc.replace_substring(text, ",", "."))
+    state = np.zeros(len(text), dtype=np.uint8)
+    try:
+        parsed = pc.cast(text, pa.float64())
+    except pa.ArrowInvalid:
+        lower = pc.utf8_lower(text)
+        readable = pc.match_substring_regex(text, _NUMBER)
+        absent = pc.is_in(lower, pa.array([*MISSING, *missing], pa.string()))
+        endless = pc.match_substring_regex(lower, _INFINITE)
+        state[~_mask(readable)] = Cell.UNREADABLE
+        state[_mask(absent)] = Cell.MISSING
+        state[_mask(endless)] = Cell.INFINITE
+        parsed = pc.cast(pc.if_else(readable, text, None), pa.float64())
+    value = parsed.to_numpy(zero_copy_only=False).astype(np.float64)
+    state[np.isnan(value) & (state == Cell.NUMBER)] = Cell.MISSING
+    state[np.isinf(value)] = Cell.INFINITE
+    for code in _numeric(missing):
+        state[(value == code) & (state == Cell.NUMBER)] = Cell.MISSING
+    value[state != Cell.NUMBER] = np.nan
+    return Numbers(value=value, state=state, decimals=_decimals(text))
+
+
+def _mask(array: pa.BooleanArray) -> NDArray[np.bool_]:
+    return array.to_numpy(zero_copy_only=False).astype(bool)
+
+
+def _numeric(codes: Sequence[str]) -> list[float]:
+    found: list[float] = []
+    for code in codes:
+        try:
+            found.append(float(code.replace(",", ".")))
+        except ValueError:
+            continue
+    return [code for code in found if np.isfinite(code)]
+
+
+def _decimals(text: pa.StringArray) -> int:
+    """Most digits after the point among plain decimals of up to 6 digits after it."""
+    head = text.slice(0, 5000)
+    fraction = pc.extract_regex(head, r"\.(?P<digits>\d{1,6})$")
+    digits = pc.max(pc.binary_length(pc.struct_field(fraction, [0]))).as_py()
+    return int(digits or 0)

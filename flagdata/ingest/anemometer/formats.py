@@ -1,0 +1,45 @@
+"""The table of anemometer formats, and the contract each of them keeps.
+
+A user's own format is a package with an entry point in the group `flagdata.formats`.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.source import TextFile
+from flagdata.registry import Registry
+
+
+class Format(Protocol):
+    """A format of anemometer logs; a class without arguments.
+
+    Attributes:
+        name: its name in the table.
+        about: one line.
+        uses: names of the `WindOptions` it heeds; others are refused when given.
+    """
+
+    name: str
+    about: str
+    uses: frozenset[str]
+
+    def recognise(self, head: Head) -> Guess | None:
+        """Whether the first lines look like this format, and why; `None` where nothing does."""
+        ...
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """All rows in the order of the file, in SI, instants in UTC nanoseconds. Raises FlagdataError only."""
+        ...
+
+
+FORMATS = Registry(
+    "anemometer format",
+    {
+        "delimited": "flagdata.ingest.anemometer.delimited:Delimited",
+    },
+    group="flagdata.formats",
+)

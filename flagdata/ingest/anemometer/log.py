@@ -1,0 +1,89 @@
+"""From an anemometer's file to a `WindLog`: choose the format, read, put in order, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding
+from flagdata.ingest.anemometer import quality, zero
+from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.formats import FORMATS, Format
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.order import in_order
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.sniff import recognise
+from flagdata.ingest.anemometer.sniffing import SURE
+from flagdata.ingest.anemometer.source import TextFile, open_text
+from flagdata.signals import WindLog, WindSeries
+
+
+def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
+    """Read an anemometer's log, of whichever format it seems to be or `options` say it is.
+
+    Args:
+        path: the file.
+        options: what the file does not say about itself.
+
+    Raises:
+        InputError, TimeError, LimitError: the file cannot be read as this format; names the line and the fix.
+        UsageError: options that do not fit the format, or a format that cannot be told from the file.
+        NotFoundError: no such file, or no such recipe.
+    """
+    path = Path(path)
+    options = options or WindOptions()
+    layout = recipes.load(options.recipe).file if options.recipe is not None else None
+    encoding = options.encoding or (layout.encoding if layout else None)
+    source = open_text(path, limits=options.limits, encoding=encoding)
+    name, options, reasons = _choose(source, options)
+    reader: Format = FORMATS[name]()
+    unused = options.given() - reader.uses
+    if unused:
+        raise UsageError(
+            f"the format {name} has no use for: {', '.join(sorted(unused))}", where=str(path), fix="leave it out"
+        )
+    reading = reader.read(source, options)
+    reading = reading.with_findings(source.findings)
+    if len(reading.time) == 0:
+        raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
+    choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
+    reading = zero.settle(in_order(reading, where=str(path)), choice)
+    for check in (quality.negative, quality.dead_zone, quality.stale, quality.at_nyquist):
+        reading = _apply(reading, check)
+    findings = (*reading.findings, *quality.gaps(reading))
+    if not any(np.isfinite(values).any() for values in reading.channels.values()):
+        raise InputError("not one value can be used", where=f"{path}, line {reading.line[0]}", fix="check the sensor")
+    series = WindSeries(
+        time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
+        host_time=reading.host_time,
+    )  # fmt: skip
+    return WindLog(series=series, format=name, findings=findings, reasons=reasons)
+
+
+def _apply(reading: Reading, check: Callable[[Reading], tuple[NDArray[np.uint16], tuple[Finding, ...]]]) -> Reading:
+    flags, found = check(reading)
+    return reading.with_findings(found, flags=reading.flags | flags)
+
+
+def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, tuple[str, ...]]:
+    """Format, options completed by what was recognised, and why."""
+    if options.format is not None:
+        if options.format not in FORMATS:
+            FORMATS[options.format]
+        return options.format, options, (f"the format {options.format} was named",)
+    if options.recipe is not None:
+        return "delimited", options, (f"the recipe {options.recipe} was named",)
+    guesses = recognise(source)
+    if not guesses or guesses[0].score < SURE:
+        seen = "; ".join(reason for guess in guesses for reason in guess.reasons)
+        raise InputError(
+            f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),
+            fix="describe it by a recipe (--recipe FILE.toml) or name its --format",
+        )  # fmt: skip
+    best = guesses[0]
+    return best.format, replace(options, recipe=best.recipe), best.reasons

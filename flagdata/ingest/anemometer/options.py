@@ -1,0 +1,97 @@
+"""What a user may say about an anemometer log that the file itself does not."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, TypeAlias
+
+from flagdata.errors import UsageError
+
+ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
+"""What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
+and change nothing, or subtract what they show."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Sizes beyond which a file is refused before it is parsed.
+
+    Attributes:
+        size: of the file [bytes].
+        rows: lines in the file.
+        line: length of a line [bytes].
+    """
+
+    size: int = 2 * 1024**3
+    rows: int = 20_000_000
+    line: int = 65_536
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            if getattr(self, item.name) < 1:
+                raise UsageError(f"limit {item.name} is below 1", where="limits", fix="give a positive limit")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindOptions:
+    """Options of `read_log`. A format that has no use for an option refuses it.
+
+    Attributes:
+        format: a name of `formats.FORMATS`; `None` takes the first guess of `sniff` when it is sure.
+        recipe: a recipe of catalogs/sensors by name, or the path of a TOML file; implies the format that reads it.
+        zone: of wall-clock stamps: IANA name or fixed offset; goes before the recipe's.
+        encoding: of the text, a Python codec name; `None` decides by byte-order mark and validity as UTF-8.
+        date: of the first sentence, for streams that carry the time of day alone.
+        date_order: "dmy" or "mdy" for dates that are written with numbers only; `None` decides by evidence or refuses.
+        platform: "fixed" for a mast, "moving" for a boat or vehicle; `None` where the log shows it or does not need it.
+        azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative
+            direction stays sensor-relative.
+        zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
+        limits: see `Limits`.
+    """
+
+    format: str | None = None
+    recipe: str | None = None
+    zone: str | None = None
+    encoding: str | None = None
+    date: dt.date | None = None
+    date_order: Literal["dmy", "mdy"] | None = None
+    platform: Literal["fixed", "moving"] | None = None
+    azimuth: float | None = None
+    zero_offset: ZeroOffset | None = None
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        if self.date_order not in (None, "dmy", "mdy"):
+            raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy or mdy")
+        if self.platform not in (None, "fixed", "moving"):
+            raise UsageError(f"platform {self.platform!r}", where="platform", fix="give fixed or moving")
+        if self.azimuth is not None and not -7.0 < self.azimuth < 7.0:
+            raise UsageError(f"azimuth {self.azimuth} is not in radians", where="azimuth", fix="give -2π to 2π")
+        check_zero_offset(self.zero_offset, where="zero_offset")
+
+    def given(self) -> frozenset[str]:
+        """Names of the options that say something about the file; limits and the choice of reader do not."""
+        apart = {"format", "recipe", "limits"}
+        return frozenset(f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) is not None)
+
+    def as_dict(self) -> Mapping[str, Any]:
+        """Everything that shapes the result, for a recipe hash; limits do not (they only refuse)."""
+        content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "limits"}
+        content["date"] = self.date.isoformat() if self.date else None
+        return content
+
+
+def check_zero_offset(value: object, *, where: str) -> None:
+    """Refuse anything that is not a `ZeroOffset` or `None`.
+
+    Raises:
+        UsageError: with the forms that are allowed.
+    """
+    if value is None or value in ("report", "estimate"):
+        return
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 100:
+        return
+    raise UsageError(f"zero offset {value!r}", where=where, fix='give "report", "estimate" or a speed in m/s')

@@ -1,0 +1,190 @@
+"""What is wrong with the samples of an anemometer: found, counted and flagged, never smoothed over.
+
+Works on rows in strictly increasing time. Each check names the samples it concerns by a flag and reports a number.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.schema import SampleFlag
+from flagdata.timebase import NANOSECONDS
+
+SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed", "wind_speed_estimate")
+"""Channels that cannot be negative."""
+STALE_CHANCE = 1e-3
+"""Probability of flagging one run of repeats in a log without any, see `stale`."""
+STALE_SHORTEST = 5
+"""Rows; a shorter run of repeats is never called stale."""
+
+
+def gaps(reading: Reading) -> tuple[Finding, ...]:
+    """Stretches without rows: longer than 1.5 times the median interval and than its jitter (6 σ, from the MAD)."""
+    if len(reading.time) < 4:
+        return ()
+    steps = np.diff(reading.time)
+    usual = float(np.median(steps))
+    jitter = 1.4826 * float(np.median(np.abs(steps - usual)))
+    wide = np.flatnonzero(steps > max(1.5 * usual, usual + 6 * jitter))
+    if len(wide) == 0:
+        return ()
+    longest = int(wide[np.argmax(steps[wide])])
+    lost = float((steps[wide] - usual).sum()) / NANOSECONDS
+    seconds = float(steps[longest]) / NANOSECONDS
+    return (
+        Finding(
+            kind="gaps", severity=Severity.WARNING, count=len(wide), value=seconds,
+            where=f"line {reading.line[longest + 1]}",
+            what=f"{len(wide)} gaps of {lost:.3f} s in all at a usual interval of {usual / NANOSECONDS:.4g} s; "
+            f"the longest, {seconds:.3f} s, ends at the line named",
+        ),
+    )  # fmt: skip
+
+
+def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Speeds below zero are impossible: OUT_OF_RANGE; but for the scatter of a calm about a zero that was set right."""
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    calm = (reading.flags & SampleFlag.DEAD_ZONE) != 0
+    found: list[Finding] = []
+    for name in SPEEDS:
+        if name not in reading.channels:
+            continue
+        below = (reading.channels[name] < 0) & ~calm
+        if below.any():
+            count = int(below.sum())
+            flags[below] |= SampleFlag.OUT_OF_RANGE
+            lowest = float(np.nanmin(reading.channels[name]))
+            found.append(
+                Finding(
+                    kind="negative-speed", severity=Severity.WARNING, count=count, value=lowest,
+                    where=f"line {reading.line[below][0]}",
+                    what=f"{count} negative values of {name}, down to {lowest:.3g} m/s; left out of averages",
+                )
+            )  # fmt: skip
+    return flags, tuple(found)
+
+
+def dead_zone(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Speeds below the sensor's declared threshold, or exactly 0 where none is declared: DEAD_ZONE."""
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    speed = reading.channels.get("wind_speed")
+    if speed is None:
+        return flags, ()
+    threshold = reading.sensor.threshold
+    below = (speed >= 0) & (speed < threshold) if threshold else speed == 0
+    if not below.any():
+        return flags, ()
+    flags[below] = SampleFlag.DEAD_ZONE
+    text = (
+        f"below the sensor's threshold, {threshold:g} m/s" if threshold else "exactly 0: calm, or below the threshold"
+    )
+    return flags, (
+        Finding(
+            kind="dead-zone", severity=Severity.NOTE, count=int(below.sum()), where=f"line {reading.line[below][0]}",
+            value=threshold, what=f"{int(below.sum())} of {len(speed)} speeds are {text}",
+        ),
+    )  # fmt: skip
+
+
+def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Runs in which every wind reading repeats exactly, longer than chance and resolution explain: STALE.
+
+    Were repeats independent with probability p, n rows would hold a run of L or more repeats with probability at most
+    n p^L (Feller, An Introduction to Probability Theory I, XIII.7). A run is stale from the L on at which that is
+    `STALE_CHANCE`. p is the share of repeats in the log, taken again without the runs found (three passes), and never
+    below 5 %. Readings of a calm (0, or dead zone) are no repeats. A recipe's `stale_after` replaces the rule.
+    """
+    names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
+    names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
+    n = len(reading.time)
+    flags = np.zeros(n, dtype=np.uint16)
+    if n < STALE_SHORTEST or not names:
+        return flags, ()
+    same = np.ones(n - 1, dtype=bool)
+    for name in names:
+        values = reading.channels[name]
+        same &= values[1:] == values[:-1]
+    same &= (reading.flags[1:] & (SampleFlag.DEAD_ZONE | SampleFlag.OUT_OF_RANGE)) == 0
+    starts, lengths = _runs(same)
+    if len(starts) == 0:
+        return flags, ()
+    if reading.rules.stale_after is not None:
+        span = (reading.time[starts + lengths] - reading.time[starts]) / NANOSECONDS
+        long = span > reading.rules.stale_after
+        text = f"for longer than the {reading.rules.stale_after:g} s its recipe allows"
+    else:
+        limit = _longest_by_chance(n, lengths)
+        long = lengths >= limit
+        text = f"{limit} times or more, which chance and resolution do not explain"
+    if not long.any():
+        return flags, ()
+    for start, length in zip(starts[long], lengths[long], strict=True):
+        flags[start + 1 : start + length + 1] = SampleFlag.STALE
+    worst = int(np.argmax(np.where(long, lengths, 0)))
+    seconds = float(reading.time[starts[worst] + lengths[worst]] - reading.time[starts[worst]]) / NANOSECONDS
+    count = int((flags != 0).sum())
+    return flags, (
+        Finding(
+            kind="stale-repeats", severity=Severity.WARNING, count=count, value=seconds,
+            where=f"line {reading.line[starts[long][0] + 1]}",
+            what=f"{count} rows in {int(long.sum())} runs repeat the reading before them {text}; the longest run lasts "
+            f"{seconds:.2f} s; left out of averages",
+        ),
+    )  # fmt: skip
+
+
+def _runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First row and number of repeats of each run of repeats."""
+    edges = np.diff(np.concatenate(([0], same.astype(np.int8), [0])))
+    starts = np.flatnonzero(edges == 1)
+    return starts, np.flatnonzero(edges == -1) - starts
+
+
+def _longest_by_chance(n: int, lengths: NDArray[np.int64]) -> int:
+    limit = n
+    for _ in range(3):
+        within = lengths < limit
+        repeats = float(lengths[within].sum())
+        rest = n - 1 - float(lengths[~within].sum())
+        share = min(max(repeats / max(rest, 1.0), 0.05), 0.999)
+        limit = max(STALE_SHORTEST, math.ceil(math.log(n / STALE_CHANCE) / -math.log(share)))
+    return limit
+
+
+def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Frequencies found in frames taken once a row that lie within one step of half the frame rate: ALIASED.
+
+    A sampled oscillation of frequency f is the same as one of |k·rate - f| for every whole k (Shannon 1949); close to
+    rate/2 the two lowest candidates cannot be told apart within the resolution of the estimate. The step is the most
+    common spacing of the frequencies above a quarter of the rate.
+    """
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    found: list[Finding] = []
+    for name in reading.rules.frame_rate_of:
+        values = reading.channels.get(name)
+        if values is None or len(values) < 10:
+            continue
+        rate = NANOSECONDS / float(np.median(np.diff(reading.time)))
+        limit = rate / 2
+        high = np.unique(np.round(values[values > rate / 4], 6))
+        step = float(np.median(np.diff(high))) if len(high) > 2 else 1.0
+        near = values >= limit - max(2 * step, 0.05 * limit)
+        if not near.any():
+            continue
+        flags[near] = SampleFlag.ALIASED
+        typical = float(np.median(values[near]))
+        found.append(
+            Finding(
+                kind="at-nyquist", severity=Severity.WARNING, count=int(near.sum()), value=typical,
+                where=f"line {reading.line[near][0]}",
+                what=f"{int(near.sum())} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at "
+                f"the Nyquist limit {limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be "
+                f"{rate - typical:.1f} or {rate + typical:.1f} Hz; only a faster camera can tell",
+            )
+        )  # fmt: skip
+    return flags, tuple(found)

@@ -1,0 +1,79 @@
+"""What a format hands over, before order and quality are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding
+from flagdata.ingest.anemometer.recipe import QualityRules
+from flagdata.signals import Instants, Sensor, Series
+
+WIND_CHANNELS = frozenset(
+    {
+        "wind_speed", "wind_x", "wind_y", "wind_z", "apparent_wind_speed", "theoretical_wind_speed",
+        "wind_speed_estimate",
+    }
+)  # fmt: skip
+"""Channels whose defects flag the sample: a missing temperature does not make the wind unusable."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """Rows of a log in the order of the file.
+
+    Attributes:
+        time: (n,) UTC nanoseconds on the device's clock, in any order.
+        channels: names of schema.CHANNELS → (n,) float64 in SI, NaN where missing.
+        flags: (n,) bits of schema.SampleFlag, as far as the format knows.
+        line: (n,) line numbers in the file.
+        sensor: the instrument.
+        step: resolution of the stamps as written [ns].
+        rules: what is known about the instrument's errors.
+        host_time: (n,) the logging computer's clock, where the file has it.
+        findings: of the format.
+    """
+
+    time: Instants
+    channels: Mapping[str, Series]
+    flags: NDArray[np.uint16]
+    line: NDArray[np.int64]
+    sensor: Sensor
+    step: int
+    rules: QualityRules = field(default_factory=QualityRules)
+    host_time: Instants | None = None
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        arrays = [self.flags, self.line, *self.channels.values()]
+        if self.host_time is not None:
+            arrays.append(self.host_time)
+        if any(len(a) != n for a in arrays):
+            raise InputError("columns of different lengths", fix="this is a defect of the format's reader")
+
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Reading:
+        """The rows chosen, in the order given."""
+        return Reading(
+            time=self.time[rows],
+            channels={name: values[rows] for name, values in self.channels.items()},
+            flags=self.flags[rows],
+            line=self.line[rows],
+            sensor=self.sensor,
+            step=self.step,
+            rules=self.rules,
+            host_time=None if self.host_time is None else self.host_time[rows],
+            findings=self.findings,
+        )
+
+    def with_findings(self, found: tuple[Finding, ...], *, flags: NDArray[np.uint16] | None = None) -> Reading:
+        """The same rows with findings added, and other flags."""
+        return Reading(
+            time=self.time, channels=self.channels, flags=self.flags if flags is None else flags, line=self.line,
+            sensor=self.sensor, step=self.step, rules=self.rules, host_time=self.host_time,
+            findings=(*self.findings, *found),
+        )  # fmt: skip

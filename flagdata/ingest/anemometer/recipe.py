@@ -1,0 +1,352 @@
+"""Sensor recipes: a delimited log described in TOML, so that a new logger needs no code.
+
+A recipe is parsed here and nowhere else; unknown keys are refused with the nearest known one. Tables:
+
+    name, about, source       what it is, and where its facts come from
+    [file]                    delimiter, decimal, encoding, preamble, header, comment, missing
+    [time]                    columns, format, zone
+    [channels.<channel>]      column, unit, gain, offset, range, convention, rotation, optional
+    [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
+                              accuracy-relative (all SI)
+    [quality]                 zero-offset, stale-after, frame-rate-of
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
+from flagdata.schema import CHANNELS
+from flagdata.signals import Sensor
+from flagdata.timebase import zone
+from flagdata.units import unit
+
+T = TypeVar("T")
+
+DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "|": "|", "space": " "}
+MISSING = ("", "-", "--", "---", "nan", "na", "n/a", "null", "none", "***")
+"""Spellings of "no value" that every recipe knows, lower-case."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileLayout:
+    """How the text is cut into cells.
+
+    Attributes:
+        delimiter: between cells; " " stands for any run of blanks.
+        decimal: "." or ",".
+        encoding: Python codec name, `None` to decide by the bytes.
+        preamble: lines before the header.
+        header: header lines; the first names the columns, further ones (units) are skipped. 0: columns have no names.
+        comment: lines that start with it are skipped; "" for none.
+        missing: further spellings of "no value"; those that are numbers are compared as numbers.
+    """
+
+    delimiter: str = ","
+    decimal: Literal[".", ","] = "."
+    encoding: str | None = None
+    preamble: int = 0
+    header: int = 1
+    comment: str = ""
+    missing: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.delimiter not in DELIMITERS.values():
+            raise UnknownNameError.of("delimiter", self.delimiter, DELIMITERS, where="[file] delimiter")
+        if self.decimal not in (".", ","):
+            raise UsageError(f"decimal mark {self.decimal!r}", where="[file] decimal", fix='give "." or ","')
+        if self.decimal == self.delimiter:
+            raise UsageError("the decimal mark is also the delimiter", where="[file]", fix="correct one of the two")
+        if not 0 <= self.preamble <= 1000 or not 0 <= self.header <= 10:
+            raise UsageError("preamble beyond 1000 or header beyond 10 lines", where="[file]", fix="count the lines")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeLayout:
+    """How a row says when it was.
+
+    Attributes:
+        columns: names or numbers (from 1) of the columns that are joined with a blank.
+        format: "iso", "epoch-s", "epoch-ms", or strptime directives (see stamps.py).
+        zone: of wall-clock stamps; `None` leaves it to the user.
+    """
+
+    columns: tuple[str | int, ...]
+    format: str
+    zone: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.columns:
+            raise UsageError("no time column", where="[time] columns", fix="name the column of the stamps")
+        if self.zone is not None:
+            zone(self.zone, where="[time] zone")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelLayout:
+    """One measured column; `value = unit.to_si(cell * gain + offset)`.
+
+    Attributes:
+        column: name or number (from 1) of the column.
+        unit: as `flagdata.units` spells it.
+        gain, offset: of the cell, in the file's unit.
+        range: smallest and largest value the instrument can give, in the file's unit, after gain and offset.
+        convention: of a direction: the wind blows "from" it or "to" it.
+        rotation: added to a direction [deg in the file's sense, clockwise].
+        optional: whether files without the column are read all the same.
+    """
+
+    column: str | int
+    unit: str
+    gain: float = 1.0
+    offset: float = 0.0
+    range: tuple[float, float] | None = None
+    convention: Literal["from", "to"] = "from"
+    rotation: float = 0.0
+    optional: bool = False
+
+    def __post_init__(self) -> None:
+        unit(self.unit, where=f"unit of column {self.column}")
+        if self.gain == 0:
+            raise UsageError("a gain of 0", where=f"column {self.column}", fix="give the factor of the calibration")
+        if self.range is not None and not self.range[0] < self.range[1]:
+            raise UsageError("a range that is empty", where=f"column {self.column}", fix="give [lowest, highest]")
+        if self.convention not in ("from", "to"):
+            where = f"column {self.column}"
+            raise UsageError(f"convention {self.convention!r}", where=where, fix='give "from" or "to"')
+
+
+@dataclass(frozen=True, kw_only=True)
+class QualityRules:
+    """What is known about the instrument's errors.
+
+    Attributes:
+        zero_offset: see options.ZeroOffset.
+        stale_after: repeats longer than this [s] are stale; `None` derives it from the readings themselves.
+        frame_rate_of: channels that are frequencies found in frames, one a row: checked against the Nyquist limit.
+    """
+
+    zero_offset: ZeroOffset = "report"
+    stale_after: float | None = None
+    frame_rate_of: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_zero_offset(self.zero_offset, where="[quality] zero-offset")
+        if self.stale_after is not None and self.stale_after <= 0:
+            raise UsageError("stale-after is not positive", where="[quality] stale-after", fix="give seconds above 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """A log format and its instrument, see the module's text."""
+
+    name: str
+    about: str
+    source: str
+    file: FileLayout
+    time: TimeLayout
+    channels: Mapping[str, ChannelLayout]
+    sensor: Sensor
+    quality: QualityRules = field(default_factory=QualityRules)
+
+    def __post_init__(self) -> None:
+        if not self.channels:
+            raise UsageError("no channels", where=self.name, fix="add a table [channels.wind_speed]")
+        for name, layout in self.channels.items():
+            if name not in CHANNELS:
+                raise UnknownNameError.of("channel", name, CHANNELS, where=self.name)
+            if unit(layout.unit).si != CHANNELS[name].unit:
+                raise UsageError(
+                    f"channel {name} is measured in {CHANNELS[name].unit}, not in {layout.unit}",
+                    where=self.name, fix="correct the unit or the channel",
+                )  # fmt: skip
+        named = [c.column for c in self.channels.values()] + list(self.time.columns)
+        if self.file.header == 0 and any(isinstance(column, str) for column in named):
+            raise UsageError("columns by name in a file without header", where=self.name, fix="give their numbers")
+
+
+def names() -> tuple[str, ...]:
+    """Recipes that come with the project."""
+    folder = files("catalogs") / "sensors"
+    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+
+
+def load(recipe: str) -> Recipe:
+    """The recipe called `recipe`, or in the TOML file of that path.
+
+    Raises:
+        UnknownNameError: no such name, with the nearest.
+        NotFoundError: no such file.
+        InputError: not TOML; a key missing, unknown or of the wrong type.
+    """
+    if recipe.endswith(".toml"):
+        path = Path(recipe)
+        if not path.is_file():
+            raise NotFoundError(f"no recipe file {path.name}", where=str(path), fix="check the path")
+        try:
+            return parse(path.read_text(encoding="utf-8"), where=str(path))
+        except UnicodeDecodeError:
+            raise InputError("the recipe is not UTF-8 text", where=str(path), fix="save it as UTF-8") from None
+    if recipe not in names():
+        raise UnknownNameError.of("sensor recipe", recipe, names())
+    return parse((files("catalogs") / "sensors" / f"{recipe}.toml").read_text(encoding="utf-8"), where=recipe)
+
+
+def parse(text: str, *, where: str) -> Recipe:
+    """The recipe written in `text`.
+
+    Raises:
+        InputError: not TOML; a key missing or of the wrong type; values that do not fit together.
+        UnknownNameError: a key, channel, unit or zone that is not known, with the nearest.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not valid TOML: {error}", where=where, fix="correct the recipe") from None
+    try:
+        return _Reader(data, where).recipe()
+    except UnknownNameError as error:
+        raise UnknownNameError(error.what, where=_inside(where, error.where), fix=error.fix) from None
+    except FlagdataError as error:
+        raise InputError(error.what, where=_inside(where, error.where), fix=error.fix) from None
+
+
+def _inside(file: str, place: str | None) -> str:
+    return file if place in (None, file) else f"{file}: {place}"
+
+
+class _Reader:
+    """Takes known keys out of TOML tables; what is left over is unknown."""
+
+    def __init__(self, data: Mapping[str, Any], where: str) -> None:
+        self.data = data
+        self.where = where
+
+    def recipe(self) -> Recipe:
+        self._known(self.data, "the recipe", "name about source file time channels sensor quality")
+        text = {key: self._text(self.data, key, "the recipe") for key in ("name", "about", "source")}
+        channels = self._table(self.data, "channels")
+        return Recipe(
+            name=text["name"], about=text["about"], source=text["source"],
+            file=self._file(self._table(self.data, "file")),
+            time=self._time(self._table(self.data, "time")),
+            channels={name: self._channel(name, self._table(channels, name)) for name in channels},
+            sensor=self._sensor(self._table(self.data, "sensor")),
+            quality=self._quality(self._table(self.data, "quality")),
+        )  # fmt: skip
+
+    def _file(self, table: Mapping[str, Any]) -> FileLayout:
+        self._known(table, "[file]", "delimiter decimal encoding preamble header comment missing")
+        delimiter = self._typed(table, "delimiter", str, ",")
+        return FileLayout(
+            delimiter=DELIMITERS.get(delimiter, delimiter),
+            decimal=self._typed(table, "decimal", str, "."),  # type: ignore[arg-type]
+            encoding=self._typed(table, "encoding", str, None),
+            preamble=self._typed(table, "preamble", int, 0),
+            header=self._typed(table, "header", int, 1),
+            comment=self._typed(table, "comment", str, ""),
+            missing=tuple(str(code).strip().lower() for code in self._typed(table, "missing", list, [])),
+        )
+
+    def _time(self, table: Mapping[str, Any]) -> TimeLayout:
+        self._known(table, "[time]", "columns format zone")
+        return TimeLayout(
+            columns=tuple(self._column(c, "[time] columns") for c in self._typed(table, "columns", list, [])),
+            format=self._text(table, "format", "[time]"),
+            zone=self._typed(table, "zone", str, None),
+        )
+
+    def _channel(self, name: str, table: Mapping[str, Any]) -> ChannelLayout:
+        where = f"[channels.{name}]"
+        self._known(table, where, "column unit gain offset range convention rotation optional")
+        if "column" not in table:
+            raise InputError("no column", where=where, fix="name the column or give its number (from 1)")
+        bounds = self._typed(table, "range", list, None)
+        if bounds is not None and (len(bounds) != 2 or not all(isinstance(b, (int, float)) for b in bounds)):
+            raise InputError("range is not two numbers", where=where, fix="give [lowest, highest]")
+        return ChannelLayout(
+            column=self._column(table["column"], where),
+            unit=self._text(table, "unit", where),
+            gain=self._number(table, "gain", 1.0),
+            offset=self._number(table, "offset", 0.0),
+            range=(float(bounds[0]), float(bounds[1])) if bounds else None,
+            convention=self._typed(table, "convention", str, "from"),  # type: ignore[arg-type]
+            rotation=self._number(table, "rotation", 0.0),
+            optional=self._typed(table, "optional", bool, False),
+        )
+
+    def _sensor(self, table: Mapping[str, Any]) -> Sensor:
+        self._known(
+            table, "[sensor]",
+            "name height distance-constant averaging threshold resolution accuracy accuracy-relative",
+        )  # fmt: skip
+        numbers = {key: self._number(table, key, None) for key in table if key != "name"}
+        for key, value in numbers.items():
+            if value is None or value < 0:
+                raise InputError(f"{key} is negative", where="[sensor]", fix="give it in SI units, 0 or more")
+        return Sensor(
+            name=self._text(table, "name", "[sensor]"),
+            height=numbers.get("height"),
+            distance_constant=numbers.get("distance-constant"),
+            averaging=numbers.get("averaging"),
+            threshold=numbers.get("threshold"),
+            resolution=numbers.get("resolution"),
+            accuracy=numbers.get("accuracy"),
+            accuracy_relative=numbers.get("accuracy-relative"),
+        )
+
+    def _quality(self, table: Mapping[str, Any]) -> QualityRules:
+        self._known(table, "[quality]", "zero-offset stale-after frame-rate-of")
+        channels = self._typed(table, "frame-rate-of", list, [])
+        for name in channels:
+            if name not in CHANNELS:
+                raise UnknownNameError.of("channel", str(name), CHANNELS, where="[quality] frame-rate-of")
+        return QualityRules(
+            zero_offset=table.get("zero-offset", "report"),
+            stale_after=self._number(table, "stale-after", None),
+            frame_rate_of=tuple(channels),
+        )
+
+    def _known(self, table: Mapping[str, Any], where: str, known: str) -> None:
+        for key in table:
+            if key not in known.split():
+                raise UnknownNameError.of("key", key, known.split(), where=where)
+
+    def _table(self, data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+        return self._typed(data, key, dict, {})
+
+    def _typed(self, table: Mapping[str, Any], key: str, kind: type[Any], default: Any) -> Any:
+        if key not in table:
+            return default
+        value = table[key]
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise InputError(f"{key} = {value!r} is not a {kind.__name__}", where=self.where, fix="correct its type")
+        return value
+
+    def _number(self, table: Mapping[str, Any], key: str, default: float | None) -> Any:
+        value = table.get(key, default)
+        if value is default:
+            return default
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise InputError(f"{key} = {value!r} is not a number", where=self.where, fix="give a finite number")
+        return float(value)
+
+    def _text(self, table: Mapping[str, Any], key: str, where: str) -> str:
+        value = table.get(key)
+        if not isinstance(value, str) or not value.strip():
+            raise InputError(f"no {key}", where=where, fix=f'add {key} = "…"')
+        return value
+
+    def _column(self, value: object, where: str) -> str | int:
+        if isinstance(value, bool) or not isinstance(value, (str, int)):
+            raise InputError(f"column {value!r} is neither a name nor a number", where=where, fix="correct it")
+        if isinstance(value, int) and value < 1:
+            raise InputError(f"column number {value}", where=where, fix="columns are counted from 1")
+        return value

@@ -1,0 +1,118 @@
+"""Lines cut into cells, with the number of each row's line and a count of the lines that do not fit."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.recipe import FileLayout
+from flagdata.ingest.anemometer.source import TextFile
+
+
+class RowReader:
+    """Reads header and rows of a delimited text once, in blocks.
+
+    Args:
+        source: the file.
+        layout: how it is cut.
+
+    Raises:
+        InputError: the file ends before its header does.
+    """
+
+    def __init__(self, source: TextFile, layout: FileLayout) -> None:
+        self._source = source
+        self._layout = layout
+        self._malformed: list[int] = []
+        self._read = 0
+        self._last_malformed = False
+        head = source.head(layout.preamble + layout.header)
+        if len(head) < layout.preamble + layout.header:
+            raise InputError(
+                f"the file ends in line {len(head)}, before its header does", where=str(source.path),
+                fix="check the recipe's preamble and header, or copy the file from the logger again",
+            )  # fmt: skip
+        self.first_line = layout.preamble + layout.header + 1
+        self.header: list[str] | None = None
+        if layout.header:
+            self.header = [cell.strip() for cell in _cut([head[layout.preamble]], layout.delimiter)[0]]
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
+
+        One empty cell more (a delimiter at the line's end) is allowed.
+        """
+        named = len(self.header) if self.header is not None else None
+        comment = self._layout.comment
+        for first, lines in self._source.blocks():
+            numbers: list[int] = []
+            kept: list[str] = []
+            for offset, line in enumerate(lines):
+                if first + offset < self.first_line or not line.strip(" \t\x00\x1a"):
+                    continue
+                if comment and line.startswith(comment):
+                    continue
+                numbers.append(first + offset)
+                kept.append(line)
+            rows = _cut(kept, self._layout.delimiter)
+            good: list[list[str]] = []
+            where: list[int] = []
+            for number, row in zip(numbers, rows, strict=True):
+                size = len(row)
+                fits = size == named or (size == (named or 0) + 1 and not row[-1].strip()) if named else size >= width
+                if fits and size >= width:
+                    good.append(row)
+                    where.append(number)
+                else:
+                    self._malformed.append(number)
+            self._read += len(good)
+            if numbers:
+                self._last_malformed = bool(self._malformed) and self._malformed[-1] == numbers[-1]
+            if good:
+                yield np.array(where, dtype=np.int64), good
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What did not fit; complete when `blocks` has been read.
+
+        Raises:
+            InputError: most lines do not fit.
+        """
+        found: list[Finding] = []
+        malformed = list(self._malformed)
+        if len(malformed) > self._read and len(malformed) > 1:
+            raise InputError(
+                f"{len(malformed)} of {len(malformed) + self._read} lines have another number of columns than expected",
+                where=f"{self._source.path}, line {malformed[0]}", fix="check delimiter and header of the recipe",
+            )  # fmt: skip
+        if self._last_malformed and malformed:
+            last = malformed.pop()
+            found.append(
+                Finding(
+                    kind="cut-off", severity=Severity.WARNING, where=f"line {last}",
+                    what="the last line is incomplete, as when the logger lost power; left out",
+                )
+            )  # fmt: skip
+        if malformed:
+            found.append(
+                Finding(
+                    kind="malformed-lines", severity=Severity.ERROR, count=len(malformed), where=f"line {malformed[0]}",
+                    what=f"{len(malformed)} lines with another number of columns than the header; left out",
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+
+def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:
+    """Cells of each line. Quotes bind within a line; a line with an unclosed quote becomes one cell."""
+    if delimiter == " ":
+        return [line.split() for line in lines]
+    if not any('"' in line for line in lines):
+        return [line.split(delimiter) for line in lines]
+    closed = [line if line.count('"') % 2 == 0 else "" for line in lines]
+    rows = list(csv.reader(closed, delimiter=delimiter))
+    return [row if kept else [line] for row, kept, line in zip(rows, closed, lines, strict=True)]

@@ -1,0 +1,77 @@
+"""What a file seems to be, and why: ranked guesses, for anemometer logs and for files that are something else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.ingest.anemometer.formats import FORMATS, Format
+from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind, Head
+from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
+
+_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+_MESHES = {".obj", ".ply", ".stl", ".off"}
+
+
+def sniff(path: Path | str) -> tuple[Guess, ...]:
+    """Guesses at what a file or folder is, the likeliest first; never empty.
+
+    Raises:
+        NotFoundError: there is no such file.
+        InputError: it is empty or cannot be read.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise NotFoundError(f"no file {path.name}", where=str(path), fix="check the path")
+    if path.is_dir():
+        return (_folder(path),)
+    head = first_bytes(path)
+    other = signature(head)
+    if other is not None:
+        what, fix = other
+        kind: GuessKind = "camera" if "video" in what else "record" if "MCAP" in what else "other"
+        reason = f"this is {what}: its first bytes are {head[:8].hex(' ')}"
+        return (Guess(format="video" if kind == "camera" else what, score=0.99, reasons=(reason,), kind=kind, fix=fix),)
+    if path.suffix.lower() in _MESHES:
+        reason = f"the name ends in {path.suffix}"
+        return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
+    try:
+        source = open_text(path, limits=Limits())
+    except FlagdataError as error:
+        return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
+    guesses = recognise(source)
+    if guesses:
+        return guesses
+    text = "text, but neither header, sentence nor stamp of a known log in its first lines"
+    fix = "describe it by a recipe: --recipe FILE.toml"
+    return (Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix),)
+
+
+def recognise(source: TextFile) -> tuple[Guess, ...]:
+    """Guesses of all anemometer formats at a text file, the likeliest first."""
+    head = Head(lines=tuple(source.head(HEAD_LINES)))
+    found: list[Guess] = []
+    for name in FORMATS:
+        reader: Format = FORMATS[name]()
+        guess = reader.recognise(head)
+        if guess is not None:
+            found.append(guess)
+    return tuple(sorted(found, key=lambda guess: -guess.score))
+
+
+def _folder(path: Path) -> Guess:
+    names = [item.name for item in sorted(path.iterdir())]
+    meshes = [name for name in names if Path(name).suffix.lower() in _MESHES]
+    pictures = [name for name in names if Path(name).suffix.lower() in _PICTURES]
+    if meshes and len(meshes) >= len(pictures):
+        arcsim = " with an ArcSim conf.json" if "conf.json" in names else ""
+        reason = f"a folder of {len(meshes)} mesh files{arcsim}, the first {meshes[0]}"
+        return Guess(format="mesh folder", score=0.95, reasons=(reason,), kind="meshes", fix="ingest it as meshes")
+    if pictures:
+        reason = f"a folder of {len(pictures)} pictures, the first {pictures[0]}"
+        return Guess(format="image sequence", score=0.9, reasons=(reason,), kind="camera", fix="ingest it as a camera")
+    return Guess(
+        format="folder", score=0.0, reasons=(f"a folder of {len(names)} files, neither meshes nor pictures",),
+        kind="other", fix="give one file",
+    )  # fmt: skip

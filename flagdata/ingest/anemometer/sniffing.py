@@ -1,0 +1,42 @@
+"""The types of a guess at what a file is; the guessing itself is in `sniff`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+GuessKind = Literal["anemometer", "camera", "meshes", "record", "other"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guess:
+    """What a file may be.
+
+    Attributes:
+        format: a name of `formats.FORMATS`, or a word for what else it is ("video", "mesh folder", "gzip").
+        score: 0 to 1; from `SURE` upwards it is taken without asking.
+        reasons: what in the file speaks for it, with places.
+        kind: which ingest it belongs to.
+        recipe: the sensor recipe, for the format "delimited" and "host-stamped".
+        fix: what to do next, where that is not to ingest it.
+    """
+
+    format: str
+    score: float
+    reasons: tuple[str, ...]
+    kind: GuessKind = "anemometer"
+    recipe: str | None = None
+    fix: str | None = None
+
+
+SURE = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Head:
+    """The beginning of a text file: up to `HEAD_LINES` lines without their ends."""
+
+    lines: tuple[str, ...]
+
+
+HEAD_LINES = 200

@@ -1,0 +1,223 @@
+"""From stamps as text to nanoseconds, in bulk: ISO 8601, Unix time and strptime directives.
+
+Directives: %Y %y %m %d %j %H %I %p %M %S %b, and %f, which here stands for an optional fraction with its mark ("" or
+".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. A blank stands for any
+run of blanks or a "T". Two-digit years are 2000 to 2099.
+"""
+
+# pyarrow.compute makes its functions at import, where a type checker cannot see them.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError
+from flagdata.timebase import NANOSECONDS
+
+DAY = 86_400 * NANOSECONDS
+_GROUPS: dict[str, str] = {
+    "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
+    "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
+    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp]\.?[Mm]\.?)", "b": r"(?P<b>[A-Za-z]{3})",
+}  # fmt: skip
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_ISO = (
+    r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
+    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
+)
+_EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stamps:
+    """Parsed stamps, in the order of the rows.
+
+    Attributes:
+        ns: (n,) nanoseconds since 1970 of the wall clock, or of UTC where `utc`.
+        utc: (n,) whether the stamp itself says its zone.
+        valid: (n,) whether it could be read at all and is a calendar date.
+        step: the resolution of the stamps as written [ns]: the last digit that is ever used.
+    """
+
+    ns: NDArray[np.int64]
+    utc: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
+    step: int
+
+
+@functools.cache
+def pattern(form: str) -> str:
+    """The regular expression of a format.
+
+    Raises:
+        UsageError: an unknown directive, one given twice, or no date or no time in it.
+    """
+    if form == "iso":
+        return _ISO
+    out: list[str] = []
+    used: list[str] = []
+    position = 0
+    while position < len(form):
+        letter = form[position]
+        if letter == "%":
+            directive = form[position + 1 : position + 2]
+            if directive not in _GROUPS:
+                raise UsageError(
+                    f"unknown directive %{directive}", where=f"time format {form!r}",
+                    fix=f"use {' '.join('%' + g for g in _GROUPS)}, iso, epoch-s or epoch-ms",
+                )  # fmt: skip
+            used.append(directive)
+            out.append(_GROUPS[directive])
+            position += 2
+            continue
+        out.append(r"[T\s]+" if letter == " " else re.escape(letter))
+        position += 1
+    if len(set(used)) < len(used):
+        raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
+    dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
+    if not (dated or {"Y", "j"} <= set(used)) or not {"H", "I"} & set(used):
+        raise UsageError("no whole date and hour in it", where=f"time format {form!r}", fix="name them all")
+    return "^" + "".join(out) + "$"
+
+
+def parse(texts: Sequence[str], form: str) -> Stamps:
+    """Read stamps written as `form`.
+
+    Raises:
+        UsageError: see `pattern`.
+    """
+    text = pc.utf8_trim_whitespace(pa.array(texts, pa.string()))
+    if form in _EPOCH:
+        return _epoch(text, _EPOCH[form])
+    found = pc.extract_regex(text, pattern(form))
+    valid = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
+    part = functools.partial(_part, found)
+    year = part("Y") if part("Y") is not None else _plus(part("y"), 2000)
+    hour, ok = _hour(found, part)
+    valid &= ok
+    minute, second = part("M"), part("S")
+    zero = np.zeros(len(text), dtype=np.int64)
+    minute, second = zero if minute is None else minute, zero if second is None else second
+    valid &= (hour < 24) & (minute < 60) & (second < 60)
+    days, ok = _days(found, part, year if year is not None else zero)
+    valid &= ok
+    fraction, digits = _fraction(found)
+    ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
+    offset, utc = _offset(found, len(text))
+    step = NANOSECONDS if np.any(second[valid]) else 60 * NANOSECONDS
+    step = 10 ** (9 - digits) if digits else step
+    return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, step=step)
+
+
+def _epoch(text: pa.StringArray, scale: int) -> Stamps:
+    """Unix time, exact in integers: a double holds today's seconds to 0.2 µs only."""
+    found = pc.extract_regex(text, r"^(?P<whole>\d{1,13})(?:[.,](?P<f>\d{1,9})\d*)?$")
+    valid = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
+    whole = _part(found, "whole")
+    fraction, digits = _fraction(found)
+    whole = np.zeros(len(text), dtype=np.int64) if whole is None else whole
+    # years 1990 to 2100: anything else is a counter or another unit
+    valid &= (whole * (scale / NANOSECONDS) > 631_152_000) & (whole * (scale / NANOSECONDS) < 4_102_444_800)
+    ns = np.where(valid, whole, 0) * scale + fraction // (NANOSECONDS // scale)
+    step = max(1, scale // 10**digits)
+    return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy(), valid=valid, step=step)
+
+
+def _field(found: pa.StructArray, name: str) -> Any:
+    index = found.type.get_field_index(name)
+    return None if index < 0 else pc.struct_field(found, [index])
+
+
+def _part(found: pa.StructArray, name: str) -> NDArray[np.int64] | None:
+    """One named group as integers, 0 where absent; `None` when the format has no such group."""
+    column = _field(found, name)
+    if column is None:
+        return None
+    filled = pc.if_else(pc.equal(pc.coalesce(column, ""), ""), "0", column)
+    return pc.cast(filled, pa.int64()).to_numpy(zero_copy_only=False)
+
+
+def _plus(values: NDArray[np.int64] | None, number: int) -> NDArray[np.int64] | None:
+    return None if values is None else values + number
+
+
+def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    hour = part("H")
+    if hour is not None:
+        return hour, np.ones(len(hour), dtype=bool)
+    twelve = part("I")
+    ok = (twelve >= 1) & (twelve <= 12)
+    half = _field(found, "p")
+    if half is None:
+        return twelve, ok
+    after = pc.starts_with(pc.utf8_lower(pc.coalesce(half, "")), "p").to_numpy(zero_copy_only=False)
+    return twelve % 12 + 12 * after.astype(np.int64), ok
+
+
+def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Days since 1970 and whether the date exists (Hinnant, "chrono-compatible low-level date algorithms")."""
+    of_year = part("j")
+    if of_year is not None:
+        first = _civil(year, np.ones_like(year), np.ones_like(year))
+        leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
+        return first + of_year - 1, (of_year >= 1) & (of_year <= 365 + leap) & (year >= 1970) & (year <= 2200)
+    month = part("m") if part("m") is not None else _month(found)
+    day = part("d")
+    leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
+    lengths = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
+    known = (month >= 1) & (month <= 12)
+    length = lengths[np.where(known, month, 0)] + (leap & (month == 2))
+    ok = known & (day >= 1) & (day <= length) & (year >= 1970) & (year <= 2200)
+    return _civil(np.where(ok, year, 1970), np.where(ok, month, 1), np.where(ok, day, 1)), ok
+
+
+def _month(found: pa.StructArray) -> NDArray[np.int64]:
+    names = pc.utf8_lower(pc.coalesce(_field(found, "b"), ""))
+    index = pc.index_in(names, pa.array(_MONTHS))
+    return pc.fill_null(pc.cast(index, pa.int64()), -1).to_numpy(zero_copy_only=False) + 1
+
+
+def _civil(year: NDArray[np.int64], month: NDArray[np.int64], day: NDArray[np.int64]) -> NDArray[np.int64]:
+    shifted = year - (month <= 2)
+    era = shifted // 400
+    of_era = shifted - era * 400
+    of_year = (153 * (month + np.where(month > 2, -3, 9)) + 2) // 5 + day - 1
+    return era * 146_097 + of_era * 365 + of_era // 4 - of_era // 100 + of_year - 719_468
+
+
+def _fraction(found: pa.StructArray) -> tuple[NDArray[np.int64], int]:
+    """Nanoseconds of the fraction, and the most digits it ever has."""
+    column = _field(found, "f")
+    if column is None:
+        return np.zeros(len(found), dtype=np.int64), 0
+    text = pc.coalesce(column, "")
+    digits = int(pc.max(pc.binary_length(text)).as_py() or 0)
+    padded = pc.utf8_rpad(text, 9, "0")
+    return pc.cast(padded, pa.int64()).to_numpy(zero_copy_only=False), digits
+
+
+def _offset(found: pa.StructArray, n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Nanoseconds east of UTC that each stamp states, and whether it states any."""
+    column = _field(found, "z")
+    if column is None:
+        return np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
+    offset = np.zeros(n, dtype=np.int64)
+    text = pc.coalesce(column, "")
+    stated = pc.not_equal(text, "").to_numpy(zero_copy_only=False).astype(bool)
+    for value in pc.unique(text).to_pylist():
+        if value in ("", "Z"):
+            continue
+        sign = -1 if value[0] == "-" else 1
+        minutes = int(value[1:3]) * 60 + int(value[-2:])
+        rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
+        offset[rows] = sign * minutes * 60 * NANOSECONDS
+    return offset, stated

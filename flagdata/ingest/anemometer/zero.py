@@ -1,0 +1,155 @@
+"""A reading that is not zero in calm air, and the jump out of it: estimated from idle stretches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import RefusedError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.options import ZeroOffset
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.schema import SampleFlag
+from flagdata.timebase import NANOSECONDS
+
+WINDOW = 2.0
+"""Length of a stretch that is looked at whole [s]."""
+SHORTEST = 10.0
+"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `BAND` for so long."""
+BAND = 0.05
+"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more."""
+LARGEST = 1.0
+"""An idle reading beyond this is no zero offset but steady wind [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Zero:
+    """An estimate of the zero offset.
+
+    Attributes:
+        offset: the median idle reading [m/s].
+        sigma: standard deviation of the idle stretches' medians [m/s]: how far the zero wanders.
+        idle: (n,) rows that are idle.
+        seconds: idle time in all [s].
+        jump: from the offset to the first reading outside the idle band after idling [m/s]; NaN if it never left.
+        exits: how often the reading left the idle band.
+    """
+
+    offset: float
+    sigma: float
+    idle: NDArray[np.bool_]
+    seconds: float
+    jump: float
+    exits: int
+
+
+def resolution(values: NDArray[np.float64]) -> float:
+    """Smallest step between different readings that occurs [same unit], 0 when all are equal."""
+    levels = np.unique(np.round(values[np.isfinite(values)], 9))
+    return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
+
+
+def estimate(time: NDArray[np.int64], speed: NDArray[np.float64]) -> Zero | None:
+    """The zero offset shown by idle stretches, `None` where there is not enough idle time.
+
+    Args:
+        time: (n,) increasing UTC nanoseconds.
+        speed: (n,) [m/s], NaN where missing.
+    """
+    if len(time) < 20 or not np.isfinite(speed).any():
+        return None
+    band = max(BAND, 4 * resolution(speed))
+    if band > LARGEST:
+        return None
+    window = (time - time[0]) // int(WINDOW * NANOSECONDS)
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(window) > 0)))
+    counts = np.diff(np.append(starts, len(time)))
+    filled = np.where(np.isfinite(speed), speed, np.inf)
+    top = np.maximum.reduceat(filled, starts)
+    bottom = np.minimum.reduceat(filled, starts)
+    with np.errstate(invalid="ignore"):
+        steady = (top - bottom <= band) & (np.abs(top) <= LARGEST) & (counts >= 4)
+    if steady.sum() * WINDOW < SHORTEST:
+        return None
+    medians = np.array([np.median(speed[s : s + c]) for s, c in zip(starts[steady], counts[steady], strict=True)])
+    offset = float(np.median(medians))
+    # Stretches at another level (a steady breeze within the limits) are not the same zero.
+    same = np.abs(medians - offset) <= band
+    if same.sum() * WINDOW < SHORTEST:
+        return None
+    idle = np.isfinite(speed) & (np.abs(speed - offset) <= band)
+    leaves = np.flatnonzero(idle[:-1] & ~idle[1:] & np.isfinite(speed[1:]))
+    jump = float(np.median(speed[leaves + 1] - offset)) if len(leaves) else float("nan")
+    return Zero(
+        offset=offset, sigma=float(np.std(medians[same])), idle=idle, seconds=float(same.sum() * WINDOW), jump=jump,
+        exits=len(leaves),
+    )  # fmt: skip
+
+
+def settle(reading: Reading, choice: ZeroOffset) -> Reading:
+    """Report the zero offset of `wind_speed`, and subtract it where `choice` says so.
+
+    Raises:
+        RefusedError: an estimate was asked for and the log has no idle stretch.
+    """
+    speed = reading.channels.get("wind_speed")
+    if speed is None:
+        return reading
+    zero = estimate(reading.time, speed)
+    shift = 0.0
+    found: list[Finding] = []
+    if zero is not None and abs(zero.offset) > max(0.5 * resolution(speed), 1e-6):
+        found.extend(_report(reading, zero, choice))
+    if choice == "estimate":
+        if zero is None:
+            raise RefusedError(
+                f"no zero offset can be estimated: the reading is nowhere idle for {SHORTEST:g} s",
+                fix="give the reading in calm air in m/s, or leave the offset as it is with report",
+            )
+        shift = zero.offset
+    elif choice != "report":
+        shift = float(choice)
+        found.append(
+            Finding(
+                kind="zero-offset-given", severity=Severity.NOTE, value=shift, count=len(speed),
+                what=f"a zero offset of {shift:+.3f} m/s was given and subtracted from every speed",
+            )
+        )  # fmt: skip
+    flags = reading.flags
+    if zero is not None and shift and abs(zero.offset - shift) <= BAND:
+        flags = np.where(zero.idle, flags | SampleFlag.DEAD_ZONE, flags).astype(np.uint16)
+    corrected = speed - shift
+    if shift:
+        # The scatter of a calm about its zero is no impossible wind: flagged as calm, its sign kept.
+        calm = (corrected < 0) & (np.abs(corrected) <= max(BAND, 4 * resolution(speed)))
+        flags = np.where(calm, flags | SampleFlag.DEAD_ZONE, flags).astype(np.uint16)
+    channels = {**reading.channels, "wind_speed": corrected}
+    return Reading(
+        time=reading.time, channels=channels, flags=flags, line=reading.line, sensor=reading.sensor, step=reading.step,
+        rules=reading.rules, host_time=reading.host_time, findings=(*reading.findings, *found),
+    )  # fmt: skip
+
+
+def _report(reading: Reading, zero: Zero, choice: ZeroOffset) -> list[Finding]:
+    done = "subtracted" if choice == "estimate" else "not applied: see the option zero offset"
+    first = f"line {reading.line[np.argmax(zero.idle)]}"
+    found = [
+        Finding(
+            kind="zero-offset", severity=Severity.NOTE if choice == "estimate" else Severity.WARNING,
+            count=int(zero.idle.sum()), value=zero.offset, where=first,
+            what=f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}",
+        )
+    ]  # fmt: skip
+    if zero.exits and np.isfinite(zero.jump) and zero.jump > 0.1:
+        leave = np.flatnonzero(zero.idle[:-1] & ~zero.idle[1:])
+        found.append(
+            Finding(
+                kind="dead-zone-jump", severity=Severity.WARNING, count=zero.exits, value=zero.jump,
+                where=f"line {reading.line[leave[0] + 1]}",
+                what=f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({zero.exits} times): lower speeds "
+                f"read as calm",
+            )
+        )  # fmt: skip
+    return found
