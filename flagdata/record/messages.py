@@ -47,6 +47,14 @@ WIND_FIELDS: dict[str, tuple[str, int]] = {
     "relative_humidity": ("relative_humidity", 12),
     "platform_speed": ("platform_speed", 13),
     "platform_heading": ("platform_heading", 14),
+    "theoretical_wind_speed": ("theoretical_speed", 15),
+    "theoretical_wind_direction": ("theoretical_direction", 16),
+    "wind_speed_estimate": ("speed_estimate", 17),
+    "tracked_rms": ("tracked_rms", 18),
+    "tracked_points": ("tracked_points", 19),
+    "tracking_quality": ("tracking_quality", 20),
+    "flutter_frequency": ("flutter_frequency", 21),
+    "deflection_angle": ("deflection_angle", 22),
 }
 _FLAGS_NUMBER = 100
 _HOST_TIME_NUMBER = 101

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import importlib
 import math
 import os
 from collections.abc import Mapping
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from flagdata.align.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, UsageError
+from flagdata.ingest.anemometer.averaging import average
 from flagdata.record import messages
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
 from flagdata.record.video import VideoEncoder
@@ -55,7 +55,12 @@ class Coding(StrEnum):
     """foxglove.CompressedVideo: for archives, see `flagdata.record.video`."""
 
 
-_CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
+CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
+
+
+def library_name() -> str:
+    """What the header of a record says wrote it: the format, not the program's version, so that bytes last."""
+    return f"flagdata format {FORMAT_VERSION}"
 
 
 class RecordWriter:
@@ -97,11 +102,11 @@ class RecordWriter:
             raise ConflictError("the record exists already", where=str(path), fix="choose another path") from None
         self._writer = Writer(
             self._stream,
-            chunk_size=_CHUNK_BYTES[chunking],
+            chunk_size=CHUNK_BYTES[chunking],
             compression=CompressionType.NONE,
             enable_data_crcs=True,
         )
-        self._writer.start(profile=PROFILE, library=f"flagdata format {FORMAT_VERSION}")
+        self._writer.start(profile=PROFILE, library=library_name())
         self._names: set[str] = set()
         self._channels: dict[str, int] = {}
         self._sequences: dict[str, int] = {}
@@ -144,7 +149,9 @@ class RecordWriter:
         self._message(TOPIC_IMAGE, message, log_time=log_time, publish_time=publish_time)
 
     def wind(self, series: WindSeries, *, clock: ClockModel | None = None) -> None:
-        """Write all samples of an anemometer, and their means over 1 s of the common clock.
+        """Write all samples of an anemometer, and the means of its wind speed over 1 s of the common clock.
+
+        A log without wind over ground (only apparent wind from a moving platform, say) has no means.
 
         Args:
             series: on the device's own clock.
@@ -174,7 +181,8 @@ class RecordWriter:
             if hosts is not None:
                 messages.set_timestamp(sample.host_time, hosts[i])
             self._message(TOPIC_WIND, sample, log_time=log_time, publish_time=publish_time)
-        self._means(aligned)
+        if "wind_speed" in series.channels:
+            self._means(aligned)
 
     def truth(self, parameters: Mapping[str, float], *, log_time: int) -> None:
         """Write the parameters a simulated record was made with, by name, in SI.
@@ -238,10 +246,6 @@ class RecordWriter:
         self._writer.add_metadata(name, dict(values))
 
     def _means(self, aligned: WindSeries) -> None:
-        try:
-            average = importlib.import_module("flagdata.ingest.anemometer.averaging").average
-        except ModuleNotFoundError:
-            return
         means = average(aligned, MEAN_PERIOD)
         rows = zip(
             means.time.tolist(), means.speed.tolist(), means.sigma.tolist(), means.direction.tolist(),
