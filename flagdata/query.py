@@ -17,7 +17,7 @@ import pyarrow as pa
 
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake.refs import View
-from flagdata.schema import CATALOG, Field, Kind
+from flagdata.schema import CATALOG, Field, Kind, catalog_schema
 
 # name → (what it is, SQL over the stored columns). `start` and `end` stay exact to the nanosecond beside them.
 DERIVED: dict[str, tuple[Field, str]] = {
@@ -141,7 +141,7 @@ class Selection:
         relation = self._relation if self.request.limit is None else self._relation.limit(self.request.limit)
         with _explained(self.request):
             raw = relation.to_arrow_reader(size)
-        schema = pa.schema([self._described(field) for field in raw.schema])
+        schema = self._schema(raw.schema)
 
         def stream() -> Iterator[pa.RecordBatch]:
             while True:
@@ -160,11 +160,18 @@ class Selection:
         """The rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not."""
         return self.batches().read_all()
 
-    def _described(self, field: pa.Field) -> pa.Field:
-        known = COLUMNS.get(field.name) if self.request.sql is None else None
-        if known is None:
-            return field
-        return pa.field(field.name, known.type, metadata={"unit": known.unit, "about": known.about})
+    def _schema(self, raw: pa.Schema) -> pa.Schema:
+        """The catalog's own schema, for rows of the catalog; what free SQL makes has no description."""
+        if self.request.sql is not None:
+            return raw
+        if self.request.columns is None:
+            return catalog_schema()
+        return pa.schema([_field(name, COLUMNS[name]) for name in self.request.columns])
+
+
+def _field(name: str, field: Field) -> pa.Field:
+    about = {"unit": field.unit, "about": field.about}
+    return pa.field(name, field.type, nullable=field.nullable, metadata=about)
 
 
 def _view_columns() -> str:

@@ -60,5 +60,6 @@ def export(
         return
     files = manifest["files"]
     size = sum(file["bytes"] for file in files)
-    say(f"{manifest['artifacts']:,} artifacts of version {manifest['version']} in {len(files):,} files, {size:,} B")
+    noun = "artifact" if manifest["artifacts"] == 1 else "artifacts"
+    say(f"{manifest['artifacts']:,} {noun} of version {manifest['version']} in {len(files):,} files, {size:,} B")
     click.echo(target)
