@@ -22,12 +22,13 @@ VERBS: dict[str, tuple[str, str]] = {
     "tag": ("flagdata.commands.lake:tag", "Name a version for good."),
     "branch": ("flagdata.commands.lake:branch", "Create or list lines of work."),
     "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
+    "withdraw": ("flagdata.commands.lake:withdraw", "Take artifacts off a branch; tags keep them."),
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
     "export": ("flagdata.commands.export:export", "Write WebDataset, Parquet, MP4 + CSV or MCAP subsets."),
-    "verify": ("flagdata.commands.lake:verify", "Re-hash every object."),
-    "doctor": ("flagdata.commands.lake:doctor", "Find and explain what is wrong with a lake."),
-    "gc": ("flagdata.commands.lake:gc", "Delete what nothing refers to."),
-    "recover": ("flagdata.commands.lake:recover", "Salvage a record that was cut off."),
+    "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
+    "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake."),
+    "gc": ("flagdata.commands.upkeep:gc", "Delete what nothing refers to."),
+    "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
     "demo": ("measure.demo.command:demo", "Make a small field recording and take it through everything."),
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -87,6 +88,9 @@ class Artifact:
             value = getattr(self, column)
             if value is not None and value < 0:
                 raise self._bad(column, value, "a number that is not negative")
+        for column, value in vars(self).items():
+            if isinstance(value, float) and not math.isfinite(value):
+                raise self._bad(column, value, "a finite number, or None where it is not known")
         for column in _JSON_COLUMNS:
             text = getattr(self, column)
             if text is not None:

@@ -195,8 +195,12 @@ class Catalog:
         return sorted(path for path in self.path.glob("*.parquet") if path.name not in tracked)
 
     @_in_one_process
-    def history(self) -> list[dict[str, Any]]:
-        """One entry a version, newest first: version, timestamp (UTC ms), operation and what the writer said of it."""
+    def history(self, limit: int | None = None) -> list[dict[str, Any]]:
+        """One entry a version, newest first: version, timestamp (UTC ms), operation and what the writer said of it.
+
+        Args:
+            limit: the newest so many; all if `None`.
+        """
         return [
             {
                 "version": entry["version"],
@@ -204,7 +208,7 @@ class Catalog:
                 "operation": entry["operation"],
                 **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
             }
-            for entry in self._open(None).history()
+            for entry in self._open(None).history(limit)
         ]
 
     def _commit(

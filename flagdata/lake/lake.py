@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata import provenance
-from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog, newer, persist
@@ -22,7 +22,7 @@ from flagdata.lake.leases import keeping_collectors_out
 from flagdata.lake.objects import STORES, Objects
 from flagdata.lake.refs import MAIN, Refs, View
 from flagdata.lake.transaction import Transaction
-from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
+from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
@@ -122,8 +122,8 @@ class Lake:
         """Rows of the catalog in the order of commit, then start, then frame.
 
         Args:
-            where: an SQL expression over the columns of `schema.CATALOG`, as DuckDB reads it ("kind = 'clip' and
-                wind between 3 and 6"; the column "end" needs its quotes).
+            where: an SQL expression as in `flagdata.query` ("kind = 'clip' and wind between 3 and 6"; the column "end"
+                needs its quotes, `end_time` does not).
             at: tag, branch, version number or commit id; the head of main if `None`.
             columns: which to return, in this order; all if `None`.
 
@@ -260,16 +260,6 @@ class Lake:
 
 
 def _filter(table: pa.Table, where: str) -> pa.Table:
-    import duckdb
+    from flagdata.query import Request, Selection  # it knows what a view is, so it imports this package
 
-    with duckdb.connect(":memory:", config={"enable_external_access": "false"}) as connection:
-        connection.execute("SET TimeZone = 'UTC'")
-        try:
-            return connection.from_arrow(table).filter(where).to_arrow_table().cast(catalog_schema())
-        except duckdb.Error as error:
-            reason = str(error).strip().splitlines()
-            raise UsageError(
-                f"the filter is not an SQL expression over the catalog: {' '.join(reason)}",
-                where=where,
-                fix="columns are those of flagdata ls --json; texts go in single quotes, the column end in double",
-            ) from None
+    return Selection(table, Request(where=where, order="created, start, frame_first, artifact")).table()

@@ -1,0 +1,269 @@
+"""`flagdata init|ls|show|log|tag|branch|diff|withdraw`: looking at a lake and naming its versions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from flagdata.console import document, json_option, lake_option, say, table
+from flagdata.errors import UsageError
+
+if TYPE_CHECKING:
+    from flagdata.lake.refs import Ref
+
+_SHORT = 12  # characters of an id that are shown; look-ups take any unique beginning
+
+at_option = click.option(
+    "--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default."
+)
+
+
+@click.command()
+@click.argument("folder", required=False)
+@json_option
+@lake_option
+@click.pass_context
+def init(context: click.Context, folder: str | None, as_json: bool, lake_path: str) -> None:
+    """Create an empty lake in FOLDER, or where --lake says."""
+    from flagdata.lake import Lake
+    from flagdata.schema import FORMAT_VERSION
+
+    if folder is not None and context.get_parameter_source("lake_path") is ParameterSource.COMMANDLINE:
+        raise UsageError("two folders for one lake", fix="give FOLDER or --lake, not both")
+    lake = Lake.create(folder if folder is not None else lake_path)
+    if as_json:
+        document("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
+    else:
+        click.echo(lake.path)
+
+
+@click.command()
+@click.option("--kind", metavar="KIND", help="Only this kind: camera, wind, recording, clip, meshes, …")
+@at_option
+@json_option
+@lake_option
+def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
+    """List artifacts; filters and SQL are `flagdata query`'s."""
+    from flagdata.errors import UnknownNameError
+    from flagdata.lake import Lake
+    from flagdata.schema import Kind
+
+    if kind is not None and kind not in list(Kind):
+        raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
+    rows = Lake.open(lake_path).rows(None if kind is None else f"kind = '{kind}'", at=at).to_pylist()
+    if as_json:
+        document("ls", {"at": at, "artifacts": [_plain(row) for row in rows]})
+        return
+    header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
+    if rows:
+        table(header, [_line(row) for row in rows])
+    say(f"{len(rows)} artifacts" if rows else "no artifacts")
+
+
+@click.command()
+@click.argument("artifact")
+@at_option
+@json_option
+@lake_option
+def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
+    """Show one artifact: all it says, what it was made from and what was made from it."""
+    from flagdata.lake import Lake
+
+    lake = Lake.open(lake_path)
+    row = _plain(lake.artifact(artifact, at=at).row())
+    for column in ("recipe", "parameters", "clock_model", "report"):
+        row[column] = json.loads(row[column]) if row[column] else None
+    others = lake.rows(at=at, columns=["artifact", "kind", "name", "parents"]).to_pylist()
+    parents = [_relative(other) for other in others if other["artifact"] in row["parents"]]
+    children = [_relative(other) for other in others if row["artifact"] in other["parents"]]
+    path = lake.objects.path(row["object"]) if row["object"] else None
+    if as_json:
+        document(
+            "show", {"artifact": row, "path": str(path) if path else None, "parents": parents, "children": children}
+        )
+        return
+    for column, value in row.items():
+        if value is not None and value != [] and column not in ("parents", "report"):
+            click.echo(
+                f"{column:<15} {json.dumps(value, ensure_ascii=False) if isinstance(value, dict | list) else value}"
+            )
+    if path is not None:
+        click.echo(f"{'path':<15} {path}")
+    for label, relatives in (("made from", parents), ("made into", children)):
+        for relative in relatives:
+            click.echo(f"{label:<15} {relative['artifact'][:_SHORT]} {relative['kind']} {relative['name']}")
+    for finding in row["report"] if isinstance(row["report"], list) else []:
+        click.echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
+
+
+@click.command()
+@click.option("--limit", type=click.IntRange(min=1), help="The newest commits only.")
+@json_option
+@lake_option
+def log(limit: int | None, as_json: bool, lake_path: str) -> None:
+    """List commits, newest first."""
+    from flagdata.lake import Lake
+
+    entries = [
+        {
+            "version": entry["version"],
+            "commit": entry.get("commit"),
+            "time": datetime.fromtimestamp(entry["timestamp"] / 1000, UTC).isoformat(timespec="seconds"),
+            "branch": entry.get("branch"),
+            "added": int(entry.get("rows", 0)),
+            "withdrawn": int(entry.get("withdrawn", 0)),
+            "message": entry.get("message"),
+            "code_version": entry.get("code_version"),
+        }
+        for entry in Lake.open(lake_path).catalog.history(limit)
+    ]
+    if as_json:
+        document("log", {"commits": entries})
+    else:
+        columns = ("version", "commit", "time", "branch", "added", "withdrawn", "message")
+        table(columns, [[entry[column] for column in columns] for entry in entries])
+
+
+@click.command()
+@click.argument("name", required=False)
+@at_option
+@json_option
+@lake_option
+def tag(name: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
+    """Name what REF shows, for good; without NAME, list the tags."""
+    from flagdata.lake import Lake
+
+    lake = Lake.open(lake_path)
+    if name is not None:
+        lake.tag(name, at=at)
+    elif at is not None:
+        raise UsageError("--at without a NAME", fix="give the tag a NAME")
+    _print_refs("tags", lake.refs.tags(), name, as_json=as_json)
+
+
+@click.command()
+@click.argument("name", required=False)
+@at_option
+@json_option
+@lake_option
+def branch(name: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
+    """Begin a line of work NAME from what REF shows; without NAME, list the branches."""
+    from flagdata.lake import Lake
+
+    lake = Lake.open(lake_path)
+    if name is not None:
+        lake.branch(name, at=at)
+    elif at is not None:
+        raise UsageError("--at without a NAME", fix="give the branch a NAME")
+    _print_refs("branches", lake.refs.branches(), name, as_json=as_json)
+
+
+@click.command()
+@click.argument("before")
+@click.argument("after", required=False)
+@json_option
+@lake_option
+def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
+    """Rows and objects that AFTER has and BEFORE has not (+), and the other way round (-).
+
+    Both are tags, branches, version numbers or commits; AFTER is the head of main by default.
+    """
+    from flagdata.lake import Lake
+    from flagdata.lake.difference import difference
+
+    found = difference(Lake.open(lake_path), before, after)
+    added = [_relative(row) for row in found.added.to_pylist()]
+    removed = [_relative(row) for row in found.removed.to_pylist()]
+    if as_json:
+        content = {"before": before, "after": after, "added": added, "removed": removed}
+        objects = {"objects_added": list(found.objects_added), "objects_removed": list(found.objects_removed)}
+        document("diff", {**content, **objects})
+        return
+    for sign, rows, objects in (("+", added, found.objects_added), ("-", removed, found.objects_removed)):
+        for row in rows:
+            click.echo(f"{sign} {row['kind']:<11} {row['artifact'][:_SHORT]} {row['name']}")
+        for name in objects:
+            click.echo(f"{sign} object      {name}")
+    say(f"{len(added)} rows added, {len(removed)} removed")
+
+
+@click.command()
+@click.argument("artifacts", nargs=-1, required=True)
+@click.option("--message", "-m", required=True, help="Why.")
+@click.option("--branch", "branch_name", default="main", show_default=True, help="The branch to take them off.")
+@json_option
+@lake_option
+def withdraw(artifacts: tuple[str, ...], message: str, branch_name: str, as_json: bool, lake_path: str) -> None:
+    """Take artifacts off a branch. Tags keep showing them; gc frees what no ref shows any more."""
+    from flagdata.lake import Lake
+
+    lake = Lake.open(lake_path)
+    ids = [lake.artifact(artifact, at=branch_name).id for artifact in artifacts]
+    version = lake.withdraw(ids, message, branch=branch_name)
+    if as_json:
+        document("withdraw", {"version": version, "withdrawn": ids})
+    else:
+        click.echo(f"version {version}: {len(set(ids))} withdrawn from {branch_name}")
+
+
+def size_text(size: float | None) -> str:
+    """Bytes for people: "12.3 MB", decimal units."""
+    if size is None:
+        return ""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} TB"
+
+
+def _line(row: Mapping[str, Any]) -> list[object]:
+    from flagdata.timebase import iso
+
+    wind = "" if row["wind"] is None else f"{row['wind']:.2f}"
+    if row["wind"] is not None and row["wind_sigma"] is not None:
+        wind += f" ± {row['wind_sigma']:.2f}"
+    return [
+        row["artifact"][:_SHORT],
+        row["kind"],
+        row["name"],
+        "" if row["start"] is None else iso(row["start"] // 10**9 * 10**9),
+        row["frame_count"],
+        wind,
+        size_text(row["object_bytes"]),
+        ",".join(row["quality"]),
+    ]
+
+
+def _relative(row: Mapping[str, Any]) -> dict[str, str]:
+    return {"artifact": row["artifact"], "kind": row["kind"], "name": row["name"]}
+
+
+def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {column: value.isoformat() if isinstance(value, datetime) else value for column, value in row.items()}
+
+
+def _print_refs(noun: str, refs: Mapping[str, Ref], name: str | None, *, as_json: bool) -> None:
+    shown: Iterable[Ref] = refs.values() if name is None else [refs[name]]
+    entries = [
+        {
+            "name": ref.name,
+            "created": ref.created,
+            "view": [{"branch": part.branch, "version": part.version} for part in ref.view],
+        }
+        for ref in shown
+    ]
+    if as_json:
+        document(noun, {noun: entries})
+    elif entries:
+        table(
+            ("name", "created", "shows" if noun == "tags" else "begins at"),
+            [[ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)] for ref in shown],
+        )
+    else:
+        say(f"no {noun}")

@@ -1,0 +1,160 @@
+"""`flagdata verify|doctor|gc|recover`: is the lake whole, and putting it right."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from datetime import timedelta
+from pathlib import Path
+
+import click
+
+from flagdata.commands.lake import size_text
+from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.errors import ConflictError, NotFoundError
+from flagdata.findings import Finding
+
+_GATE_NOT_MET = 3
+_UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86_400}
+
+
+class Duration(click.ParamType):
+    """A time span on the command line: a number and s, m, h or d ("24h", "0s")."""
+
+    name = "duration"
+
+    def convert(self, value: str | timedelta, param: click.Parameter | None, ctx: click.Context | None) -> timedelta:
+        if isinstance(value, timedelta):
+            return value
+        match = re.fullmatch(r"(\d{1,9}(?:\.\d+)?)([smhd])", value.strip())
+        if match is None:
+            self.fail(f"{value!r} is not a duration; write it as 24h, 30m, 7d or 0s", param, ctx)
+        return timedelta(seconds=float(match[1]) * _UNITS[match[2]])
+
+
+grace_option = click.option(
+    "--older-than", "grace", type=Duration(), default="24h", show_default=True, metavar="AGE",
+    help="How old something must be, with nothing referring to it, to be garbage.",
+)  # fmt: skip
+
+
+@click.command()
+@click.option("--sample", type=click.IntRange(min=1), help="So many objects drawn at random, instead of all.")
+@json_option
+@lake_option
+def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
+    """Re-hash every object; exits with 3 when one is missing or has changed."""
+    from flagdata.lake import Lake
+    from flagdata.lake.health import object_names, sampled
+    from flagdata.lake.health import verify as verified
+
+    lake = Lake.open(lake_path)
+    names = object_names(lake)
+    chosen = names if sample is None else sampled(names, sample)
+    with progress(len(chosen), label="verify", unit="object") as advance:
+        findings = verified(lake, chosen, advance=advance)
+    _conclude("verify", findings, f"{len(chosen)} of {len(names)} objects re-hashed", as_json=as_json)
+
+
+@click.command()
+@click.option("--deep", is_flag=True, help="Re-hash every object, too.")
+@grace_option
+@json_option
+@lake_option
+def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
+    """Find and explain what is wrong; exits with 3 when there is something to act on."""
+    from flagdata.lake import Lake
+    from flagdata.lake.health import doctor as examined
+    from flagdata.lake.health import verify as verified
+
+    lake = Lake.open(lake_path)
+    findings = examined(lake, grace=grace)
+    checked = "structure checked, contents not (flagdata verify)"
+    if deep:
+        names = [stored.name for stored in lake.objects]
+        with progress(len(names), label="re-hash", unit="object") as advance:
+            findings += verified(lake, names, advance=advance)
+        checked = f"structure checked, {len(names)} objects re-hashed"
+    _conclude("doctor", findings, checked, as_json=as_json)
+
+
+@click.command()
+@grace_option
+@click.option("--dry-run", is_flag=True, help="Say what would be deleted, delete nothing.")
+@json_option
+@lake_option
+def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
+    """Delete what no branch, tag or running transaction refers to."""
+    from flagdata.lake import Lake
+    from flagdata.lake.collect import collect, garbage
+
+    lake = Lake.open(lake_path)
+    found = garbage(lake, grace=grace) if dry_run else collect(lake, grace=grace)
+    if as_json:
+        document(
+            "gc",
+            {
+                "deleted": not dry_run,
+                "objects": list(found.objects),
+                "leftovers": [str(path) for path in found.leftovers],
+                "bytes": found.size,
+            },
+        )
+        return
+    for name in (*found.objects, *map(str, found.leftovers)):
+        click.echo(name)
+    verb = "would be deleted" if dry_run else "deleted"
+    say(f"{len(found.objects)} objects and {len(found.leftovers)} leftovers, {size_text(found.size)}, {verb}")
+
+
+@click.command()
+@click.argument("source")
+@click.argument("target", type=click.Path(path_type=Path))
+@json_option
+@lake_option
+def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
+    """Salvage what a cut-off or damaged record still holds.
+
+    SOURCE is an .mcap file or an object of the lake (mcap/…); all that can be read goes to the new file TARGET.
+    """
+    from flagdata.lake import Lake
+    from flagdata.lake.artifact import OBJECT_NAME
+    from flagdata.record import salvage
+
+    path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else Path(source)
+    if not path.is_file():
+        raise NotFoundError(
+            "there is no such record", where=source, fix="give an .mcap file, or mcap/<sha256> of the lake"
+        )
+    if target.exists():
+        raise ConflictError("there is a file already", where=str(target), fix="choose a new name")
+    findings = salvage(path, target)
+    if as_json:
+        document("recover", {"source": str(path), "target": str(target), "findings": [f.as_dict() for f in findings]})
+        return
+    _print(findings)
+    click.echo(target)
+
+
+def _conclude(tag: str, findings: Sequence[Finding], checked: str, *, as_json: bool) -> None:
+    from flagdata.lake.health import is_healthy
+
+    healthy = is_healthy(findings)
+    if as_json:
+        document(tag, {"healthy": healthy, "checked": checked, "findings": [f.as_dict() for f in findings]})
+    else:
+        _print(findings)
+        click.echo("healthy" if healthy else "not healthy")
+        say(checked)
+    if not healthy:
+        sys.exit(_GATE_NOT_MET)
+
+
+def _print(findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        click.echo(f"{finding.severity}: {finding.kind}: {finding.what}")
+        if finding.where:
+            click.echo(f"  where: {finding.where}")
+        if finding.fix:
+            click.echo(f"  fix:   {finding.fix}")
