@@ -1,0 +1,315 @@
+"""The offset between a camera's and an anemometer's clock, from the flag itself.
+
+A flag moves more when the wind is stronger, a fraction of a second later. Neither the relation's shape nor its noise is
+known, so the estimator uses only that it rises:
+
+1. Wind x_k is the mean over bins of length P. Motion energy is averaged alike, at every P/10, so that a shift by any
+   multiple of P/10 is a choice of samples, not an interpolation.
+2. Both become normal scores, Φ⁻¹(rank): any monotone relation between Gaussian gusts and motion is then linear, and
+   outliers weigh no more than their rank (van der Waerden, 1952).
+3. The motion is modelled as y(t) = Σ a_w (G_w * x)(t + o) + e(t): Gaussians G_w of several widths with a_w ≥ 0, since
+   the quick gusts at the sensor are not those at the flag (Davenport, 1961: coherence exp(−c n d / U)), and e
+   autoregressive, φ(B) e = ε (Cochrane and Orcutt, 1949). Both are filtered by φ. Frequencies so count by their
+   signal-to-noise ratio: the time-domain form of the maximum-likelihood weighting of Knapp and Carter, IEEE Trans. ASSP
+   24 (1976) 320.
+4. r(o) is the correlation of the two at offset o over the n(o) bins that both cover, z = atanh(r) √(n − 3) its score.
+   The estimate is where z is greatest, refined by a parabola.
+5. σ is that of the regression y = g x(t + o) + ε in o, with dependent scores ψ_k = (y_k − g x_k) dx_k/dt:
+   σ² = Λ / (n (g var(dx/dt))²), Λ the long-run variance of ψ (Newey and West, 1987). Where exp(z²/2), the likelihood
+   over all of the peak, is wider than that, its standard deviation counts. The uncertainty of the flag's response and
+   of the stamps is added in quadrature.
+6. Chance is measured, not assumed: winds with the same spectrum and random phases (Theiler et al., 1992) go through
+   step 4, and a Gumbel distribution fitted to their greatest scores gives the probability of a score as high by
+   accident. A periodic wind stays periodic under this, and so fails by itself.
+
+Everything here is a function of its arguments: no files, no clocks, no random generator of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flagdata.align.bins import STEPS, LagBins
+from flagdata.align.motion import MotionSeries
+from flagdata.align.whitened import Whitened, fit
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.signals import Series, WindAverage
+
+_NINETY = 1.6448536269514722  # two-sided 90 % of a normal distribution
+_EULER = 0.5772156649015329
+
+
+@dataclass(frozen=True, kw_only=True)
+class LagSearch:
+    """What is searched, and what is asked of the answer.
+
+    Attributes:
+        centre: offset around which to search [s]: what the stamps say, 0 if they are believed.
+        window: the search goes from centre − window to centre + window [s].
+        response: time by which the flag's motion follows the wind at the anemometer [s]: about L/U for the flag itself,
+            less the delay of the sensor (distance constant / U), plus the way between the two.
+        response_sigma: its standard uncertainty [s]. It bounds from below what this method can know.
+        stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut to whole seconds.
+        overlap: least time both must cover [s].
+        gustiness: least standard deviation over mean of the binned wind. Below it the wind says nothing about time.
+        chance: greatest probability of such a peak by accident.
+        rival: a second peak at this share of the greatest score makes the estimate ambiguous.
+        sigma: greatest standard uncertainty that is still an answer [s].
+        surrogates: how many winds of random phase measure chance.
+    """
+
+    centre: float = 0.0
+    window: float = 120.0
+    response: float = 0.4
+    response_sigma: float = 0.15
+    stamp_sigma: float = 0.0
+    overlap: float = 120.0
+    gustiness: float = 0.03
+    chance: float = 0.01
+    rival: float = 0.8
+    sigma: float = 0.5
+    surrogates: int = 200
+
+    def __post_init__(self) -> None:
+        numbers = (self.centre, self.window, self.response, self.overlap, self.gustiness, self.chance, self.sigma)
+        if not all(math.isfinite(number) for number in numbers):
+            raise InputError("a lag search with numbers that are not finite", fix="give finite numbers")
+        if self.window <= 0 or self.overlap <= 0 or self.sigma <= 0:
+            raise InputError("window, overlap and sigma must be positive", fix="give seconds > 0")
+        if self.response_sigma < 0 or self.stamp_sigma < 0 or self.gustiness < 0:
+            raise InputError("uncertainties and gustiness must not be negative", fix="give numbers ≥ 0")
+        if not (0 < self.chance < 1 and 0 < self.rival < 1):
+            raise InputError("chance and rival are shares", fix="give numbers between 0 and 1")
+        if self.surrogates < 50:
+            raise InputError(f"{self.surrogates} surrogates cannot measure chance", fix="use 50 at least")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LagCurve:
+    """Agreement of motion and wind against the offset, for the plot.
+
+    Attributes:
+        offset: (m,) offsets tried [s].
+        score: (m,) z; NaN where the overlap is too short.
+        overlap: (m,) time covered by both [s].
+        chance_score: the score that `LagSearch.chance` of the accidental greatest ones exceed; NaN when not reached.
+    """
+
+    offset: Series
+    score: Series
+    overlap: Series
+    chance_score: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LagEstimate:
+    """An offset to add to the camera's clock to reach the wind's, and whether it may be used.
+
+    Attributes:
+        offset: [s]; NaN where there is no peak at all.
+        sigma: standard uncertainty, all parts [s].
+        sigma_statistical: the part that a longer recording would shrink [s].
+        interval: 90 % [s].
+        at: instant on the camera's clock at which it holds, mid-overlap [UTC ns].
+        confidence: probability that the peak is neither an accident nor a rival's; the interval is given that.
+        correlation: of filtered normal scores at the peak.
+        chance: probability of a score as high by accident.
+        bins: how many wind bins were compared at the peak.
+        findings: reasons; one of severity "error" refuses the estimate.
+        curve: the whole search.
+    """
+
+    offset: float
+    sigma: float
+    sigma_statistical: float
+    interval: tuple[float, float]
+    at: int
+    confidence: float
+    correlation: float
+    chance: float
+    bins: int
+    findings: tuple[Finding, ...]
+    curve: LagCurve
+
+    @property
+    def accepted(self) -> bool:
+        return not any(finding.severity is Severity.ERROR for finding in self.findings)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it was refused; empty when accepted."""
+        return tuple(finding.what for finding in self.findings if finding.severity is Severity.ERROR)
+
+
+def estimate_offset(
+    motion: MotionSeries, wind: WindAverage, *, search: LagSearch, generator: np.random.Generator
+) -> LagEstimate:
+    """Offset of the camera's clock from the wind's by the lag of the flag's motion (see the module's text).
+
+    Args:
+        motion: energy on the camera's clock; several values a wind bin.
+        wind: bins on one regular grid; missing bins are gaps.
+        generator: for the phases of the surrogate winds only; the offset does not depend on it.
+
+    Raises:
+        InputError: no wind bins, bins off their grid, or fewer than two motion values a bin.
+    """
+    bins = LagBins.of(motion, wind, centre=search.centre - search.response, window=search.window)
+    if bins.gustiness < search.gustiness:
+        return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
+    pair = fit(bins, overlap=search.overlap)
+    if pair is None:
+        return _nothing(bins, search, (*motion.findings, _short_overlap(bins.longest_overlap(), search)))
+    score, counts, best = pair.search(overlap=search.overlap)
+    peak = pair.peak(score, best)
+
+    location, scale = _accidents(pair, search, generator)
+    chance = -math.expm1(-math.exp(-(float(score[best]) - location) / scale))
+    rival, mass, spread = _lobe(bins.offsets, score, best)
+    statistical = max(peak.sigma, spread)
+    sigma = math.sqrt(statistical**2 + search.response_sigma**2 + search.stamp_sigma**2)
+    offset = peak.offset + search.response
+    estimate = LagEstimate(
+        offset=offset,
+        sigma=sigma,
+        sigma_statistical=statistical,
+        interval=(offset - _NINETY * sigma, offset + _NINETY * sigma),
+        at=bins.middle(best),
+        confidence=(1 - chance) * mass,
+        correlation=peak.correlation,
+        chance=chance,
+        bins=peak.bins,
+        findings=motion.findings,
+        curve=LagCurve(
+            offset=bins.offsets + search.response,
+            score=score,
+            overlap=counts * bins.period,
+            chance_score=float(location - scale * math.log(-math.log1p(-search.chance))),
+        ),
+    )
+    return replace(estimate, findings=(*motion.findings, *_judge(estimate, search, best=best, rival=rival)))
+
+
+def _accidents(pair: Whitened, search: LagSearch, generator: np.random.Generator) -> tuple[float, float]:
+    """Location and scale of the Gumbel distribution of the greatest score that winds of random phase reach."""
+    present = np.isfinite(pair.wind)
+    centred = np.where(present, pair.wind - np.mean(pair.wind[present]), 0.0)
+    spectrum = np.abs(np.fft.rfft(centred))[:, None]
+    phase = generator.uniform(0.0, 2 * math.pi, (len(spectrum), search.surrogates))
+    winds = np.fft.irfft(spectrum * np.exp(1j * phase), n=len(centred), axis=0)
+    scores, _ = pair.scores(winds, overlap=search.overlap)
+    greatest = np.max(scores[np.all(np.isfinite(scores), axis=1)], axis=0)
+    scale = float(np.std(greatest, ddof=1)) * math.sqrt(6) / math.pi
+    return float(np.mean(greatest)) - _EULER * scale, scale
+
+
+def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float, float]:
+    """The greatest score outside the peak's lobe, and the share and standard deviation [s] of exp(z²/2) inside it.
+
+    The lobe reaches to where the score first falls below half of its greatest, and two bins at least.
+    """
+    low = high = best
+    half = score[best] / 2
+    while low > 0 and score[low - 1] > half:
+        low -= 1
+    while high < len(score) - 1 and score[high + 1] > half:
+        high += 1
+    lobe = slice(max(min(low, best - 2 * STEPS), 0), max(high, best + 2 * STEPS) + 1)
+    outside = np.where(np.isfinite(score), score, -np.inf)
+    positive = np.maximum(outside, 0.0)
+    weight = np.where(positive > 0, np.exp((positive**2 - positive[best] ** 2) / 2), 0.0)
+    inside = weight[lobe] / weight[lobe].sum()
+    mean = float(inside @ offsets[lobe])
+    spread = math.sqrt(float(inside @ np.square(offsets[lobe] - mean)))
+    mass = float(weight[lobe].sum() / weight.sum())
+    outside[lobe] = -np.inf
+    rival = int(np.argmax(outside))
+    return (rival if np.isfinite(outside[rival]) else None), mass, spread
+
+
+def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | None) -> list[Finding]:
+    """What speaks against an estimate, and what the user should know of it."""
+    curve = estimate.curve
+    score = curve.score
+    found: list[Finding] = []
+    if estimate.chance > search.chance:
+        found.append(
+            _error(
+                "accidental-peak",
+                f"unrelated winds reach such a peak with probability {estimate.chance:.2g} (limit {search.chance:g})",
+                estimate.chance,
+            )
+        )
+    if rival is not None and score[rival] > search.rival * score[best]:
+        found.append(
+            _error(
+                "ambiguous-offset",
+                f"{curve.offset[rival]:+.1f} s fits {100 * score[rival] / score[best]:.0f} % as well as"
+                f" {curve.offset[best]:+.1f} s",
+                float(curve.offset[rival]),
+            )
+        )
+    usable = np.flatnonzero(np.isfinite(score))
+    if min(best - usable[0], usable[-1] - best) < 2 * STEPS:
+        found.append(
+            _error(
+                "offset-at-edge",
+                f"the best offset {curve.offset[best]:+.1f} s is at the edge of the"
+                f" {curve.offset[usable[0]]:+.1f} to {curve.offset[usable[-1]]:+.1f} s searched",
+                float(curve.offset[best]),
+            )
+        )
+    if not estimate.sigma <= search.sigma:
+        found.append(
+            _error(
+                "wide-offset",
+                f"the offset is known to {estimate.sigma:.2f} s only (limit {search.sigma:g} s)",
+                estimate.sigma if math.isfinite(estimate.sigma) else None,
+            )
+        )
+    return found
+
+
+def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
+    return _error(
+        "steady-wind",
+        f"the wind varies by {100 * bins.gustiness:.1f} % of its mean only (limit {100 * search.gustiness:g} %):"
+        " without gusts nothing ties the film to it",
+        bins.gustiness,
+    )
+
+
+def _short_overlap(longest: float, search: LagSearch) -> Finding:
+    return _error(
+        "short-overlap",
+        f"film and wind log share {longest:.0f} s at most at any offset searched (limit {search.overlap:g} s)",
+        longest,
+    )
+
+
+def _error(kind: str, what: str, value: float | None) -> Finding:
+    return Finding(kind=kind, severity=Severity.ERROR, what=what, value=value)
+
+
+def _nothing(bins: LagBins, search: LagSearch, findings: tuple[Finding, ...]) -> LagEstimate:
+    """A refusal before there is a peak."""
+    empty = np.full(len(bins.offsets), np.nan)
+    return LagEstimate(
+        offset=math.nan,
+        sigma=math.inf,
+        sigma_statistical=math.inf,
+        interval=(-math.inf, math.inf),
+        at=bins.first,
+        confidence=0.0,
+        correlation=math.nan,
+        chance=1.0,
+        bins=0,
+        findings=findings,
+        curve=LagCurve(
+            offset=bins.offsets + search.response, score=empty, overlap=np.zeros(len(empty)), chance_score=math.nan
+        ),
+    )

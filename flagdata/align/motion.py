@@ -1,0 +1,173 @@
+"""How much a flag moves, frame by frame: one number that rises with the wind, for finding the lag between two clocks.
+
+Successive frames are compared after what concerns the whole picture has been taken out. With I the newer and J the
+older frame, both averaged over square blocks,
+
+    I ≈ a + g J + s_x ∂J/∂x + s_y ∂J/∂y + motion,
+
+where a and g are flicker, exposure and gain, and (s_x, s_y) a small shift of the camera (the linearised brightness
+constancy of Lucas and Kanade, 1981). The four numbers are fitted by least squares and refitted without the blocks that
+move. The energy is what the residual holds above the noise of the same pair of frames,
+
+    E = mean(max(|residual| − 3 σ, 0)) / Δt,
+
+so that only the moving area counts, and no map of it has to be learnt first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.signals import Instants, Series
+from flagdata.timebase import NANOSECONDS
+
+BLOCKS = 60  # blocks along the shorter side of the picture
+LONGEST_GAP = 0.5  # s; frames further apart are not compared
+_LOW_QUANTILE = 0.2
+_LOW_QUANTILE_OF_HALF_NORMAL = 0.2533471031357997  # P(|z| < this) = 0.2 for a standard normal z
+_SHAKE = 0.5  # pixels of the original picture, root mean square
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionSeries:
+    """Motion energy on the camera's own clock.
+
+    Attributes:
+        time: (n,) midway between the two frames compared, UTC nanoseconds on the camera's clock, strictly increasing.
+        energy: (n,) mean brightness change above noise [gray levels/s], NaN where two frames were too far apart.
+        findings: what was noticed about the picture (camera shake, flicker, no motion).
+
+    Raises:
+        InputError: shapes that disagree, time that does not increase, or negative energies.
+    """
+
+    time: Instants
+    energy: Series
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.time.ndim != 1 or self.time.shape != self.energy.shape:
+            raise InputError(
+                f"motion with {self.time.shape} times and {self.energy.shape} energies", fix="give one energy a time"
+            )
+        if len(self.time) > 1 and not bool(np.all(np.diff(self.time) > 0)):
+            raise InputError("the times of the motion do not increase", fix="give the frames in order of time")
+        if bool(np.any(self.energy < 0)):
+            raise InputError("a negative motion energy", fix="give mean absolute differences or another energy ≥ 0")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def motion_energy(frames: Iterable[tuple[int, NDArray[np.uint8]]]) -> MotionSeries:
+    """Motion energy of a film, in one pass, holding two reduced frames at a time.
+
+    Args:
+        frames: (instant [UTC ns on the camera's clock], (height, width) uint8 gray), in order of time; all of one size.
+
+    Raises:
+        InputError: fewer than two frames, frames of different sizes, or times that do not increase.
+    """
+    times: list[int] = []
+    energies: list[float] = []
+    shifts: list[float] = []
+    gains: list[float] = []
+    before: NDArray[np.float32] | None = None
+    before_time = 0
+    before_shape: tuple[int, ...] = ()
+    block = 1
+    for time, image in frames:
+        if before is None:
+            block = max(1, min(image.shape) // BLOCKS)
+            before_shape = image.shape
+        if image.shape != before_shape:
+            raise InputError(
+                f"a frame of {image.shape} after frames of {before_shape}", fix="crop all frames to one size"
+            )
+        reduced = _reduce(image, block)
+        if before is not None:
+            if time <= before_time:
+                raise InputError(
+                    f"frame {len(times) + 1} is not later than the one before it",
+                    fix="give the frames in order of time",
+                )
+            gap = (time - before_time) / NANOSECONDS
+            times.append(before_time + (time - before_time) // 2)
+            if gap > LONGEST_GAP:
+                energies.append(math.nan)
+            else:
+                change, gain, shift = _change(before, reduced, block)
+                energies.append(change / gap)
+                gains.append(gain)
+                shifts.append(shift * block)
+        before, before_time = reduced, time
+    if not times:
+        raise InputError("motion needs two frames at least", fix="give a longer film")
+    return MotionSeries(
+        time=np.array(times, dtype=np.int64), energy=np.array(energies), findings=_findings(energies, shifts, gains)
+    )
+
+
+def _reduce(image: NDArray[np.uint8], block: int) -> NDArray[np.float32]:
+    """Means over `block` × `block` pixels; rows and columns that do not fill a block are left out."""
+    height, width = image.shape[0] // block, image.shape[1] // block
+    whole = image[: height * block, : width * block]
+    return whole.reshape(height, block, width, block).mean(axis=(1, 3), dtype=np.float32)
+
+
+def _change(before: NDArray[np.float32], after: NDArray[np.float32], block: int) -> tuple[float, float, float]:
+    """Mean change above noise [gray levels], the gain, and the shift [blocks] between two reduced frames."""
+    grad_y, grad_x = np.gradient(before) if min(before.shape) > 1 else (np.zeros_like(before), np.zeros_like(before))
+    centre = float(before.mean())
+    columns = np.stack(
+        [np.ones(before.size), (before - centre).ravel(), grad_x.ravel(), grad_y.ravel()], axis=1
+    )  # (blocks, 4)
+    target = after.ravel().astype(np.float64) - centre
+    keep = np.ones(before.size, dtype=bool)
+    parameters = np.zeros(4)
+    sigma = 0.0
+    least = 0.3 / block  # the rounding of 8-bit pixels, averaged over a block
+    residual = target
+    for _ in range(3):
+        parameters = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-6)[0]
+        residual = np.abs(target - columns @ parameters)
+        sigma = max(float(np.quantile(residual, _LOW_QUANTILE)) / _LOW_QUANTILE_OF_HALF_NORMAL, least)
+        keep = residual < 3 * sigma
+        if np.count_nonzero(keep) < max(8, 0.1 * before.size):
+            break
+    change = float(np.mean(np.maximum(residual - 3 * sigma, 0.0)))
+    return change, float(parameters[1]), float(math.hypot(parameters[2], parameters[3]))
+
+
+def _findings(energies: list[float], shifts: list[float], gains: list[float]) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+    shake = math.sqrt(float(np.mean(np.square(shifts)))) if shifts else 0.0
+    if shake > _SHAKE:
+        found.append(
+            Finding(
+                kind="camera-shake",
+                severity=Severity.WARNING,
+                what=f"the whole picture moves by {shake:.1f} pixels a frame (rms); taken out to first order",
+                value=shake,
+            )
+        )
+    flicker = float(np.std(gains)) if gains else 0.0
+    if flicker > 0.02:
+        found.append(
+            Finding(
+                kind="brightness-flicker",
+                severity=Severity.NOTE,
+                what=f"the brightness of the whole picture varies by {100 * flicker:.1f} % a frame; taken out",
+                value=flicker,
+            )
+        )
+    if energies and not np.nanmax(np.array([0.0, *energies])) > 0:
+        found.append(Finding(kind="no-motion", severity=Severity.ERROR, what="nothing moves in the picture"))
+    return tuple(found)

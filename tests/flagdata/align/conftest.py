@@ -1,0 +1,137 @@
+"""Gusts, an anemometer and a flag, made from published spectra and independent of the estimators under test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from flagdata.align.motion import MotionSeries
+from flagdata.rng import stream
+from flagdata.signals import WindAverage
+
+SECOND = 1_000_000_000
+START = 1_780_000_000 * SECOND
+FINE = 20  # samples of the true wind a second
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A ten-minute film beside an anemometer whose clock differs by `offset`; all that varies between cases.
+
+    The true wind has von Kármán's spectrum n S(n)/σ² = 4 f / (1 + 70.8 f²)^(5/6), f = n L / U (IEC 61400-1, B.13).
+    """
+
+    seed: int
+    offset: float = 0.0
+    duration: float = 600.0
+    margin: float = 150.0
+    mean: float = 6.0
+    turbulence: float = 0.18
+    length: float = 70.0
+    sensor_noise: float = 0.1
+    flag_noise: float = 0.35
+    exponent: float = 1.6
+    response: float = 0.4
+    memory: float = 0.5
+    apart: float = 3.0
+    drift: float = 0.0
+    period: float = 1.0
+
+
+def gusts(scene: Scene, generator: np.random.Generator, seconds: float) -> np.ndarray:
+    """Zero-mean gusts of unit variance at FINE samples a second, by random phases and von Kármán amplitudes."""
+    count = round(seconds * FINE)
+    frequency = np.fft.rfftfreq(count, 1 / FINE)[1:]
+    reduced = frequency * scene.length / scene.mean
+    spectrum = 4 * reduced / (1 + 70.8 * reduced**2) ** (5 / 6) / frequency
+    amplitude = np.sqrt(spectrum) * (
+        generator.standard_normal(len(spectrum)) + 1j * generator.standard_normal(len(spectrum))
+    )
+    series = np.fft.irfft(np.concatenate([[0], amplitude]), n=count)
+    return series / np.std(series)
+
+
+def lagged(series: np.ndarray, seconds: float) -> np.ndarray:
+    """First-order lag with a time constant."""
+    keep = np.exp(-1 / (FINE * seconds))
+    out = np.empty_like(series)
+    state = series[0]
+    for index, value in enumerate(series):
+        state = keep * state + (1 - keep) * value
+        out[index] = state
+    return out
+
+
+def red_noise(generator: np.random.Generator, count: int, steps: float) -> np.ndarray:
+    """Gauss–Markov noise of unit variance with a correlation length in samples."""
+    keep = np.exp(-1 / steps)
+    kicks = generator.standard_normal(count) * np.sqrt(1 - keep**2)
+    out = np.empty(count)
+    state = generator.standard_normal()
+    for index, kick in enumerate(kicks):
+        state = keep * state + kick
+        out[index] = state
+    return out
+
+
+def make(
+    scene: Scene, *, gust: np.ndarray | None = None, other: np.ndarray | None = None
+) -> tuple[MotionSeries, WindAverage]:
+    """The motion on the camera's clock and the 1 Hz wind on its own: common = camera + offset.
+
+    Args:
+        gust: replaces von Kármán's gusts.
+        other: replaces the gusts at the flag only, for unrelated pairs.
+    """
+    generator = stream(scene.seed, "scene")
+    seconds = scene.duration + 2 * scene.margin
+    here = gusts(scene, generator, seconds) if gust is None else gust
+    # Taylor's frozen gusts between the two places, less what decays on the way: coherence exp(−8 n d / U) (Davenport).
+    spectrum = np.fft.rfft(here)
+    frequency = np.fft.rfftfreq(len(here), 1 / FINE)
+    coherence = np.exp(-8 * frequency * scene.apart / scene.mean)
+    fresh = np.fft.rfft(gusts(scene, stream(scene.seed, "fresh"), seconds)) if gust is None else np.zeros(len(spectrum))
+    there = np.fft.irfft(spectrum * np.sqrt(coherence) + fresh * np.sqrt(1 - coherence), n=len(here))
+    if gust is not None:
+        there = here
+    if other is not None:
+        there = other
+    speed_here = np.maximum(scene.mean * (1 + scene.turbulence * here), 0.1)
+    speed_there = np.maximum(scene.mean * (1 + scene.turbulence * there), 0.1)
+
+    per_bin = round(FINE * scene.period)
+    bins = len(here) // per_bin
+    binned = speed_here[: bins * per_bin].reshape(bins, per_bin).mean(axis=1)
+    binned = np.round(binned + scene.sensor_noise * generator.standard_normal(bins), 1)
+    wind_time = START + np.round((np.arange(1, bins + 1) * scene.period) * SECOND).astype(np.int64)
+    wind = WindAverage(
+        time=wind_time, speed=binned, sigma=np.full(bins, 0.1), direction=np.full(bins, np.nan),
+        count=np.ones(bins, dtype=np.int32), period=scene.period,
+    )  # fmt: skip
+
+    felt = lagged(speed_there, scene.memory)
+    rate = 25.0
+    frames = round(scene.duration * rate)
+    true = scene.margin + np.arange(frames) / rate
+    delay = scene.response - scene.memory if scene.response > scene.memory else 0.0
+    drive = np.interp(true - delay, np.arange(len(felt)) / FINE, felt)
+    flutter = red_noise(generator, frames, 0.7 * rate) + 0.7 * generator.standard_normal(frames)
+    energy = drive**scene.exponent * np.exp(scene.flag_noise * flutter)
+    camera = true - scene.offset - scene.drift * (true - seconds / 2)
+    motion = MotionSeries(time=START + np.round(camera * SECOND).astype(np.int64), energy=energy)
+    return motion, wind
+
+
+@pytest.fixture(scope="session")
+def scene() -> Callable[..., tuple[MotionSeries, WindAverage]]:
+    """`scene(seed=1, offset=12.3, …)`: a film's motion and an anemometer's averages."""
+
+    def build(
+        *, gust: np.ndarray | None = None, other: np.ndarray | None = None, **changes: float
+    ) -> tuple[MotionSeries, WindAverage]:
+        return make(Scene(**changes), gust=gust, other=other)  # type: ignore[arg-type]
+
+    return build
