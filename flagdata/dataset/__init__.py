@@ -1,1 +1,68 @@
-"""Typed, synchronized pairs of clips and ground truth, out of the lake."""
+"""Typed, synchronized pairs of clips and ground truth, out of the lake.
+
+    import flagdata
+    from flagdata.dataset import Tolerance
+
+    lake = flagdata.open("lake")
+    pairs = lake.pairs("wind between 3 and 6", at="v1", split="train", tolerance=Tolerance(coverage=0.9))
+    for batch in pairs.loader(32, workers=2):
+        batch.clip, batch.wind, batch.wind_sigma
+
+Names are imported when they are first used: cutting clips needs no torch.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flagdata.dataset.cache import DecodedCache
+    from flagdata.dataset.clips import clip_rows
+    from flagdata.dataset.loader import PairLoader
+    from flagdata.dataset.pairs import Pairs
+    from flagdata.dataset.resolve import Refusal, Tolerance
+    from flagdata.dataset.sample import Batch, Sample, collate
+    from flagdata.dataset.source import Source
+    from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+    from flagdata.dataset.truth import TruthSeries, WindTruth
+
+__all__ = [
+    "Batch",
+    "DecodedCache",
+    "ExplicitSplit",
+    "HashedSplit",
+    "PairLoader",
+    "Pairs",
+    "Refusal",
+    "Sample",
+    "Source",
+    "Tolerance",
+    "TruthSeries",
+    "WindTruth",
+    "clip_rows",
+    "collate",
+]
+
+_PLACES = {
+    "Batch": "sample",
+    "DecodedCache": "cache",
+    "ExplicitSplit": "splits",
+    "HashedSplit": "splits",
+    "PairLoader": "loader",
+    "Pairs": "pairs",
+    "Refusal": "resolve",
+    "Sample": "sample",
+    "Source": "source",
+    "Tolerance": "resolve",
+    "TruthSeries": "truth",
+    "WindTruth": "truth",
+    "clip_rows": "clips",
+    "collate": "sample",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)

@@ -72,6 +72,8 @@ def clip_rows(record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES)
         last = first + frames - 1
         end = int(times[last])
         sigma = float(clock.sigma(record.device_frame_times[last])) if clock else recording.clock_sigma
+        if sigma is None and recording.seed is not None:
+            sigma = 0.0  # a simulation has one clock
         truth = clip_truth(series, end, known=known.get(TRUTH_SPEED), clock_sigma=sigma, window=TRUTH_WINDOW)
         start = int(times[first])
         rows.append(

@@ -90,7 +90,7 @@ def add_recording(lake: Lake, made: Made) -> str:
             name=f"recording {made.number}",
             object=transaction.put(path),
             parents=(source.id,) if source else (),
-            recipe={"number": made.number},
+            recipe={"number": made.number, "start": made.start},
             session=made.session,
             seed=made.seed,
             rate=25.0,

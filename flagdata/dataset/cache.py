@@ -1,0 +1,161 @@
+"""Decoded clips on disk, so that an epoch after the first does not decode JPEG. Optional, outside the lake, disposable.
+
+One file a clip: a header line of JSON (what it holds, its shape and checksum) and the raw frames. Files are written
+beside and renamed, so that any number of processes share a cache; one that finds a clip missing decodes it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError
+from flagdata.lake.durable import disk_errors
+
+_FORMAT = "flagdata.decoded/1"
+_SUFFIX = ".clip"
+_WRITING = "writing.part"  # the one file being written; only under the lock
+_TALLY = "tally"  # the lock, and in it the bytes of all clips
+_MAX_HEADER = 4096  # B
+_ROOM = 0.9  # eviction goes down to this share of the limit, so that it is not needed at every write
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Entry:
+    path: Path
+    size: int
+    read: int
+    """When it was last read [ns]."""
+
+
+class DecodedCache:
+    """A folder of decoded clips, at most `limit` bytes.
+
+    A clip is found by its object's content hash and its frames, so a cached clip never goes stale. Its checksum is
+    compared the first time a process reads it; a damaged or foreign file is deleted and the clip decoded anew. When the
+    folder is full, the clips that were read least recently go.
+
+    Args:
+        path: the folder; made if it is not there. Not inside a lake.
+        limit: [B].
+
+    Raises:
+        UsageError: no room for anything, or a folder inside a lake.
+    """
+
+    def __init__(self, path: Path | str, *, limit: int) -> None:
+        self.path = Path(path).absolute()
+        self.limit = limit
+        if limit < 1:
+            raise UsageError(f"a cache of {limit} bytes", fix="give a limit above zero")
+        for folder in (self.path, *self.path.parents):
+            if (folder / "lake.json").exists():
+                raise UsageError(
+                    "a cache inside a lake", where=str(self.path), fix="choose a folder outside it: it is disposable"
+                )
+        self.path.mkdir(parents=True, exist_ok=True)
+        self._verified: set[str] = set()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_verified": set()}
+
+    def frames(
+        self, object_name: str, first: int, count: int, *, decode: Callable[[], NDArray[np.uint8]]
+    ) -> NDArray[np.uint8]:
+        """Frames (count, height, width) of an object, from the cache or else by `decode`, which fills it."""
+        name = hashlib.sha256(f"{object_name}\n{first}\n{count}".encode()).hexdigest() + _SUFFIX
+        identity = {"format": _FORMAT, "object": object_name, "first": first, "count": count}
+        frames = self._read(name, identity)
+        if frames is None:
+            frames = decode()
+            self._write(name, identity, frames)
+        return frames
+
+    def size(self) -> int:
+        """Bytes of the clips in the folder now."""
+        return sum(entry.size for entry in self._entries())
+
+    def _read(self, name: str, identity: dict[str, Any]) -> NDArray[np.uint8] | None:
+        path = self.path / name
+        try:
+            with path.open("rb") as stream:
+                line = stream.readline(_MAX_HEADER)
+                header = json.loads(line)
+                shape = tuple(header["shape"])
+                data = np.fromfile(stream, dtype=np.uint8)
+                os.utime(stream.fileno())
+        except FileNotFoundError:
+            return None
+        except (ValueError, KeyError, TypeError):
+            path.unlink(missing_ok=True)
+            return None
+        sound = {k: header.get(k) for k in identity} == identity and data.size == int(np.prod(shape))
+        if sound and name not in self._verified:
+            sound = zlib.crc32(data.data) == header.get("crc32")
+        if not sound:
+            path.unlink(missing_ok=True)
+            return None
+        self._verified.add(name)
+        return data.reshape(shape)
+
+    def _write(self, name: str, identity: dict[str, Any], frames: NDArray[np.uint8]) -> None:
+        pixels = np.ascontiguousarray(frames).data
+        line = json.dumps({**identity, "shape": list(frames.shape), "crc32": zlib.crc32(pixels)}).encode() + b"\n"
+        size = len(line) + frames.nbytes
+        if size > self.limit:
+            return
+        with disk_errors("writing the decoded cache", self.path), self._locked() as tally:
+            self._take_room(tally, size)
+            written = self.path / _WRITING
+            with written.open("wb") as stream:
+                stream.write(line)
+                stream.write(pixels)
+            written.replace(self.path / name)
+
+    def _take_room(self, tally: BinaryIO, size: int) -> None:
+        """Add `size` to the tally of bytes, evicting when it would exceed the limit. Counted before the file is there,
+        so that a crash leaves the tally too high at worst; it is counted anew before anything is evicted."""
+        text = tally.read()
+        entries: list[_Entry] | None = None if text.isdigit() else self._entries()
+        total = int(text) if entries is None else sum(entry.size for entry in entries)
+        if total + size > self.limit:
+            entries = self._entries() if entries is None else entries
+            total = sum(entry.size for entry in entries)
+            room = self.limit if total + size <= self.limit else _ROOM * self.limit
+            for entry in sorted(entries, key=lambda entry: entry.read):
+                if total + size <= room:
+                    break
+                entry.path.unlink(missing_ok=True)
+                total -= entry.size
+        tally.seek(0)
+        tally.truncate()
+        tally.write(str(total + size).encode())
+
+    def _entries(self) -> list[_Entry]:
+        entries: list[_Entry] = []
+        with os.scandir(self.path) as found:
+            for entry in found:
+                if entry.name.endswith(_SUFFIX):
+                    with contextlib.suppress(FileNotFoundError):
+                        status = entry.stat()
+                        entries.append(_Entry(path=Path(entry.path), size=status.st_size, read=status.st_mtime_ns))
+        return entries
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[BinaryIO]:
+        """One writer at a time, across processes; the lock dies with its holder. Yields the tally, at its start."""
+        with (self.path / _TALLY).open("a+b") as tally:
+            fcntl.flock(tally, fcntl.LOCK_EX)
+            tally.seek(0)
+            yield tally

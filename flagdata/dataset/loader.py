@@ -1,0 +1,174 @@
+"""Batches in an order that depends on (data, seed, epoch) alone, with a cursor that can be saved and restored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import numpy as np
+import torch
+from torch.utils.data import DataLoader
+
+from flagdata.dataset.sample import Batch, collate
+from flagdata.errors import RefusedError, UsageError
+from flagdata.rng import stream
+
+if TYPE_CHECKING:
+    from flagdata.dataset.pairs import Pairs
+
+Order: TypeAlias = Literal["shuffled", "stored"]
+Last: TypeAlias = Literal["keep", "drop"]
+Memory: TypeAlias = Literal["pageable", "pinned"]
+State: TypeAlias = dict[str, str | int | None]
+
+_MOVING = ("epoch", "cursor", "at")  # parts of a state that may differ from the loader that takes it up
+
+
+class PairLoader:
+    """Iterates over the batches of one epoch; a new iteration after the end begins the next epoch.
+
+    The order of an epoch depends on the pairs, the seed and the epoch's number, never on the number of workers. An
+    iteration that was left early is taken up where it stopped, in this process or, through `state_dict`, in another.
+
+    Args:
+        pairs: the dataset.
+        batch_size: pairs a batch.
+        workers: processes that read and decode; 0 reads in this one.
+        order: "shuffled" anew each epoch, or as "stored": by recording and frame.
+        last: whether to "keep" or "drop" the last batch when it is not full.
+        memory: "pinned" copies batches to page-locked memory for transfer to a GPU.
+        start_method: of the workers, "fork", "spawn" or "forkserver"; `None` is the platform's.
+
+    Attributes:
+        epoch: number of the epoch that the next batch belongs to, from 0.
+        cursor: batches of it that were handed out.
+
+    Raises:
+        UsageError: sizes that cannot be, or an unknown option.
+    """
+
+    def __init__(
+        self,
+        pairs: Pairs,
+        *,
+        batch_size: int,
+        workers: int = 0,
+        order: Order = "shuffled",
+        last: Last = "keep",
+        memory: Memory = "pageable",
+        start_method: str | None = None,
+    ) -> None:
+        if batch_size < 1 or workers < 0:
+            raise UsageError(f"batches of {batch_size} with {workers} workers", fix="give at least 1 and 0")
+        for option, value, known in (
+            ("order", order, ("shuffled", "stored")),
+            ("last", last, ("keep", "drop")),
+            ("memory", memory, ("pageable", "pinned")),
+        ):
+            if value not in known:
+                raise UsageError(f"{option} {value!r}", fix=f"give {' or '.join(map(repr, known))}")
+        if start_method is not None and workers == 0:
+            raise UsageError(f"start method {start_method!r} without workers", fix="give workers, or leave it out")
+        if last == "drop" and len(pairs) < batch_size:
+            raise UsageError(
+                f"{len(pairs)} pairs do not fill one batch of {batch_size}", fix="give a smaller batch, or last='keep'"
+            )
+        self.pairs = pairs
+        self.epoch = 0
+        self.cursor = 0
+        self._batch_size = batch_size
+        self._order: Order = order
+        self._last: Last = last
+        self._todo: list[list[int]] = []
+        self._iteration = 0
+        self._loader = DataLoader(
+            pairs,
+            batch_sampler=_Todo(self),
+            num_workers=workers,
+            collate_fn=collate,
+            pin_memory=memory == "pinned",
+            persistent_workers=workers > 0,
+            multiprocessing_context=start_method,
+            generator=torch.Generator(),  # its own, so that loading draws nothing from the global stream
+        )
+
+    def __len__(self) -> int:
+        """Batches in a whole epoch."""
+        whole, rest = divmod(len(self.pairs), self._batch_size)
+        return whole + (rest > 0 and self._last == "keep")
+
+    def batches(self, epoch: int) -> list[list[int]]:
+        """Indices of the pairs in each batch of an epoch, in order."""
+        n, size = len(self.pairs), self._batch_size
+        shuffled = self._order == "shuffled"
+        order = stream(self.pairs.seed, "pairs", "order", epoch).permutation(n) if shuffled else np.arange(n)
+        return [order[k * size : (k + 1) * size].tolist() for k in range(len(self))]
+
+    def __iter__(self) -> Iterator[Batch]:
+        """The batches of the epoch that are left.
+
+        Raises:
+            UsageError: while stepping, when another iteration of this loader has begun since.
+        """
+        self._iteration += 1
+        return self._run(self._iteration)
+
+    def _run(self, iteration: int) -> Iterator[Batch]:
+        self._todo = self.batches(self.epoch)[self.cursor :]
+        for batch in self._loader:
+            if iteration != self._iteration:
+                raise UsageError("another iteration of this loader has begun", fix="use one loader for each iteration")
+            self.cursor += 1
+            if self.cursor == len(self):
+                self.epoch, self.cursor = self.epoch + 1, 0
+            yield batch
+
+    def state_dict(self) -> State:
+        """Everything that determines the batches still to come; put it into the checkpoint beside the model."""
+        return {
+            "at": self.pairs.at,
+            "fingerprint": self.pairs.fingerprint,
+            "seed": self.pairs.seed,
+            "batch_size": self._batch_size,
+            "order": self._order,
+            "last": self._last,
+            "epoch": self.epoch,
+            "cursor": self.cursor,
+        }
+
+    def load_state_dict(self, state: Mapping[str, str | int | None]) -> None:
+        """Go to where `state` was taken: the next iteration gives the same batches, bit for bit.
+
+        Raises:
+            RefusedError: it was taken of other data, another seed, or other batches.
+            UsageError: it is not a state of a loader.
+        """
+        own = self.state_dict()
+        if set(state) != set(own):
+            raise UsageError("this is not a state of a loader of pairs", fix="give what state_dict returned")
+        different = [name for name in own if name not in _MOVING and state[name] != own[name]]
+        if different:
+            named = "; ".join(f"{name} was {state[name]!r}, is {own[name]!r}" for name in different)
+            raise RefusedError(
+                f"the state is of other batches: {named}",
+                where=f"data at {state['at'] or 'the head of main'}",
+                fix="resolve the query at the same tag, with the same options",
+            )
+        epoch, cursor = state["epoch"], state["cursor"]
+        if not (isinstance(epoch, int) and isinstance(cursor, int) and epoch >= 0 and 0 <= cursor < len(self)):
+            raise UsageError(f"no batch {cursor!r} in epoch {epoch!r}", fix="give what state_dict returned")
+        self._iteration += 1
+        self.epoch, self.cursor = epoch, cursor
+
+
+class _Todo:
+    """The batch sampler that the `DataLoader` asks for the lists of indices left in the epoch."""
+
+    def __init__(self, loader: PairLoader) -> None:
+        self._loader = loader
+
+    def __iter__(self) -> Iterator[list[int]]:
+        return iter(self._loader._todo)
+
+    def __len__(self) -> int:
+        return len(self._loader._todo)

@@ -1,0 +1,244 @@
+"""A query becomes pairs, in the parent process: rows, side of the split, ground truth of the window, tolerance."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from flagdata.dataset.clips import TRUTH_SPEED, clip_truth
+from flagdata.dataset.splits import ExplicitSplit, HashedSplit, Origin, check_side, groups, refuse_leaks
+from flagdata.dataset.table import COLUMNS, PairTable
+from flagdata.dataset.truth import TruthSeries
+from flagdata.errors import NotFoundError, RefusedError, UsageError
+from flagdata.lake import Lake
+from flagdata.query import Request, Selection
+from flagdata.record import Record
+from flagdata.schema import Kind
+
+_ORIGIN = ("artifact", "recording", "session", "seed", "day")
+_SOURCES = (Kind.CAMERA, Kind.MESHES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerance:
+    """How uncertain a pair may be. A pair outside is refused with the reason, never filled in.
+
+    Attributes:
+        clock_sigma: of the camera's clock on the wind's, at most [s].
+        staleness: age of the newest wind sample at the clip's end, at most [s].
+        coverage: share of the window that wind samples speak for, at least.
+
+    Raises:
+        UsageError: a bound that is not a number of its kind.
+    """
+
+    clock_sigma: float = 1.0
+    staleness: float = 5.0
+    coverage: float = 0.8
+
+    def __post_init__(self) -> None:
+        if not (self.clock_sigma >= 0 and self.staleness >= 0 and 0 <= self.coverage <= 1):
+            raise UsageError(f"{self}", fix="give σ and staleness of 0 s or more, and a coverage between 0 and 1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refusal:
+    """A pair that was refused, and every reason for it."""
+
+    artifact: str
+    recording: str
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resolved:
+    """The pairs of a query and those it refused."""
+
+    table: PairTable
+    refused: tuple[Refusal, ...]
+
+
+def resolve(
+    lake: Lake,
+    *,
+    where: str | None,
+    at: str | None,
+    split: str | None,
+    split_by: HashedSplit | ExplicitSplit,
+    window: float,
+    tolerance: Tolerance,
+) -> Resolved:
+    """Pairs of `lake` at one version; arguments as in `Source.pairs`, which see for what it raises."""
+    if not (math.isfinite(window) and window > 0):
+        raise UsageError(f"a window of {window} s", fix="give a length above zero")
+    catalog = lake.table(lake.view(at))
+    clips = _clips(catalog, where, COLUMNS)
+    if not clips.num_rows:
+        raise NotFoundError(
+            "no clips match", where=where, fix="align recordings first, or widen the filter; flagdata query shows rows"
+        )
+    table = PairTable.of(clips)
+    if split is not None:
+        check_side(split, split_by)
+        if isinstance(split_by, ExplicitSplit):
+            wanted = _explicit_side(catalog, split_by, split)
+        else:
+            wanted = _hashed_side(catalog, split_by, split)
+        table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))
+        if not len(table):
+            count = len(set(groups(_origins(catalog, _clips(catalog, None, _ORIGIN))).tolist()))
+            raise RefusedError(
+                f"split {split!r} holds none of the clips; the catalog has {count} independent groups",
+                where=where,
+                fix="record more days and sessions, or give an ExplicitSplit",
+            )
+    table = _with_window(lake, table, _windows(clips, table), window)
+    refused = _judge(table, tolerance)
+    kept = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
+    if not kept.any():
+        first = next(iter(refused.values()))
+        raise RefusedError(
+            f"all {len(table)} pairs are outside the tolerance; the first: {'; '.join(first.reasons)}",
+            where=f"clip {first.artifact}",
+            fix="give a wider Tolerance, or improve the recording's wind log or clock",
+        )
+    return Resolved(table=table.take(kept), refused=tuple(refused.values()))
+
+
+def _clips(catalog: pa.Table, where: str | None, columns: tuple[str, ...]) -> pa.Table:
+    # The line break ends a comment that the filter may close with.
+    condition = f"kind = '{Kind.CLIP}'" + (f" and ({where}\n)" if where is not None else "")
+    return Selection(catalog, Request(where=condition, columns=columns)).table()
+
+
+def _origins(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
+    """One origin a recording, with the days of `clips` only."""
+    parents = dict(zip(catalog["artifact"].to_pylist(), catalog["parents"].to_pylist(), strict=True))
+    kinds = catalog.filter(pc.field("kind").isin([kind.value for kind in _SOURCES]))
+    sources = {
+        artifact: f"{kind} {source or artifact}"
+        for artifact, kind, source in zip(
+            kinds["artifact"].to_pylist(), kinds["kind"].to_pylist(), kinds["source_hash"].to_pylist(), strict=True
+        )
+    }
+    days: dict[str, set[str]] = defaultdict(set)
+    known: dict[str, Origin] = {}
+    for row in clips.group_by(["recording", "session", "seed", "day"]).aggregate([]).to_pylist():
+        recording = row["recording"]
+        if row["day"]:
+            days[recording].add(row["day"])
+        if recording not in known:
+            ancestry = _ancestors(recording, parents)
+            known[recording] = Origin(
+                recording=recording,
+                session=row["session"],
+                seed=row["seed"],
+                sources=tuple(sorted({sources[a] for a in ancestry if a in sources})),
+            )
+    return [replace(known[recording], days=tuple(sorted(days[recording]))) for recording in sorted(known)]
+
+
+def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:
+    found: set[str] = set()
+    open_ = [artifact]
+    while open_:
+        for parent in parents.get(open_.pop(), ()):
+            if parent not in found:
+                found.add(parent)
+                open_.append(parent)
+    return found
+
+
+def _hashed_side(catalog: pa.Table, split_by: HashedSplit, split: str) -> set[str]:
+    """Clips of the side. Every clip of the catalog takes part, so that two filters never disagree about a group."""
+    clips = _clips(catalog, None, _ORIGIN)
+    origins = _origins(catalog, clips)
+    sides = zip(origins, split_by.assign(origins), strict=True)
+    recordings = pa.array([origin.recording for origin, side in sides if side == split], pa.string())
+    return set(clips.filter(pc.field("recording").isin(recordings))["artifact"].to_pylist())
+
+
+def _explicit_side(catalog: pa.Table, split_by: ExplicitSplit, split: str) -> set[str]:
+    """Clips of the side. All sides are resolved and compared, whichever is asked for."""
+    taken = {side: _clips(catalog, where, _ORIGIN) for side, where in split_by.where.items()}
+    refuse_leaks({side: _origins(catalog, clips) for side, clips in taken.items()})
+    return set(taken[split]["artifact"].to_pylist())
+
+
+def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:
+    """Window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
+    stated = {text: json.loads(text).get("window", math.nan) for text in set(clips["recipe"].to_pylist()) if text}
+    by_artifact = {
+        artifact: stated.get(text, math.nan)
+        for artifact, text in zip(clips["artifact"].to_pylist(), clips["recipe"].to_pylist(), strict=True)
+    }
+    return np.array([by_artifact[str(artifact)] for artifact in table.artifact], dtype=np.float64)
+
+
+def _with_window(lake: Lake, table: PairTable, windows: NDArray[np.float64], window: float) -> PairTable:
+    """The table with ground truths over `window`; those of another window are computed anew from the record's wind."""
+    other = np.nonzero(windows != window)[0]
+    if not len(other):
+        return table
+    wind, sigma, coverage, staleness = (
+        values.copy() for values in (table.wind, table.wind_sigma, table.coverage, table.staleness)
+    )
+    for number in np.unique(table.object[other]):
+        record = Record.open(lake.object_path(str(table.objects[number])))
+        known = (record.truth or {}).get(TRUTH_SPEED)
+        samples = record.wind()
+        series = TruthSeries.of(samples) if samples is not None else None
+        for k in other[table.object[other] == number]:
+            clock = float(table.clock_sigma[k])
+            truth = clip_truth(
+                series,
+                int(table.end[k]),
+                known=known,
+                clock_sigma=None if math.isnan(clock) else clock,
+                window=window,
+            )
+            wind[k], sigma[k], coverage[k], staleness[k] = truth.wind, truth.sigma, truth.coverage, truth.staleness
+    return replace(table, wind=wind, wind_sigma=sigma, coverage=coverage, staleness=staleness)
+
+
+def _judge(table: PairTable, tolerance: Tolerance) -> dict[int, Refusal]:
+    """Refusals by the pair's index."""
+    checks = (
+        (np.isnan(table.wind), lambda k: "no usable wind sample in the window"),
+        (
+            table.coverage < tolerance.coverage,
+            lambda k: f"wind samples cover {table.coverage[k]:.2f} of the window, less than {tolerance.coverage:g}",
+        ),
+        (
+            table.staleness > tolerance.staleness,
+            lambda k: f"the newest wind sample is {table.staleness[k]:.3g} s old, above {tolerance.staleness:g} s",
+        ),
+        (np.isnan(table.clock_sigma), lambda k: "the uncertainty of the camera's clock is unknown"),
+        (
+            table.clock_sigma > tolerance.clock_sigma,
+            lambda k: (
+                f"the camera's clock is known to ±{table.clock_sigma[k]:.3g} s, above {tolerance.clock_sigma:g} s"
+            ),
+        ),
+        (
+            np.isnan(table.wind_sigma) & ~np.isnan(table.wind) & ~np.isnan(table.clock_sigma),
+            lambda k: "too few wind samples to know the uncertainty of their mean",
+        ),
+    )
+    bad = np.any([mask for mask, _ in checks], axis=0)
+    return {
+        int(k): Refusal(
+            artifact=str(table.artifact[k]),
+            recording=str(table.recording[k]),
+            reasons=tuple(reason(k) for mask, reason in checks if mask[k]),
+        )
+        for k in np.nonzero(bad)[0]
+    }

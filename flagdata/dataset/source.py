@@ -1,0 +1,76 @@
+"""A lake as a source of training data: what `flagdata.open` returns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flagdata.dataset.cache import DecodedCache
+from flagdata.dataset.pairs import Pairs
+from flagdata.dataset.resolve import Tolerance, resolve
+from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+from flagdata.lake import Lake
+from flagdata.schema import TRUTH_WINDOW
+
+
+class Source:
+    """Typed pairs out of a lake.
+
+    Attributes:
+        lake: the lake itself, for rows, artifacts and refs.
+    """
+
+    def __init__(self, lake: Lake) -> None:
+        self.lake = lake
+
+    @classmethod
+    def open(cls, path: Path | str) -> Source:
+        """The lake in the folder `path`.
+
+        Raises:
+            NotFoundError: no lake there.
+        """
+        return cls(Lake.open(path))
+
+    def pairs(
+        self,
+        where: str | None = None,
+        *,
+        at: str | None = None,
+        split: str | None = None,
+        split_by: HashedSplit | ExplicitSplit | None = None,
+        window: float = TRUTH_WINDOW,
+        tolerance: Tolerance | None = None,
+        seed: int = 0,
+        cache: DecodedCache | None = None,
+    ) -> Pairs:
+        """Clips with their ground truth, resolved now and for good: later commits change nothing in them.
+
+        Args:
+            where: a filter over the catalog's columns, as in `flagdata query --where`; `None` is every clip.
+            at: tag, branch, version number or commit; `None` is the head of main.
+            split: side of the split; `None` is all sides.
+            split_by: how sides are made; `None` is `HashedSplit()`. Sides are decided over all clips of the version,
+                before `where`, so that two filters never put one session, day or seed on two sides.
+            window: length of the mean that is the ground truth [s]; other than the catalog's it is computed anew from
+                the records' wind.
+            tolerance: bounds beyond which a pair is refused; `None` is `Tolerance()`.
+            seed: of the shuffled order.
+            cache: where decoded clips are kept; `None` decodes each time.
+
+        Raises:
+            NotFoundError: no clip matches.
+            RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
+            UnknownNameError: no such ref, column or side.
+            UsageError: a filter that is not SQL, or a window that is no length of time.
+        """
+        resolved = resolve(
+            self.lake,
+            where=where,
+            at=at,
+            split=split,
+            split_by=split_by or HashedSplit(),
+            window=window,
+            tolerance=tolerance or Tolerance(),
+        )
+        paths = tuple(self.lake.object_path(str(name)) for name in resolved.table.objects)
+        return Pairs(resolved.table, paths=paths, refused=resolved.refused, at=at, seed=seed, cache=cache)

@@ -1,0 +1,153 @@
+"""What a resolved query hands to loader workers: flat numpy arrays, one entry a pair; no catalog, no connection."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError
+
+# Columns of the catalog that a pair is made of.
+COLUMNS = (
+    "artifact", "recording", "session", "day", "seed", "object", "frame_first", "frame_count", "start", "end",
+    "wind", "wind_sigma", "wind_coverage", "wind_staleness", "clock_sigma", "parameters", "recipe",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PairTable:
+    """Pairs in order; arrays of length n unless said otherwise.
+
+    Attributes:
+        artifact, recording, session, day: identities as in `Sample`; "" where the catalog has null.
+        seed: root seed; meaningless where `seeded` is false.
+        seeded: whether the clip is simulated.
+        object: index into `objects`.
+        objects: (m,) names of the objects that hold the clips.
+        frame_first, frame_count: the clip's frames in its object.
+        start, end: [UTC ns].
+        wind, wind_sigma: [m/s]; NaN where unknown.
+        coverage: share of the window.
+        staleness: [s], infinite where there is no sample.
+        clock_sigma: [s], NaN where unknown.
+        parameters: (n, p) values of `names`, NaN where a clip has no such parameter.
+        names: (p,) parameter names; those of nested parameters are joined by dots.
+    """
+
+    artifact: NDArray[np.str_]
+    recording: NDArray[np.str_]
+    session: NDArray[np.str_]
+    day: NDArray[np.str_]
+    seed: NDArray[np.int64]
+    seeded: NDArray[np.bool_]
+    object: NDArray[np.int64]
+    objects: NDArray[np.str_]
+    frame_first: NDArray[np.int64]
+    frame_count: NDArray[np.int64]
+    start: NDArray[np.int64]
+    end: NDArray[np.int64]
+    wind: NDArray[np.float64]
+    wind_sigma: NDArray[np.float64]
+    coverage: NDArray[np.float64]
+    staleness: NDArray[np.float64]
+    clock_sigma: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    names: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.artifact)
+
+    @classmethod
+    def of(cls, rows: pa.Table) -> Self:
+        """The table of catalog rows (with at least `COLUMNS`), in the order of recording, frame and identity.
+
+        Raises:
+            CorruptError: a clip without its object or frames.
+        """
+        rows = rows.sort_by([("recording", "ascending"), ("frame_first", "ascending"), ("artifact", "ascending")])
+        for column in ("object", "frame_first", "frame_count", "start", "end"):
+            if rows[column].null_count:
+                artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
+                raise CorruptError(f"a clip without {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
+        objects, index = np.unique(_text(rows, "object"), return_inverse=True)
+        parameters, names = _parameters(rows["parameters"].to_pylist())
+        return cls(
+            artifact=_text(rows, "artifact"),
+            recording=_text(rows, "recording"),
+            session=_text(rows, "session"),
+            day=_text(rows, "day"),
+            seed=rows["seed"].fill_null(0).to_numpy().astype(np.int64),
+            seeded=rows["seed"].is_valid().to_numpy().astype(np.bool_),
+            object=index.astype(np.int64),
+            objects=objects,
+            frame_first=rows["frame_first"].to_numpy().astype(np.int64),
+            frame_count=rows["frame_count"].to_numpy().astype(np.int64),
+            start=rows["start"].to_numpy().astype(np.int64),
+            end=rows["end"].to_numpy().astype(np.int64),
+            wind=_number(rows, "wind", null=np.nan),
+            wind_sigma=_number(rows, "wind_sigma", null=np.nan),
+            coverage=_number(rows, "wind_coverage", null=0.0),
+            staleness=_number(rows, "wind_staleness", null=np.inf),
+            clock_sigma=_number(rows, "clock_sigma", null=np.nan),
+            parameters=parameters,
+            names=names,
+        )
+
+    def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
+        """The pairs at `index`, in its order."""
+        shared = ("objects", "names")
+        return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared})
+
+    def parameters_of(self, index: int) -> dict[str, float]:
+        """The parameters that pair `index` has."""
+        values = self.parameters[index]
+        return {str(self.names[k]): float(values[k]) for k in np.nonzero(~np.isnan(values))[0]}
+
+    def fingerprint(self) -> str:
+        """SHA-256 of every pair's identity, place and ground truth, in order: equal means the same data."""
+        digest = hashlib.sha256()
+        for field in fields(self):
+            values = getattr(self, field.name)
+            if field.name in ("object", "objects"):
+                continue
+            digest.update(f"{field.name} {values.dtype.str} {values.shape}\n".encode())
+            digest.update(np.ascontiguousarray(values).tobytes())
+        digest.update("\n".join(self.objects[self.object].tolist()).encode())
+        return digest.hexdigest()
+
+
+def _text(rows: pa.Table, column: str) -> NDArray[np.str_]:
+    return np.array(rows[column].fill_null("").to_pylist(), dtype=np.str_)
+
+
+def _number(rows: pa.Table, column: str, *, null: float) -> NDArray[np.float64]:
+    return rows[column].fill_null(null).to_numpy().astype(np.float64)
+
+
+def _parameters(texts: Sequence[str | None]) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
+    """Numbers of JSON objects as columns. Texts and lists among the parameters stay in the catalog only."""
+    parsed = {text: dict(_numbers(json.loads(text))) for text in set(texts) if text}
+    names = sorted({name for values in parsed.values() for name in values})
+    column = {name: k for k, name in enumerate(names)}
+    out = np.full((len(texts), len(names)), np.nan)
+    for row, text in enumerate(texts):
+        for name, value in parsed[text].items() if text else ():
+            out[row, column[name]] = value
+    return out, np.array(names, dtype=np.str_)
+
+
+def _numbers(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:
+    found: list[tuple[str, float]] = []
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            found.extend(_numbers(value, f"{prefix}{name}."))
+        elif isinstance(value, (int, float)):
+            found.append((prefix + name, float(value)))
+    return found
