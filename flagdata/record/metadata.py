@@ -55,5 +55,7 @@ def camera_metadata(info: CameraInfo) -> dict[str, str]:
     """A camera's settled options as text; rates in Hz, sizes in pixels, `start` in UTC nanoseconds."""
     values = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
     return {
-        name: ",".join(map(str, value)) if isinstance(value, tuple) else str(value) for name, value in values.items()
+        name: ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+        for name, value in values.items()
+        if value is not None
     }

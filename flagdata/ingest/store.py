@@ -1,0 +1,385 @@
+"""From a vendor's file to an artifact of the lake: read, written as a record on the device's own clock, published.
+
+The identity of an artifact is its source's bytes and the options that shaped it, so that ingesting a file again finds
+it. One source is one transaction: an error, Ctrl-C or a crash leaves the lake as it was.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.errors import ConflictError, InputError
+from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.lake import Artifact, Lake, Transaction
+from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
+from flagdata.record import Coding, RecordWriter
+from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
+from flagdata.record.writer import ATTACHMENT_LIMIT, JPEG_QUALITY
+from flagdata.schema import CHANNELS, Kind
+from flagdata.signals import CameraInfo, WindLog
+from flagdata.timebase import NANOSECONDS, iso
+
+Progress = Callable[[int], object]
+REPORT_SCHEMA = "flagdata.ingest-report/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Labels:
+    """What people call an artifact; not part of its identity.
+
+    Attributes:
+        name: of the artifact; `None` takes the file's name without its suffix.
+        session: one set-up at one place; splits never cut through it.
+    """
+
+    name: str | None = None
+    session: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraIngest:
+    """All that shapes a camera artifact: how the file is read, and how its frames are stored."""
+
+    camera: CameraOptions = field(default_factory=CameraOptions)
+    coding: Coding = Coding.JPEG
+
+    def recipe(self) -> dict[str, Any]:
+        stored: dict[str, Any] = {"coding": self.coding.value}
+        if self.coding is Coding.JPEG:
+            stored["quality"] = JPEG_QUALITY
+        return {"ingest": "camera", "camera": self.camera.recipe(), "stored": stored}
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindIngest:
+    """All that shapes a wind artifact."""
+
+    wind: WindOptions = field(default_factory=WindOptions)
+
+    def recipe(self) -> dict[str, Any]:
+        """The options; a sensor recipe by its name and content, since its file may change or lie elsewhere tomorrow."""
+        options = dict(self.wind.as_dict())
+        if self.wind.recipe is not None:
+            options["recipe"] = Path(self.wind.recipe).name
+            options["recipe_hash"] = digest(recipe_text(self.wind.recipe).decode(errors="replace"))
+        return {"ingest": "wind", "wind": options}
+
+
+@dataclass(frozen=True, kw_only=True)
+class IngestResult:
+    """What an ingest did.
+
+    Attributes:
+        artifact: as it is in the lake.
+        created: false when it was there already, and nothing was written.
+        report: what was found, see `REPORT_SCHEMA`.
+    """
+
+    artifact: Artifact
+    created: bool
+    report: Mapping[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "artifact": self.artifact.id,
+            "kind": self.artifact.kind.value,
+            "name": self.artifact.name,
+            "created": self.created,
+            "object": self.artifact.object,
+            "source_name": self.artifact.source_name,
+            "source_hash": self.artifact.source_hash,
+            "session": self.artifact.session,
+            "quality": list(self.artifact.quality),
+            "report": dict(self.report),
+        }
+
+
+def ingest_camera(
+    lake: Lake,
+    path: Path,
+    options: CameraIngest | None = None,
+    *,
+    labels: Labels | None = None,
+    branch: str = "main",
+    progress: Progress | None = None,
+) -> IngestResult:
+    """Ingest a camera file or a folder of pictures; frames are streamed, in constant memory.
+
+    Args:
+        progress: called with 1 for each frame written.
+
+    Raises:
+        FlagdataError: as `open_camera`; the lake is unchanged.
+        ConflictError: the file changed while it was read.
+    """
+    options, labels = options or CameraIngest(), labels or Labels()
+    source = _Source.of(path)
+    recipe = options.recipe()
+    present = _find(lake, Kind.CAMERA, source, recipe, branch=branch)
+    if present is not None:
+        return present
+    with lake.transaction(f"ingest camera {path.name}", branch=branch) as transaction:
+        staged = transaction.staging(".mcap")
+        times = _Times()
+        with open_camera(path, options.camera) as stream:
+            metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe)}
+            with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
+                for frame in stream:
+                    record.frame(log_time=frame.time, publish_time=frame.time, timestamp=frame.time, image=frame.image)
+                    times.add(frame.time, frame.stamp_error)
+                    if progress:
+                        progress(1)
+            info, findings = stream.info, stream.findings
+        if not times.count:
+            raise InputError("no frame could be read", where=str(path), fix="check the file, or its --tolerance")
+        source.check_unchanged()
+        report = _camera_report(info, times, findings)
+        artifact = _artifact(
+            Kind.CAMERA, source, recipe, labels, findings=findings, report=report, start=times.first, end=times.last,
+            rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
+        )  # fmt: skip
+        transaction.add(artifact)
+    return _result(lake, transaction, artifact, report, branch=branch)
+
+
+def ingest_wind(
+    lake: Lake,
+    path: Path,
+    options: WindIngest | None = None,
+    *,
+    labels: Labels | None = None,
+    branch: str = "main",
+) -> IngestResult:
+    """Ingest an anemometer's log. The vendor's file, and the sensor recipe that was named, are attached.
+
+    Raises:
+        FlagdataError: as `read_log`; the lake is unchanged.
+        ConflictError: the file changed while it was read.
+    """
+    options, labels = options or WindIngest(), labels or Labels()
+    source = _Source.of(path)
+    recipe = options.recipe()
+    present = _find(lake, Kind.WIND, source, recipe, branch=branch)
+    if present is not None:
+        return present
+    log = read_log(path, options.wind)
+    time = log.series.time
+    findings = log.findings
+    with lake.transaction(f"ingest wind {path.name}", branch=branch) as transaction:
+        staged = transaction.staging(".mcap")
+        with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
+            record.wind(log.series)
+            if path.stat().st_size <= ATTACHMENT_LIMIT:
+                record.attach(path.name, path.read_bytes(), media_type="text/plain", log_time=int(time[0]))
+            else:
+                findings = (*findings, _not_attached(path))
+            if options.wind.recipe is not None:
+                name = f"{Path(options.wind.recipe).name.removesuffix('.toml')}.recipe.toml"
+                text = recipe_text(options.wind.recipe)
+                record.attach(name, text, media_type="application/toml", log_time=int(time[0]))
+        source.check_unchanged()
+        report = _wind_report(log, findings)
+        artifact = _artifact(
+            Kind.WIND, source, recipe, labels, findings=findings, report=report, start=int(time[0]), end=int(time[-1]),
+            rate=report["rate"], frame_count=None, stored=transaction.put(staged),
+        )  # fmt: skip
+        transaction.add(artifact)
+    return _result(lake, transaction, artifact, report, branch=branch)
+
+
+def recipe_text(recipe: str) -> bytes:
+    """The TOML of a sensor recipe, by name or path.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        if recipe.endswith(".toml"):
+            return Path(recipe).read_bytes()
+        return (files("catalogs") / "sensors" / f"{recipe}.toml").read_bytes()
+    except OSError as error:
+        raise InputError(f"the recipe cannot be read: {error.strerror}", where=recipe, fix="check its path") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Source:
+    """A file, or a folder of pictures, as it was when its hash was taken."""
+
+    path: Path
+    hash: str
+    state: tuple[tuple[str, int, int], ...]
+
+    @classmethod
+    def of(cls, path: Path) -> _Source:
+        before = _state(path)
+        if path.is_dir():
+            parts = [f"{name}\0{file_hash(path / name)}" for name, _, _ in before]
+            return cls(path=path, hash=digest("\n".join(parts)), state=before)
+        try:
+            return cls(path=path, hash=file_hash(path), state=before)
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
+
+    def check_unchanged(self) -> None:
+        if _state(self.path) != self.state:
+            raise ConflictError(
+                "the file changed while it was read", where=str(self.path), fix="ingest it when it is complete"
+            )
+
+    def provenance(self, recipe: Mapping[str, Any]) -> dict[str, str]:
+        return {
+            "source_name": self.path.name,
+            "source_hash": self.hash,
+            "recipe": canonical(recipe),
+            "recipe_hash": recipe_hash(recipe),
+            "code_version": code_version(),
+        }
+
+
+def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Name, size and time of change of the file, or of each file in the folder."""
+    try:
+        if not path.is_dir():
+            status = path.stat()
+            return ((path.name, status.st_size, status.st_mtime_ns),)
+        with os.scandir(path) as entries:
+            found = [(e.name, e.stat()) for e in entries if e.is_file()]
+        return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
+
+
+@dataclass
+class _Times:
+    """What is kept of a stream of frames."""
+
+    count: int = 0
+    first: int = 0
+    last: int = 0
+    worst_error: float = 0.0
+
+    def add(self, time: int, stamp_error: float) -> None:
+        if not self.count:
+            self.first = time
+        self.last = time
+        self.count += 1
+        self.worst_error = max(self.worst_error, stamp_error)
+
+    @property
+    def rate(self) -> float | None:
+        """Mean frame rate [Hz]; `None` for a single frame."""
+        return (self.count - 1) * NANOSECONDS / (self.last - self.first) if self.count > 1 else None
+
+
+def _find(lake: Lake, kind: Kind, source: _Source, recipe: Mapping[str, Any], *, branch: str) -> IngestResult | None:
+    """The artifact that this ingest would make, if it is on the branch."""
+    where = f"kind = '{kind.value}' and source_hash = '{source.hash}' and recipe_hash = '{recipe_hash(recipe)}'"
+    rows = lake.rows(where, at=branch).to_pylist()
+    if not rows:
+        return None
+    artifact = Artifact.from_row(rows[0])
+    return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
+
+
+def _artifact(
+    kind: Kind,
+    source: _Source,
+    recipe: Mapping[str, Any],
+    labels: Labels,
+    *,
+    findings: Sequence[Finding],
+    report: Mapping[str, Any],
+    start: int,
+    end: int,
+    rate: float | None,
+    frame_count: int | None,
+    stored: str,
+) -> Artifact:
+    return Artifact(
+        kind=kind,
+        name=labels.name or source.path.stem or source.path.name,
+        object=stored,
+        source_hash=source.hash,
+        source_name=source.path.name,
+        recipe=recipe,
+        session=labels.session,
+        day=iso(start)[:10],
+        start=start,
+        end=end,
+        frame_count=frame_count,
+        rate=rate,
+        quality=quality_flags(tuple(findings)),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )
+
+
+def _result(
+    lake: Lake, transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], *, branch: str
+) -> IngestResult:
+    committed = transaction.result
+    created = committed is not None and artifact.id in committed.added
+    kept = artifact if created else lake.artifact(artifact.id, at=branch)
+    return IngestResult(artifact=kept, created=created, report=report if created else json.loads(kept.report or "{}"))
+
+
+def _span(start: int, end: int) -> dict[str, Any]:
+    return {"start": iso(start), "end": iso(end), "span": (end - start) / NANOSECONDS}
+
+
+def _camera_report(info: CameraInfo, times: _Times, findings: Iterable[Finding]) -> dict[str, Any]:
+    return {
+        "schema": REPORT_SCHEMA,
+        "kind": Kind.CAMERA.value,
+        "format": f"{info.container} / {info.codec}",
+        "reasons": [],
+        **_span(times.first, times.last),
+        "frames": times.count,
+        "rate": times.rate,
+        "worst_stamp_error": times.worst_error,
+        "camera": {**vars(info), "crop": list(info.crop), "start": iso(info.start)},
+        "findings": [finding.as_dict() for finding in findings],
+    }
+
+
+def _wind_report(log: WindLog, findings: Iterable[Finding]) -> dict[str, Any]:
+    series = log.series
+    time = series.time
+    steps = np.diff(time)
+    speed = series.channels.get("wind_speed")
+    sensor = {name: value for name, value in vars(series.sensor).items() if value is not None}
+    return {
+        "schema": REPORT_SCHEMA,
+        "kind": Kind.WIND.value,
+        "format": log.format,
+        "reasons": list(log.reasons),
+        **_span(int(time[0]), int(time[-1])),
+        "samples": len(series),
+        "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,
+        "longest_gap": float(steps.max()) / NANOSECONDS if len(steps) else None,
+        "channels": {
+            name: {"unit": CHANNELS[name].unit, "values": int(np.isfinite(values).sum())}
+            for name, values in series.channels.items()
+        },
+        "mean_speed": float(np.nanmean(speed)) if speed is not None and np.isfinite(speed).any() else None,
+        "sensor": sensor,
+        "findings": [finding.as_dict() for finding in findings],
+    }
+
+
+def _not_attached(path: Path) -> Finding:
+    return Finding(
+        kind="log-not-attached",
+        severity=Severity.WARNING,
+        what=f"the log of {path.stat().st_size} bytes is over the limit of {ATTACHMENT_LIMIT} and was not attached",
+        fix="keep the original: the catalog has its hash",
+    )
