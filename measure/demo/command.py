@@ -84,7 +84,16 @@ def demo(out: Path, seed: int, minutes: float) -> None:
     shell.show("init", "lake")
     shell.show("ingest", "flag.mp4", "--crop", "auto", "--session", "demo", "--lake", "lake")
     shell.show(
-        "ingest", "anemometer.csv", "--sensor", "demo-cup", "--zone", "+02:00", "--session", "demo", "--lake", "lake"
+        "ingest",
+        "anemometer.csv",
+        "--sensor",
+        "cup-logger.toml",
+        "--zone",
+        "+02:00",
+        "--session",
+        "demo",
+        "--lake",
+        "lake",
     )
     artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
     shell.show(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta
 from fractions import Fraction
 from pathlib import Path
 
@@ -25,7 +25,40 @@ from sim.wind.spectral import VonKarman
 BEFORE = 120.0  # s of wind logged before the camera starts
 _AFTER = 30.0
 WIND_RATE = 20  # Hz at which the true wind is made
-_ZONE = timezone(timedelta(hours=2))
+START = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
+ZONE = "+02:00"  # of the logger's wall clock
+
+SENSOR = """\
+name = "cup-logger"
+about = "A cup anemometer on a logger of one's own, described so that flagdata can read it"
+source = "the demonstration"
+
+[file]
+delimiter = ";"
+decimal = ","
+
+[time]
+columns = ["Date", "Time"]
+format = "%d.%m.%Y %H:%M:%S"
+
+[channels.wind_speed]
+column = "Wind speed [km/h]"
+unit = "km/h"
+range = [0, 200]
+
+[channels.wind_direction]
+column = "Wind direction [deg]"
+unit = "deg"
+
+[sensor]
+name = "cup anemometer"
+height = 4.0
+distance-constant = 2.3
+averaging = 1.0
+threshold = 0.4
+resolution = 0.1
+accuracy = 0.1
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,25 +110,38 @@ class Field:
 
 
 def make_field(recipe: FieldRecipe, folder: Path, *, advance: Callable[[int], None]) -> Field:
-    """Write `flag.mp4` and `anemometer.csv` into `folder`; `advance` is called with the number of frames done."""
-    offset = float(stream(recipe.seed, "clock").uniform(-recipe.largest_offset, recipe.largest_offset))
-    duration = BEFORE + recipe.duration + _AFTER
-    wind = recipe.wind.series(stream(recipe.seed, "wind"), duration=duration, rate=WIND_RATE)
-    start = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
+    """Write `flag.mp4`, `anemometer.csv` and its `cup-logger.toml` into `folder`.
+
+    Args:
+        advance: called with the number of frames done.
+    """
+    wind, at_frames, offset = film(recipe)
     video, log = folder / "flag.mp4", folder / "anemometer.csv"
-    times = np.arange(round(recipe.duration * recipe.frame_rate)) / recipe.frame_rate + BEFORE
-    at_frames = np.interp(times, np.arange(len(wind)) / WIND_RATE, wind)
-    _write_video(video, recipe, at_frames, start, advance)
-    _write_log(log, recipe, wind, start + timedelta(seconds=offset - BEFORE))
+    write_video(video, recipe, at_frames, advance)
+    write_log(log, recipe, wind, offset)
+    (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
     return Field(video=video, log=log, clock_offset=offset, wind=wind)
 
 
-def _write_video(
-    path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], start: datetime, advance: Callable[[int], None]
-) -> None:
+def film(recipe: FieldRecipe) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """What happens in front of the camera, and what nobody is told.
+
+    Returns:
+        The true wind [m/s] at `WIND_RATE` from `BEFORE` seconds before the first frame on; the wind [m/s] at each frame;
+        and the offset [s] to add to the camera's clock to reach the anemometer's.
+    """
+    offset = float(stream(recipe.seed, "clock").uniform(-recipe.largest_offset, recipe.largest_offset))
+    duration = BEFORE + recipe.duration + _AFTER
+    wind = recipe.wind.series(stream(recipe.seed, "wind"), duration=duration, rate=WIND_RATE)
+    times = np.arange(round(recipe.duration * recipe.frame_rate)) / recipe.frame_rate + BEFORE
+    return wind, np.interp(times, np.arange(len(wind)) / WIND_RATE, wind), offset
+
+
+def write_video(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], advance: Callable[[int], None]) -> None:
+    """An H.264 file of the drawn flag in the wind of each frame [m/s], its metadata naming `START`."""
     flag = DrawnFlag()
     with av.open(str(path), "w") as container:
-        container.metadata["creation_time"] = start.isoformat()
+        container.metadata["creation_time"] = START.isoformat()
         video = container.add_stream("libx264", rate=recipe.frame_rate, options={"preset": "veryfast", "crf": "23"})
         video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
         video.codec_context.time_base = Fraction(1, recipe.frame_rate)
@@ -108,9 +154,11 @@ def _write_video(
         container.mux(video.encode())
 
 
-def _write_log(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], start: datetime) -> None:
-    """Once a second: the cups' mean speed over the second before the stamp, in km/h on the logger's own wall clock;
-    with a gap, and a reading that sticks. `start` is the logger's time at the first value of `wind`."""
+def write_log(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], offset: float) -> None:
+    """Once a second: the cups' mean speed over the second before the stamp, in km/h, by the logger's own wall clock,
+    which runs `offset` seconds ahead of the camera's; with a gap, and a reading that sticks."""
+    start = START + timedelta(seconds=offset - BEFORE)  # the logger's time at the first value of `wind`
+    zone = datetime.strptime(ZONE, "%z").tzinfo
     rng = stream(recipe.seed, "anemometer")
     first = start.replace(microsecond=0) + timedelta(seconds=2)  # the logger stamps its own whole seconds
     seconds = len(wind) // WIND_RATE - 2
@@ -129,7 +177,7 @@ def _write_log(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], start
         for second in range(seconds):
             if gap <= second < gap + recipe.dropout:
                 continue
-            stamp = (first + timedelta(seconds=second)).astimezone(_ZONE)
+            stamp = (first + timedelta(seconds=second)).astimezone(zone)
             decimal = f"{speed[second] * 3.6:.2f}".replace(".", ",")
             writer.writerow([f"{stamp:%d.%m.%Y}", f"{stamp:%H:%M:%S}", decimal, f"{direction[second] % 360:.0f}"])
 

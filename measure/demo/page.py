@@ -59,7 +59,7 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
     shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
-    reasons = Counter(refusal.reason for refusal in pairs.refused)
+    reasons = Counter(reason for refusal in pairs.refused for reason in refusal.reasons)
     page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
         files("measure.demo").joinpath("page.html.j2").read_text(encoding="utf-8")
     )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from tests.evidence import run_all
 
-VALIDATIONS: dict[str, str] = {}
+VALIDATIONS = {
+    "clock-recovery": "tests.validation.clock_recovery",
+}
 
 if __name__ == "__main__":
     run_all("validate", VALIDATIONS)

@@ -1,0 +1,65 @@
+"""Is the hidden offset of two clocks found, and does its interval cover it as often as it says?
+
+Field recordings of 10 minutes are made with drawn flags in gusty wind, each with an offset that is told to nobody; the
+clock estimator sees the frames (as uint8 pictures at 25 Hz) and the anemometer's log alone. As many recordings in
+steady wind must all be refused.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
+from flagdata.align.motion import motion_energy
+from flagdata.ingest.anemometer import WindOptions, average, read_log
+from flagdata.rng import stream
+from flagdata.timebase import NANOSECONDS, from_datetime
+from measure.demo.field import SENSOR, START, ZONE, FieldRecipe, film, write_log
+from measure.demo.flag import DrawnFlag
+from sim.wind.spectral import VonKarman
+
+_RATE = 25
+_RECORDINGS = 20
+
+
+def _estimate(recipe: FieldRecipe) -> tuple[LagEstimate, float]:
+    wind, at_frames, offset = film(recipe)
+    start = from_datetime(START)
+    pictures = DrawnFlag().frames(at_frames, recipe.frame_rate, stream(recipe.seed, "camera"))
+    motion = motion_energy((start + i * NANOSECONDS // _RATE, picture) for i, picture in enumerate(pictures))
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "anemometer.csv"
+        write_log(log, recipe, wind, offset)
+        recipe_file = Path(folder) / "cup-logger.toml"
+        recipe_file.write_text(SENSOR)
+        series = read_log(log, WindOptions(recipe=str(recipe_file), zone=ZONE)).series
+    estimate = estimate_offset(motion, average(series), search=LagSearch(), generator=stream(recipe.seed, "surrogates"))
+    return estimate, offset
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    gusty, steady = [], []
+    for i in range(_RECORDINGS):
+        recipe = FieldRecipe(seed=seed * 1000 + i, frame_rate=_RATE)
+        estimate, offset = _estimate(recipe)
+        gusty.append((estimate, offset))
+    for i in range(_RECORDINGS // 4):
+        calm = VonKarman(mean=5.0, intensity=0.005, length=60.0)
+        steady.append(_estimate(FieldRecipe(seed=seed * 1000 + 500 + i, frame_rate=_RATE, wind=calm))[0])
+    errors = np.array([abs(e.offset - o) for e, o in gusty if e.accepted])
+    return {
+        "recordings": _RECORDINGS,
+        "minutes": 10,
+        "accepted": len(errors),
+        "median_error_s": float(np.median(errors)),
+        "largest_error_s": float(errors.max()),
+        "within_half_a_second": int((errors <= 0.5).sum()),
+        "covered_by_90_percent_interval": sum(e.interval[0] <= o <= e.interval[1] for e, o in gusty if e.accepted),
+        "median_sigma_s": float(np.median([e.sigma for e, _ in gusty if e.accepted])),
+        "steady_recordings": len(steady),
+        "steady_refused": sum(not e.accepted for e in steady),
+    }
