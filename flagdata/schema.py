@@ -51,6 +51,12 @@ CHANNELS: dict[str, Channel] = {
     "wind_x": Channel(dims=("time",), unit="m/s", frame="sensor, towards +x", about="wind component of a sonic"),
     "wind_y": Channel(dims=("time",), unit="m/s", frame="sensor, towards +y", about="wind component of a sonic"),
     "wind_z": Channel(dims=("time",), unit="m/s", frame="sensor, upwards", about="vertical wind"),
+    "sonic_temperature": Channel(
+        dims=("time",),
+        unit="K",
+        frame="",
+        about="temperature from the speed of sound; above the air's where it is moist",
+    ),
     "air_temperature": Channel(dims=("time",), unit="K", frame="", about="air temperature"),
     "air_pressure": Channel(dims=("time",), unit="Pa", frame="station", about="static pressure at the sensor"),
     "relative_humidity": Channel(dims=("time",), unit="1", frame="", about="relative humidity, 0 to 1"),
@@ -171,7 +177,7 @@ CATALOG: dict[str, Field] = {
     "clock_model": Field(type=pa.string(), about="the whole clock model, JSON"),
     "parameters": Field(type=pa.string(), about="simulation or render parameters, canonical JSON object"),
     "quality": Field(type=pa.list_(pa.string()), nullable=False, about="flags: machine-readable names of what is off"),
-    "report": Field(type=pa.string(), about="findings of the ingest, JSON"),
+    "report": Field(type=pa.string(), about="what was found, a JSON object with a list 'findings'"),
 }
 
 

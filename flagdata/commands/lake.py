@@ -97,7 +97,7 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
     for label, relatives in (("made from", parents), ("made into", children)):
         for relative in relatives:
             click.echo(f"{label:<15} {relative['artifact'][:_SHORT]} {relative['kind']} {relative['name']}")
-    for finding in row["report"] if isinstance(row["report"], list) else []:
+    for finding in (row["report"] or {}).get("findings", []):
         click.echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
 
 
