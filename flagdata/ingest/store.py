@@ -31,6 +31,8 @@ from flagdata.timebase import NANOSECONDS, iso
 
 Progress = Callable[[int], object]
 REPORT_SCHEMA = "flagdata.ingest-report/1"
+CROP_PICTURE = "crop.png"
+"""Attachment of a camera record whose crop was found from motion: the motion in red, the crop in yellow."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,11 +113,15 @@ def ingest_camera(
     *,
     labels: Labels | None = None,
     branch: str = "main",
+    reasons: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> IngestResult:
     """Ingest a camera file or a folder of pictures; frames are streamed, in constant memory.
 
+    A crop found from motion is attached as a picture, see `CROP_PICTURE`.
+
     Args:
+        reasons: why the file is taken to be a camera's, for the report.
         progress: called with 1 for each frame written.
 
     Raises:
@@ -134,6 +140,10 @@ def ingest_camera(
         with open_camera(path, options.camera) as stream:
             metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe)}
             with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
+                if stream.proposal is not None:
+                    record.attach(
+                        CROP_PICTURE, stream.proposal.picture, media_type="image/png", log_time=stream.info.start
+                    )
                 for frame in stream:
                     record.frame(log_time=frame.time, publish_time=frame.time, timestamp=frame.time, image=frame.image)
                     times.add(frame.time, frame.stamp_error)
@@ -143,7 +153,7 @@ def ingest_camera(
         if not times.count:
             raise InputError("no frame could be read", where=str(path), fix="check the file, or its --tolerance")
         source.check_unchanged()
-        report = _camera_report(info, times, findings)
+        report = _camera_report(info, times, findings, reasons)
         artifact = _artifact(
             Kind.CAMERA, source, recipe, labels, findings=findings, report=report, start=times.first, end=times.last,
             rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
@@ -336,12 +346,14 @@ def _span(start: int, end: int) -> dict[str, Any]:
     return {"start": iso(start), "end": iso(end), "span": (end - start) / NANOSECONDS}
 
 
-def _camera_report(info: CameraInfo, times: _Times, findings: Iterable[Finding]) -> dict[str, Any]:
+def _camera_report(
+    info: CameraInfo, times: _Times, findings: Iterable[Finding], reasons: Sequence[str]
+) -> dict[str, Any]:
     return {
         "schema": REPORT_SCHEMA,
         "kind": Kind.CAMERA.value,
         "format": f"{info.container} / {info.codec}",
-        "reasons": [],
+        "reasons": list(reasons),
         **_span(times.first, times.last),
         "frames": times.count,
         "rate": times.rate,

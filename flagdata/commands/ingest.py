@@ -1,0 +1,372 @@
+"""`flagdata ingest`: camera files and anemometer logs into the lake, or a look at what a file is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from flagdata.commands.ingest_report import print_result, print_sniffed
+from flagdata.console import document, fail, json_option, lake_option, progress, say
+from flagdata.errors import FlagdataError, InputError, UsageError
+
+if TYPE_CHECKING:
+    from flagdata.ingest.anemometer import Guess
+    from flagdata.ingest.store import CameraIngest, IngestResult, Labels, WindIngest
+    from flagdata.lake import Lake
+
+# Parameters that mean something for one kind of source only, and those that name or time one single source.
+CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "rate", "crop", "crop_picture", "exposure", "archive")
+WIND_ONLY = ("sensor", "date", "date_order", "platform", "azimuth", "zero_offset", "encoding")
+ONE_SOURCE = ("start", "date", "name", "crop_picture")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Given:
+    """The command line, read."""
+
+    camera: CameraIngest
+    wind: WindIngest
+    labels: Labels
+    branch: str
+    crop_picture: Path | None
+
+
+@click.command()
+@click.argument("sources", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SOURCE...")
+@click.option("--sniff", is_flag=True, help="Only say what each source seems to be, and why; the lake is not touched.")
+@click.option(
+    "--as",
+    "--format",
+    "format_name",
+    metavar="FORMAT",
+    help="camera, or an anemometer format; by content if not given.",
+)
+@click.option("--session", metavar="NAME", help="One set-up at one place; splits never cut through it.")
+@click.option("--name", help="What people call the artifact; the file's name by default.")
+@click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
+@click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
+@click.option("--start", metavar="TIME", help="Camera: instant of the first frame, ISO 8601.")
+@click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
+@click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
+@click.option("--rate", default="25", show_default=True, metavar="HZ|native", help="Camera: frames a second to keep.")
+@click.option(
+    "--crop", default="whole", show_default=True, metavar="BOX",
+    help="Camera: x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
+)  # fmt: skip
+@click.option(
+    "--crop-picture", type=click.Path(path_type=Path, dir_okay=False), metavar="PATH",
+    help="Camera: write the picture that shows --crop auto.",
+)  # fmt: skip
+@click.option("--exposure", type=float, metavar="S", help="Camera: exposure time, to stamp mid-exposure.")
+@click.option(
+    "--archive", type=click.Choice(["jpeg", "h264"]), default="jpeg", show_default=True,
+    help="Camera: how frames are stored; h264 is smaller and slower to reach.",
+)  # fmt: skip
+@click.option(
+    "--sensor", "--recipe", "sensor", metavar="RECIPE", help="Wind: a recipe of catalogs/sensors, or a TOML file."
+)
+@click.option(
+    "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
+)
+@click.option("--date-order", type=click.Choice(["dmy", "mdy"]), help="Wind: of dates written with numbers only.")
+@click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
+@click.option(
+    "--azimuth", type=float, metavar="DEG", help="Wind: of the sensor's north or bow, clockwise from true north."
+)
+@click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
+@click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
+@json_option
+@lake_option
+@click.pass_context
+def ingest(
+    context: click.Context,
+    sources: tuple[Path, ...],
+    sniff: bool,
+    format_name: str | None,
+    session: str | None,
+    name: str | None,
+    zone: str | None,
+    branch: str,
+    start: str | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
+    rate: str,
+    crop: str,
+    crop_picture: Path | None,
+    exposure: float | None,
+    archive: str,
+    sensor: str | None,
+    date: str | None,
+    date_order: str | None,
+    platform: str | None,
+    azimuth: float | None,
+    zero_offset: str | None,
+    encoding: str | None,
+    as_json: bool,
+    lake_path: str,
+) -> None:
+    """Bring camera files and anemometer logs in.
+
+    Whether a SOURCE is a camera's or an anemometer's is decided by its content. Each is one commit: what fails leaves
+    the lake as it was, and the others go on.
+
+    \b
+      flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
+      flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png
+      flagdata ingest gill.csv --sensor gill-windsonic --zone +01:00 --session field-1
+    """
+    given = frozenset(
+        parameter for parameter in context.params
+        if context.get_parameter_source(parameter) is ParameterSource.COMMANDLINE
+    )  # fmt: skip
+    _one_source_only(given, sources)
+    if crop_picture is not None and crop.strip().lower() != "auto":
+        raise UsageError("--crop-picture without --crop auto", where=str(crop_picture), fix="add --crop auto")
+    if crop_picture is not None and crop_picture.exists():
+        raise UsageError("the crop picture exists", where=str(crop_picture), fix="choose another path")
+    options = _Given(
+        camera=_camera_options(
+            start=start, zone_name=zone, true_fps=true_fps, sequence_fps=sequence_fps, rate=rate, crop=crop,
+            exposure=exposure, archive=archive,
+        ),
+        wind=_wind_options(
+            format_name=None if format_name == "camera" else format_name, sensor=sensor, zone_name=zone, date=date,
+            date_order=date_order, platform=platform, azimuth=azimuth, zero_offset=zero_offset, encoding=encoding,
+        ),
+        labels=_labels(name, session),
+        branch=branch,
+        crop_picture=crop_picture,
+    )  # fmt: skip
+    if sniff:
+        _sniff(sources, options, as_json=as_json)
+        return
+    from flagdata.lake import Lake
+
+    _ingest(Lake.open(lake_path), sources, options, given=given, format_name=format_name, as_json=as_json)
+
+
+def _one_source_only(given: frozenset[str], sources: Sequence[Path]) -> None:
+    for parameter in ONE_SOURCE:
+        if parameter in given and len(sources) > 1:
+            raise UsageError(
+                f"{_option(parameter)} with {len(sources)} sources", fix="ingest the source it belongs to by itself"
+            )
+
+
+def _option(parameter: str) -> str:
+    return f"--{parameter.replace('_', '-')}"
+
+
+def _camera_options(
+    *,
+    start: str | None,
+    zone_name: str | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
+    rate: str,
+    crop: str,
+    exposure: float | None,
+    archive: str,
+) -> CameraIngest:
+    from flagdata import timebase
+    from flagdata.ingest.camera import CameraOptions, parse_crop
+    from flagdata.ingest.store import CameraIngest
+    from flagdata.record import Coding
+
+    place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+    options = CameraOptions(
+        start=timebase.parse(start, default=place, where="--start") if start is not None else None,
+        zone=zone_name,
+        true_fps=true_fps,
+        sequence_fps=sequence_fps,
+        rate="native" if rate.strip().lower() == "native" else _number(rate, "--rate", "a rate in Hz, or native"),
+        crop=parse_crop(crop),
+        exposure=exposure,
+    )
+    return CameraIngest(camera=options, coding=Coding(archive))
+
+
+def _wind_options(
+    *,
+    format_name: str | None,
+    sensor: str | None,
+    zone_name: str | None,
+    date: str | None,
+    date_order: Any,
+    platform: Any,
+    azimuth: float | None,
+    zero_offset: str | None,
+    encoding: str | None,
+) -> WindIngest:
+    import datetime as dt
+
+    from flagdata.ingest.anemometer import WindOptions
+    from flagdata.ingest.store import WindIngest
+    from flagdata.units import unit
+
+    try:
+        day = dt.date.fromisoformat(date) if date is not None else None
+    except ValueError:
+        raise UsageError(f"{date!r} is not a date", where="--date", fix="write it as 2026-05-01") from None
+    offset: Any = zero_offset
+    if zero_offset is not None and zero_offset not in ("report", "estimate"):
+        offset = _number(zero_offset, "--zero-offset", "a speed in m/s, report or estimate")
+    return WindIngest(
+        wind=WindOptions(
+            format=format_name,
+            recipe=sensor,
+            zone=zone_name,
+            encoding=encoding,
+            date=day,
+            date_order=date_order,
+            platform=platform,
+            azimuth=float(unit("deg").to_si(azimuth)) if azimuth is not None else None,
+            zero_offset=offset,
+        )
+    )
+
+
+def _number(text: str, option: str, wanted: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"{text!r} is not a number", where=option, fix=f"give {wanted}") from None
+
+
+def _labels(name: str | None, session: str | None) -> Labels:
+    from flagdata.ingest.store import Labels
+
+    return Labels(name=name, session=session)
+
+
+def _ingest(
+    lake: Lake,
+    sources: Sequence[Path],
+    options: _Given,
+    *,
+    given: frozenset[str],
+    format_name: str | None,
+    as_json: bool,
+) -> None:
+    from flagdata.ingest.classify import classify
+
+    kinds: list[Guess | FlagdataError] = []
+    for source in sources:
+        try:
+            kinds.append(classify(source, format_name=format_name, recipe=options.wind.wind.recipe))
+        except FlagdataError as error:
+            kinds.append(error)
+        else:
+            _check_applies(kinds[-1], source, given)
+    results: list[IngestResult] = []
+    failures: list[tuple[Path, FlagdataError]] = []
+    for source, kind in zip(sources, kinds, strict=True):
+        try:
+            if isinstance(kind, FlagdataError):
+                raise kind
+            result = _one(lake, source, kind, options)
+        except FlagdataError as error:
+            if len(sources) == 1:
+                raise
+            failures.append((source, error))
+            if not as_json:
+                fail(error, as_json=False)
+            continue
+        results.append(result)
+        if not as_json:
+            print_result(result)
+    if as_json:
+        document(
+            "ingest",
+            {
+                "lake": str(lake.path),
+                "results": [result.as_dict() for result in results],
+                "failures": [{"source": str(source), **error.as_dict()} for source, error in failures],
+            },
+        )
+    if failures:
+        say(f"flagdata: {len(failures)} of {len(sources)} sources failed: {', '.join(str(s) for s, _ in failures)}")
+        sys.exit(1)
+
+
+def _check_applies(guess: Any, source: Path, given: frozenset[str]) -> None:
+    """Refuse options that mean nothing for this source, before anything is written."""
+    foreign = WIND_ONLY if guess.kind == "camera" else CAMERA_ONLY
+    what = "a camera file" if guess.kind == "camera" else "an anemometer log"
+    for parameter in foreign:
+        if parameter in given:
+            raise UsageError(
+                f"{_option(parameter)} means nothing for {what}", where=str(source),
+                fix="leave it out, or ingest the sources it belongs to by themselves",
+            )  # fmt: skip
+
+
+def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:
+    from flagdata.ingest.store import ingest_camera, ingest_wind
+
+    if kind.kind != "camera":
+        return ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch)
+    with progress(None, label=source.name, unit="frame") as advance:
+        result = ingest_camera(
+            lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
+            progress=advance,
+        )  # fmt: skip
+    if options.crop_picture is not None:
+        _write_crop_picture(lake, result, options.crop_picture)
+    return result
+
+
+def _write_crop_picture(lake: Lake, result: IngestResult, path: Path) -> None:
+    from flagdata.ingest.store import CROP_PICTURE
+    from flagdata.record import Record
+
+    if result.artifact.object is None:
+        raise InputError("the artifact has no object", where=result.artifact.id, fix="run flagdata doctor")
+    _write(path, Record.open(lake.object_path(result.artifact.object)).attachment(CROP_PICTURE))
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", where=str(path), fix="choose another path") from None
+
+
+def _sniff(sources: Sequence[Path], options: _Given, *, as_json: bool) -> None:
+    from flagdata.ingest.camera import probe, propose_crop
+    from flagdata.ingest.classify import guesses
+
+    found: list[dict[str, Any]] = []
+    for source in sources:
+        ranked = guesses(source)
+        entry: dict[str, Any] = {"source": str(source), "guesses": [_guess(guess) for guess in ranked]}
+        if ranked[0].kind == "camera":
+            entry["camera"] = probe(source, options.camera.camera).as_dict()
+            if options.camera.camera.crop == "auto":
+                proposal = propose_crop(source, options.camera.camera)
+                entry["crop"] = {"box": list(proposal.box.as_tuple()), "share": proposal.share}
+                if options.crop_picture is not None:
+                    _write(options.crop_picture, proposal.picture)
+        found.append(entry)
+    if as_json:
+        document("sniff", {"sources": found})
+        return
+    for entry in found:
+        print_sniffed(entry)
+
+
+def _guess(guess: Guess) -> dict[str, Any]:
+    return {
+        "kind": guess.kind,
+        "format": guess.format,
+        "recipe": guess.recipe,
+        "score": guess.score,
+        "reasons": list(guess.reasons),
+        "fix": guess.fix,
+    }

@@ -1,0 +1,74 @@
+"""What `flagdata ingest` tells people: the report of an ingest, and what a source seems to be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from flagdata.ingest.store import IngestResult
+
+
+def print_result(result: IngestResult) -> None:
+    """One ingest for people, on stdout."""
+    artifact, report = result.artifact, result.report
+    if not result.created:
+        click.echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
+        return
+    click.echo(f"{artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
+    for label, text in _lines(report):
+        click.echo(f"  {label:<8} {text}")
+
+
+def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    lines = [("format", report["format"])]
+    lines += [("why", reason) for reason in report["reasons"]]
+    lines.append(("time", f"{report['start']} to {report['end']} ({report['span']:.3f} s)"))
+    rate = "–" if report["rate"] is None else f"{report['rate']:.6g} Hz"
+    if report["kind"] == "camera":
+        camera = report["camera"]
+        x, y, width, height = camera["crop"]
+        lines.append(("start", f"{camera['start']}, from {camera['start_from']}"))
+        lines.append(
+            ("frames", f"{report['frames']} at {rate}, worst stamp error {report['worst_stamp_error'] * 1e3:.3f} ms")
+        )
+        source = (
+            f"{camera['width']}×{camera['height']}, container {camera['container_rate']:.6g} Hz, "
+            f"true {camera['true_rate']:.6g} Hz, {'variable' if camera['variable_rate'] else 'constant'} rate; "
+            f"crop {width}×{height} at {x},{y}"
+        )
+        lines.append(("source", source))
+    else:
+        channels = ", ".join(f"{name} [{c['unit']}]" for name, c in report["channels"].items())
+        lines.append(("samples", f"{report['samples']}, median rate {rate}: {channels}"))
+        lines.append(("sensor", report["sensor"]["name"]))
+    for finding in report["findings"]:
+        where = f" ({finding['where']})" if finding["where"] else ""
+        lines.append((finding["severity"], f"{finding['kind']}: {finding['what']}{where}"))
+        if finding["fix"]:
+            lines.append(("", f"fix: {finding['fix']}"))
+    return lines
+
+
+def print_sniffed(entry: Mapping[str, Any]) -> None:
+    """One source and its guesses for people, on stdout."""
+    click.echo(entry["source"])
+    for guess in entry["guesses"]:
+        recipe = f", recipe {guess['recipe']}" if guess["recipe"] else ""
+        click.echo(f"  {guess['score']:.0%} {guess['kind']}: {guess['format']}{recipe}")
+        for reason in guess["reasons"]:
+            click.echo(f"    because {reason}")
+        if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
+            click.echo(f"    to do: {guess['fix']}")
+    if "camera" in entry:
+        seen = entry["camera"]
+        click.echo(
+            f"  {seen['container']} / {seen['codec']}, {seen['width']}×{seen['height']}, {seen['frames']} frames "
+            f"at {seen['rate']:.6g} Hz{' (variable)' if seen['variable_rate'] else ''}, {seen['duration']:.3f} s"
+        )
+        click.echo(f"  start: {seen['start'] or 'unknown, give --start'}")
+    if "crop" in entry:
+        box = ",".join(map(str, entry["crop"]["box"]))
+        click.echo(f"  crop: {box} holds {entry['crop']['share']:.0%} of the motion")

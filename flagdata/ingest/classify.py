@@ -1,0 +1,65 @@
+"""Whether a source is a camera's or an anemometer's, by its content and never by its name alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flagdata.errors import FlagdataError, InputError, UnknownNameError
+from flagdata.ingest.anemometer import Guess, sniff
+from flagdata.ingest.anemometer.formats import FORMATS
+from flagdata.ingest.camera import CameraProbe, probe
+
+CAMERA = "camera"
+
+
+def guesses(path: Path) -> tuple[Guess, ...]:
+    """What a source may be, the likeliest first; never empty. A file of no known signature is tried as a video.
+
+    Raises:
+        NotFoundError: there is no such source.
+    """
+    found = sniff(path)
+    if found[0].kind != "other":
+        return found
+    seen = _probe(path)
+    if seen is None:
+        return found
+    reason = f"FFmpeg reads it as {seen.container} with {seen.codec} video"
+    return (Guess(format="video", score=0.8, reasons=(reason,), kind="camera"), *found)
+
+
+def classify(path: Path, *, format_name: str | None = None, recipe: str | None = None) -> Guess:
+    """What a source is to be ingested as: a guess whose kind is "camera" or "anemometer".
+
+    Args:
+        format_name: the user's word for it: "camera" or an anemometer format; goes before the content.
+        recipe: a sensor recipe the user named, which makes it an anemometer's.
+
+    Raises:
+        InputError: something else (meshes, a record, an archive), with what to do.
+        UnknownNameError: no such format.
+        NotFoundError: there is no such source.
+    """
+    if format_name == CAMERA:
+        return Guess(format="video", score=1.0, reasons=("it was said to be a camera's",), kind="camera")
+    if format_name is not None:
+        if format_name not in FORMATS:
+            raise UnknownNameError.of("format", format_name, [CAMERA, *FORMATS], where="--as")
+        return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
+    if recipe is not None:
+        return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
+    best = guesses(path)[0]
+    if best.kind in ("camera", "anemometer"):
+        return best
+    raise InputError(
+        f"neither a camera file nor an anemometer log: {'; '.join(best.reasons)}",
+        where=str(path),
+        fix=best.fix or "see flagdata ingest --sniff",
+    )
+
+
+def _probe(path: Path) -> CameraProbe | None:
+    try:
+        return probe(path)
+    except FlagdataError:
+        return None
