@@ -134,6 +134,8 @@ class CameraInfo:
     duration: float
     crop: tuple[int, int, int, int]
     """x, y, width, height in the upright source image."""
+    start_sigma: float | None = None
+    """Standard uncertainty of reading `start` off the file [s], clock error apart; `None` where the user gave it."""
 
 
 class FrameStream(Protocol):

@@ -98,6 +98,12 @@ class Geometry:
         )
 
     @property
+    def placement(self) -> tuple[int, int, int, int]:
+        """Top, left, height and width of the crop in the output; black around it."""
+        wide, high = self._content
+        return ((self.size - high) // 2, (self.size - wide) // 2, high, wide)
+
+    @property
     def padded(self) -> bool:
         return self._content != (self.size, self.size)
 
@@ -134,7 +140,7 @@ class Geometry:
         if not self.padded:
             return np.ascontiguousarray(gray)
         square = np.zeros((self.size, self.size), dtype=np.uint8)
-        top, left = (self.size - high) // 2, (self.size - wide) // 2
+        top, left, high, wide = self.placement
         square[top : top + high, left : left + wide] = gray
         return square
 

@@ -65,8 +65,8 @@ class Source(Protocol):
         """Decoded pictures in order of presentation; once."""
         ...
 
-    def samples(self, runs: int, length: int) -> Iterator[list[Picture]]:
-        """About `runs` short runs of at most `length` consecutive pictures, spread over it; any number of times."""
+    def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
+        """At most `runs` runs of at most `count` pictures, every `stride`-th, spread over it; any number of times."""
         ...
 
     def damage(self) -> list[Finding]:

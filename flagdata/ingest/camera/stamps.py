@@ -82,13 +82,13 @@ def survey(stamps: NDArray[np.int64], *, tick: Fraction, missing: int, fallback_
     allowed = max(1.0, 0.01 * float(mean))
     variable = bool(np.mean(off > allowed) > 0.01)
     period = Fraction(round(median)) if variable else mean
-    head = np.sort(stamps[:_REORDER])
+    origin, end = int(stamps[:_REORDER].min()), int(stamps[-_REORDER:].max())
     return Timing(
         tick=tick,
-        origin=int(head[0]),
+        origin=origin,
         period=period,
         variable=variable,
-        span=int(ordered[-1] - head[0]),
+        span=end - origin if end > origin else int(ordered[-1]) - origin,
         shortest=int(steps.min()),
         longest=int(steps.max()),
         count=len(stamps),

@@ -7,11 +7,13 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
-from flagdata.errors import InputError, LimitError, UsageError
+from flagdata.errors import LimitError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import GridReport, Resampler
+from flagdata.ingest.camera.motion import CropProposal, propose
 from flagdata.ingest.camera.options import CameraOptions, exact
+from flagdata.ingest.camera.sequence import SequenceSource
 from flagdata.ingest.camera.source import Picture, Source
 from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
 from flagdata.ingest.camera.start import find_start
@@ -21,7 +23,12 @@ from flagdata.timebase import NANOSECONDS
 
 
 class CameraStream:
-    """A `FrameStream`: opened by `open_camera`, read once, in constant memory, closed by its `with` block."""
+    """A `FrameStream`: opened by `open_camera`, read once, in constant memory, closed by its `with` block.
+
+    Attributes:
+        info: the file after its options are settled.
+        proposal: the crop found from motion, with its picture; `None` unless `options.crop` is "auto".
+    """
 
     def __init__(self, source: Source, path: Path, options: CameraOptions) -> None:
         self._source = source
@@ -46,7 +53,11 @@ class CameraStream:
         )  # fmt: skip
         self._opening += start.findings
         width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
-        crop = settle_crop(options.crop, width=width, height=height)
+        self.proposal: CropProposal | None = None
+        if options.crop == "auto":
+            self.proposal = propose(source, rate=float(timing.rate / self._scale), where=str(path))
+            self._opening.append(_proposed(self.proposal))
+        crop = settle_crop(self.proposal.box if self.proposal else options.crop, width=width, height=height)
         self._geometry = Geometry(
             width=facts.width, height=facts.height, aspect=facts.aspect, orientation=facts.orientation, crop=crop,
             size=options.size,
@@ -64,6 +75,7 @@ class CameraStream:
             rotation=facts.orientation.clockwise,
             start=start.instant,
             start_from=start.source,
+            start_sigma=start.sigma,
             duration=duration,
             crop=crop.as_tuple(),
         )
@@ -169,6 +181,15 @@ class CameraStream:
         return found
 
 
+def _proposed(proposal: CropProposal) -> Finding:
+    return Finding(
+        kind="crop-proposed", severity=Severity.NOTE,
+        what=f"the crop {proposal.box} was drawn around {proposal.share:.0%} of the motion in {proposal.runs} runs of "
+        "frames; look at its picture",
+        value=proposal.share,
+    )  # fmt: skip
+
+
 def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
     what = (
         f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled by {float(scale):.6g}"
@@ -238,6 +259,22 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 
 def open_source(path: Path, options: CameraOptions) -> Source:
-    if path.is_dir():
-        raise InputError("a folder is not a video", where=str(path), fix="give the video file")
-    return VideoSource(path, options)
+    """The reader for `path`: a folder is an image sequence, anything else a video file."""
+    return SequenceSource(path, options) if path.is_dir() else VideoSource(path, options)
+
+
+def propose_crop(path: Path | str, options: CameraOptions | None = None) -> CropProposal:
+    """The crop that the motion in a camera file suggests, with a picture of it; needs no start time.
+
+    Raises:
+        RefusedError: nothing moves, or motion is all over the image.
+        NotFoundError, InputError, LimitError, TimeError, UsageError: as `open_camera`.
+    """
+    path = Path(path)
+    options = options or CameraOptions()
+    source = open_source(path, options)
+    try:
+        rate = exact(options.true_fps) if options.true_fps is not None else source.facts.timing.rate
+        return propose(source, rate=float(rate), where=str(path))
+    finally:
+        source.close()

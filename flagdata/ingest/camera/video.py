@@ -4,37 +4,36 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import cast
 
 import av
-import av.error
-import av.stream
 import numpy as np
-from av.container import InputContainer
 from av.sidedata.sidedata import SideData, Type
 from av.video.stream import VideoStream
 
-from flagdata.errors import InputError, LimitError, NotFoundError, TimeError, UsageError
+from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.avchd import recording_time
+from flagdata.ingest.camera.container import (
+    BY_DECODE_ORDER,
+    DECODE_ERRORS,
+    UNTIMED,
+    check_file,
+    open_container,
+    packets,
+    survey_file,
+)
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import luma_of_frame
-from flagdata.ingest.camera.options import CameraOptions, Limits, exact
+from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
-from flagdata.ingest.camera.stamps import Timing, survey
+from flagdata.ingest.camera.stamps import Timing
 
-# Containers of one file's own frames. Playlists and scripts that name other files or addresses (HLS, DASH, concat, SDP)
-# are not among them.
-_FORMATS = (
-    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpegts,avi,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,mxf,flv,asf,ogg,gif,apng,dv,ivf,"
-    "yuv4mpegpipe,nut,wtv"
-)
-_UNTIMED = frozenset({"h264", "hevc", "mjpeg", "m4v", "mpegvideo"})
-_BY_DECODE_ORDER = frozenset({"avi"})
-_DECODE_ERRORS = (av.error.FFmpegError, ValueError, OSError)
+_FARTHEST = 1000  # frames decoded in vain to reach a place between key frames
 
 
 class VideoSource:
@@ -55,13 +54,10 @@ class VideoSource:
         self._corrupt_frames = 0
         self._suspect_frames = 0
         self._resized = 0
-        if not path.is_file():
-            raise NotFoundError("there is no such file", where=str(path), fix="check the path")
-        if path.stat().st_size == 0:
-            raise InputError("the file is empty", where=str(path), fix="copy it from the camera again")
-        timing, surveyed = _survey(path, options)
+        check_file(path)
+        timing, surveyed = survey_file(path, options)
         self._timing = timing
-        self._container, self._stream = _open(path, options.limits, threads=options.threads)
+        self._container, self._stream = open_container(path, options.limits, threads=options.threads)
         try:
             self._decoded = self._decode()
             first = next(self._decoded, None)
@@ -90,8 +86,8 @@ class VideoSource:
             interlaced=bool(first.interlaced_frame),
             timing=self._timing,
             metadata=metadata,
-            recorded=None,
-            sequence=self._container.format.name in _UNTIMED,
+            recorded=_recorded(first),
+            sequence=self._container.format.name in UNTIMED,
             findings=tuple(findings),
         )
 
@@ -134,7 +130,7 @@ class VideoSource:
         return found
 
     def pictures(self) -> Iterator[Picture]:
-        codec = self._stream.codec_context.name
+        codec = self.facts.codec
         stamp, frame = self._first
         yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
         for stamp, frame in self._decoded:
@@ -143,35 +139,33 @@ class VideoSource:
                 continue
             yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
 
-    def samples(self, runs: int, length: int) -> Iterator[list[Picture]]:
-        container, stream = _open(self._path, self._options.limits, threads=self._options.threads)
+    def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
+        container, stream = open_container(self._path, self._options.limits, threads=self._options.threads)
         with container:
-            codec = stream.codec_context.name
-            seen: set[int | None] = set()
+            keys: set[int | None] = set()
             for run in range(runs):
                 target = self._timing.origin + self._timing.span * run // runs
-                run_pictures: list[Picture] = []
+                pictures: list[Picture] = []
                 try:
                     container.seek(target, stream=stream)
-                    for frame in container.decode(stream):
+                    for frame in _run(container.decode(stream), keys, target=target, stride=stride):
                         if (frame.width, frame.height) == (self.facts.width, self.facts.height):
-                            luma = partial(luma_of_frame, frame, codec=codec)
-                            run_pictures.append(Picture(stamp=frame.pts, luma=luma))
-                        if len(run_pictures) == length:
+                            luma = partial(luma_of_frame, frame, codec=self.facts.codec)
+                            pictures.append(Picture(stamp=frame.pts, luma=luma))
+                        if len(pictures) == count:
                             break
-                except _DECODE_ERRORS:
+                except DECODE_ERRORS:
                     # A spot that cannot be decoded is no loss to a sample; what came before it counts.
                     pass
-                if run_pictures and run_pictures[0].stamp not in seen:
-                    seen.add(run_pictures[0].stamp)
-                    yield run_pictures
+                if pictures:
+                    yield pictures
 
     def _decode(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
         """(stamp, frame) in order of presentation."""
-        ordered = _DecodeOrderStamps(self._timing) if self._container.format.name in _BY_DECODE_ORDER else None
+        ordered = _DecodeOrderStamps(self._timing) if self._container.format.name in BY_DECODE_ORDER else None
         damaged = False
         count = 0
-        for packet in _packets(self._container, self._stream):
+        for packet in packets(self._container, self._stream):
             count += 1
             stamp = packet.pts if packet.pts is not None else packet.dts
             if packet.is_corrupt:
@@ -182,7 +176,7 @@ class VideoSource:
                 if ordered is not None:
                     ordered.sent(stamp)
                 frames = packet.decode()
-            except _DECODE_ERRORS:
+            except DECODE_ERRORS:
                 self._bad(count)
                 damaged = True
                 continue
@@ -243,6 +237,24 @@ class VideoSource:
         self._container.close()
 
 
+def _run(
+    frames: Iterator[av.VideoFrame], keys: set[int | None], *, target: int, stride: int
+) -> Iterator[av.VideoFrame]:
+    """Every `stride`-th of the frames after a seek, from the key frame it landed on.
+
+    Where an earlier run began with that frame, from `target` on. Adds the first frame's stamp to `keys`.
+    """
+    first = next(frames, None)
+    if first is None:
+        return
+    if first.pts in keys:
+        first = next((frame for frame in islice(frames, _FARTHEST) if (frame.pts or 0) >= target), None)
+    if first is not None:
+        keys.add(first.pts)
+        yield first
+        yield from islice(frames, stride - 1, None, stride)
+
+
 class _DecodeOrderStamps:
     """Stamps for containers that number frames in decoding order: presentation takes them in increasing order."""
 
@@ -261,146 +273,6 @@ class _DecodeOrderStamps:
         return heapq.heappop(self._waiting) if self._waiting else own
 
 
-@contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except (av.error.FFmpegError, ValueError, OSError, MemoryError) as error:
-        if isinstance(error, av.error.FileNotFoundError):
-            raise NotFoundError("there is no such file", where=str(path), fix="check the path") from error
-        raise InputError(
-            f"the file cannot be opened as a video ({error.__class__.__name__}: {_reason(error)})",
-            where=str(path),
-            fix=_advice(path),
-        ) from error
-
-
-def _reason(error: BaseException) -> str:
-    return str(getattr(error, "strerror", None) or error)
-
-
-def _advice(path: Path) -> str:
-    """What to do about a file that will not open; an unfinished MP4 is the common case."""
-    with path.open("rb") as stream:
-        head = stream.read(12)
-    if head[4:8] in (b"ftyp", b"mdat", b"wide", b"free"):
-        return (
-            "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair it with a "
-            "recovery tool and an intact file of the same camera"
-        )
-    return "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG images"
-
-
-def _open(path: Path, limits: Limits, *, threads: int) -> tuple[InputContainer, VideoStream]:
-    """The container and its first real video stream, ready to decode; nothing is decoded yet.
-
-    Raises:
-        InputError, LimitError, NotFoundError: see `VideoSource`.
-    """
-    with _reading(path):
-        container = av.open(
-            f"file:{path.resolve()}",
-            options={
-                "protocol_whitelist": "file",
-                "format_whitelist": _FORMATS,
-                "max_pixels": str(limits.frame_pixels),
-            },
-            metadata_errors="replace",
-        )
-    try:
-        stream = _choose(container, path)
-        context = stream.codec_context
-        if context.width * context.height > limits.frame_pixels:
-            raise LimitError(
-                f"frames of {context.width} × {context.height} px are beyond the limit of {limits.frame_pixels} px",
-                where=str(path), fix="raise the limit if the file is to be trusted",
-            )  # fmt: skip
-        context.options = {"max_pixels": str(limits.frame_pixels)}
-        context.thread_count = threads
-        context.thread_type = "FRAME" if threads > 1 else "SLICE"
-    except BaseException:
-        container.close()
-        raise
-    return container, stream
-
-
-def _choose(container: InputContainer, path: Path) -> VideoStream:
-    """The first video stream that is not a cover picture."""
-    for stream in container.streams.video:
-        if not stream.disposition & av.stream.Disposition.attached_pic:
-            return stream
-    kinds = sorted({stream.type for stream in container.streams}) or ["nothing"]
-    raise InputError(f"the file holds {', '.join(kinds)} but no video", where=str(path), fix="give the video file")
-
-
-def _packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Packet]:
-    """Packets of the stream, the flushing one last; damage of the container ends them."""
-    try:
-        yield from container.demux(stream)
-    except _DECODE_ERRORS:
-        flush = av.Packet()
-        flush.stream = stream
-        yield flush
-
-
-def _survey(path: Path, options: CameraOptions) -> tuple[Timing, list[Finding]]:
-    """The timing of a file by its packets, without decoding; refuses what is beyond the limits."""
-    limits = options.limits
-    container, stream = _open(path, limits, threads=1)
-    with container:
-        pixels = max(1, stream.codec_context.width * stream.codec_context.height)
-        stamps: list[int] = []
-        missing = 0
-        for packet in _packets(container, stream):
-            if packet.size == 0 and packet.pts is None and packet.dts is None:
-                continue
-            if packet.is_discard:
-                continue
-            stamp = packet.pts if packet.pts is not None else packet.dts
-            if stamp is None:
-                missing += 1
-            else:
-                stamps.append(stamp)
-            count = len(stamps) + missing
-            if count > limits.frames or count * pixels > limits.total_pixels:
-                raise LimitError(
-                    f"more than {count - 1} frames of {pixels} px are beyond the limit of {limits.frames} frames and "
-                    f"{limits.total_pixels} px in all",
-                    where=str(path), fix="cut the file into parts, or raise the limit",
-                )  # fmt: skip
-        untimed = container.format.name in _UNTIMED
-        tick = stream.time_base or Fraction(1, 1000)
-        rate = stream.average_rate or None
-        stated_frames = stream.frames
-    if untimed:
-        if options.sequence_fps is None:
-            raise TimeError(
-                "a raw stream has no time stamps and states no frame rate",
-                where=str(path), fix="give the camera's frame rate (sequence_fps), or wrap the stream in a container",
-            )  # fmt: skip
-        count = len(stamps) + missing
-        tick = 1 / exact(options.sequence_fps)
-        timing = survey(np.arange(count, dtype=np.int64), tick=tick, missing=0, fallback_rate=1 / tick)
-    else:
-        if options.sequence_fps is not None:
-            raise UsageError(
-                "sequence_fps is for image sequences and raw streams; this file has time stamps of its own",
-                where=str(path), fix="drop it, or give true_fps if the container lies about a high-speed camera",
-            )  # fmt: skip
-        timing = survey(np.array(stamps, dtype=np.int64), tick=tick, missing=missing, fallback_rate=rate)
-    found = []
-    read = timing.count + timing.missing
-    if stated_frames > read:
-        found.append(
-            Finding(
-                kind="truncated", severity=Severity.ERROR,
-                what=f"the file states {stated_frames} frames and holds {read}: it is cut off", where=f"frame {read}",
-                count=stated_frames - read,
-            )
-        )  # fmt: skip
-    return timing, found
-
-
 def _pixel_aspect(stream: VideoStream) -> Fraction:
     aspect = stream.sample_aspect_ratio or stream.codec_context.sample_aspect_ratio
     return Fraction(aspect) if aspect and aspect > 0 else Fraction(1)
@@ -416,3 +288,12 @@ def _orientation(frame: av.VideoFrame) -> Orientation:
         if data.type is Type.DISPLAYMATRIX:
             return Orientation.of_display_matrix(np.frombuffer(memoryview(data), dtype="<i4").tolist())
     return Orientation()
+
+
+def _recorded(frame: av.VideoFrame) -> str | None:
+    for data in _side_data(frame):
+        if data.type is Type.SEI_UNREGISTERED:
+            text = recording_time(bytes(memoryview(data)))
+            if text is not None:
+                return text
+    return None

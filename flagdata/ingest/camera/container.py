@@ -1,0 +1,239 @@
+"""Opening video files safely: which containers, what their headers get refused, what the packets say of the timing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import av.error
+import av.stream
+import numpy as np
+from av.container import InputContainer
+from av.video.stream import VideoStream
+
+from flagdata.errors import InputError, LimitError, NotFoundError, TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.options import CameraOptions, Limits, exact
+from flagdata.ingest.camera.stamps import Timing, survey
+
+# Containers of one file's own frames. Playlists and scripts that name other files or addresses (HLS, DASH, concat, SDP)
+# are not among them.
+_FORMATS = (
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpegts,avi,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,mxf,flv,asf,ogg,gif,apng,dv,ivf,"
+    "yuv4mpegpipe,nut,wtv"
+)
+# Raw streams: FFmpeg numbers their frames at 25 Hz, which is nobody's measurement.
+UNTIMED = frozenset({"h264", "hevc", "mjpeg", "m4v", "mpegvideo"})
+# Containers that number packets in decoding order.
+BY_DECODE_ORDER = frozenset({"avi"})
+DECODE_ERRORS = (av.error.FFmpegError, ValueError, OSError)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (av.error.FFmpegError, ValueError, OSError, MemoryError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"the file cannot be opened as a video ({reason})", where=str(path), fix=_advice(path)
+        ) from error
+
+
+def _advice(path: Path) -> str:
+    """What to do about a file that will not open; an unfinished MP4 is the common case."""
+    with path.open("rb") as stream:
+        head = stream.read(12)
+    if head[4:8] in (b"ftyp", b"mdat", b"wide", b"free"):
+        return (
+            "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair it with a "
+            "recovery tool and an intact file of the same camera"
+        )
+    return "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG images"
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is not a file with something in it.
+
+    Raises:
+        NotFoundError, InputError
+    """
+    try:
+        size = path.stat().st_size if path.is_file() else None
+    except (OSError, ValueError) as error:
+        raise NotFoundError(f"the path cannot be used ({error})", where=repr(str(path)), fix="check it") from error
+    if size is None:
+        raise NotFoundError("there is no such file", where=str(path), fix="check the path")
+    if size == 0:
+        raise InputError("the file is empty", where=str(path), fix="copy it from the camera again")
+
+
+def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputContainer, VideoStream]:
+    """The container and its first real video stream, ready to decode; nothing is decoded yet.
+
+    Raises:
+        InputError: not a video.
+        LimitError: its header states frames beyond the limit.
+    """
+    with _reading(path):
+        container = av.open(
+            f"file:{path.resolve()}",
+            options={
+                "protocol_whitelist": "file",
+                "format_whitelist": _FORMATS,
+                "max_pixels": str(limits.frame_pixels),
+            },
+            metadata_errors="replace",
+        )
+    try:
+        stream = _choose(container, path)
+        context = stream.codec_context
+        if context.width * context.height > limits.frame_pixels:
+            raise LimitError(
+                f"frames of {context.width} × {context.height} px are beyond the limit of {limits.frame_pixels} px",
+                where=str(path), fix="raise the limit if the file is to be trusted",
+            )  # fmt: skip
+        # The decoder itself refuses frames that turn out larger than the header said.
+        context.options = {"max_pixels": str(limits.frame_pixels)}
+        context.thread_count = threads
+        context.thread_type = "FRAME" if threads > 1 else "SLICE"
+    except BaseException:
+        container.close()
+        raise
+    return container, stream
+
+
+def _choose(container: InputContainer, path: Path) -> VideoStream:
+    """The first video stream that is not a cover picture and that there is a decoder for."""
+    for stream in container.streams.video:
+        if stream.disposition & av.stream.Disposition.attached_pic:
+            continue
+        try:
+            stream.codec_context  # noqa: B018
+        except (RuntimeError, av.error.FFmpegError, AttributeError):
+            continue
+        if stream.codec_context is not None:
+            return stream
+    kinds = sorted({stream.type for stream in container.streams}) or ["nothing"]
+    raise InputError(
+        f"the file holds {', '.join(kinds)} but no video that can be decoded",
+        where=str(path),
+        fix="give the video file",
+    )
+
+
+def packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Packet]:
+    """Packets of the stream, the empty one that flushes the decoder last; damage of the container ends them."""
+    try:
+        yield from container.demux(stream)
+    except DECODE_ERRORS:
+        flush = av.Packet()
+        flush.stream = stream
+        yield flush
+
+
+def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Finding]]:
+    """The timing of a file by its packets, without decoding, and whether it is cut off.
+
+    Raises:
+        InputError: not a video.
+        LimitError: more frames or pixels than the limits.
+        TimeError: a raw stream and no `sequence_fps`.
+        UsageError: `sequence_fps` for a file with stamps of its own.
+    """
+    limits = options.limits
+    container, stream = open_container(path, limits, threads=1)
+    with container:
+        pixels = max(1, stream.codec_context.width * stream.codec_context.height)
+        stamps: list[int] = []
+        missing = 0
+        discarded = 0
+        for packet in packets(container, stream):
+            if packet.size == 0 and packet.pts is None and packet.dts is None:
+                continue
+            if packet.is_discard:
+                discarded += 1
+                continue
+            stamp = packet.pts if packet.pts is not None else packet.dts
+            if stamp is None:
+                missing += 1
+            else:
+                stamps.append(stamp)
+            count = len(stamps) + missing
+            if count > limits.frames or count * pixels > limits.total_pixels:
+                raise LimitError(
+                    f"more than {count - 1} frames of {pixels} px are beyond the limit of {limits.frames} frames and "
+                    f"{limits.total_pixels} px in all",
+                    where=str(path), fix="cut the file into parts, or raise the limit",
+                )  # fmt: skip
+        timing = _timing(path, options, container, stream, stamps, missing)
+        findings = _truncation(path, container, stream, timing, read=len(stamps) + missing + discarded)
+    return timing, findings
+
+
+def _timing(
+    path: Path,
+    options: CameraOptions,
+    container: InputContainer,
+    stream: VideoStream,
+    stamps: list[int],
+    missing: int,
+) -> Timing:
+    if container.format.name in UNTIMED:
+        if options.sequence_fps is None:
+            raise TimeError(
+                "a raw stream has no time stamps", where=str(path),
+                fix="give the camera's frame rate (sequence_fps), or wrap the stream in a container with stamps",
+            )  # fmt: skip
+        rate = exact(options.sequence_fps)
+        places = np.arange(len(stamps) + missing, dtype=np.int64)
+        return survey(places, tick=1 / rate, missing=0, fallback_rate=rate)
+    if options.sequence_fps is not None:
+        raise UsageError(
+            "sequence_fps is for image sequences and raw streams; this file has time stamps of its own",
+            where=str(path), fix="drop it, or give true_fps if the container lies about a high-speed camera",
+        )  # fmt: skip
+    tick = stream.time_base or Fraction(1, 1000)
+    rate = stream.average_rate or stream.guessed_rate
+    return survey(np.array(stamps, dtype=np.int64), tick=tick, missing=missing, fallback_rate=rate or None)
+
+
+def _truncation(
+    path: Path, container: InputContainer, stream: VideoStream, timing: Timing, *, read: int
+) -> list[Finding]:
+    """Whether the file ends before its own header says, or inside a transport packet."""
+    if stream.frames > read:
+        return [
+            Finding(
+                kind="truncated", severity=Severity.ERROR,
+                what=f"the file states {stream.frames} frames and holds {read}: it is cut off", where=f"frame {read}",
+                count=stream.frames - read,
+            )
+        ]  # fmt: skip
+    name = container.format.name
+    if name.startswith("matroska") and container.duration is not None and len(container.streams) == 1:
+        stated = Fraction(container.duration, 1_000_000)
+        held = (timing.span + timing.period) * timing.tick
+        lost = stated - held
+        if lost > max(Fraction(1, 2), 3 * timing.period * timing.tick):
+            return [
+                Finding(
+                    kind="truncated", severity=Severity.ERROR,
+                    what=f"the file states {float(stated):.2f} s and holds {float(held):.2f} s: it is cut off",
+                    where=f"frame {read}", count=max(1, int(lost / (timing.period * timing.tick))), value=float(lost),
+                )
+            ]  # fmt: skip
+    if name == "mpegts":
+        with path.open("rb") as raw:
+            length = 192 if raw.read(5)[4:5] == b"\x47" else 188
+        if path.stat().st_size % length:
+            return [
+                Finding(
+                    kind="truncated", severity=Severity.WARNING,
+                    what=f"the file is not a whole number of transport packets of {length} B: it is cut off or damaged",
+                )
+            ]  # fmt: skip
+    return []

@@ -1,0 +1,191 @@
+"""Where the motion is: a crop proposed from it, and a picture of the proposal for a person to judge.
+
+Short runs of frames are taken all over the recording. In each run the brightness of every frame is fitted to the run's
+median frame (gain and offset, over the pixels that hold still), so that flicker and exposure control are not motion.
+What remains is the temporal standard deviation of each pixel. Where its mean square over the runs stands out, there are
+regions; the one with the most motion in the median run is the flag's, since a passer-by is in few of the runs. The
+proposal is the square around it.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+from scipy import ndimage
+
+from flagdata.errors import RefusedError
+from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
+from flagdata.ingest.camera.options import CropBox
+from flagdata.ingest.camera.source import Picture, Source
+
+_RUNS = 10
+_PER_RUN = 8
+_STEP = 0.03  # s between the frames of a run: a flag's motion shows, and a run stays within a tenth of its gusts
+_WORK = 192  # px, longer side of the images that are compared
+_SHOW = 960  # px, longer side of the picture
+_FAINTEST = 1.0  # gray levels; less motion than one is coding noise
+_BRIDGE = 8  # px of the images that are compared
+_PAD = 0.15  # of the motion's extent, on each side: the hoist of a flag hardly moves
+_LEAST_SHARE = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class CropProposal:
+    """A crop found from motion.
+
+    Attributes:
+        box: of the upright image; square, unless the motion is longer than the image's shorter side.
+        share: part of the motion's energy that lies in the region the box was drawn around, 0 to 1.
+        runs: runs of frames it rests on.
+        picture: PNG of the whole upright image, the motion in red, the box in yellow.
+    """
+
+    box: CropBox
+    share: float
+    runs: int
+    picture: bytes
+
+
+def propose(source: Source, *, rate: float, where: str) -> CropProposal:
+    """The crop that the motion in `source` suggests.
+
+    Args:
+        rate: true frame rate of the source [Hz].
+
+    Raises:
+        RefusedError: nothing moves, or motion is all over the image.
+    """
+    facts = source.facts
+    wide, high = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
+    whole = settle_crop("whole", width=wide, height=high)
+    maps: list[NDArray[np.float32]] = []
+    shown: NDArray[np.uint8] | None = None
+    stride = min(8, max(1, round(_STEP * rate)))
+    for pictures in source.samples(_RUNS, _PER_RUN, stride):
+        if len(pictures) < 3:
+            continue
+        frames = np.stack([_small(picture, source, whole, _WORK) for picture in pictures])
+        maps.append(_deviation(frames))
+        if shown is None:
+            shown = _small(pictures[0], source, whole, _SHOW)
+    if not maps or shown is None:
+        raise RefusedError(
+            "too few frames to see motion in", where=where, fix="give the crop as x,y,width,height, or take it whole"
+        )
+    stack = np.stack(maps)
+    motion = np.sqrt(np.mean(stack**2, axis=0))
+    region, share = _region(stack, motion, where=where)
+    box = _box_around(region, wide=wide, high=high)
+    if share < _LEAST_SHARE:
+        raise RefusedError(
+            f"motion is all over the image: its largest region carries {share:.0%} of it",
+            where=where, fix="give the crop as x,y,width,height",
+        )  # fmt: skip
+    return CropProposal(box=box, share=share, runs=len(maps), picture=_draw(shown, motion, box, wide=wide))
+
+
+def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> NDArray[np.uint8]:
+    """The whole upright picture with its longer side scaled to `size`, without padding."""
+    facts, luma = source.facts, picture.luma()
+    geometry = Geometry(
+        width=facts.width,
+        height=facts.height,
+        aspect=facts.aspect,
+        orientation=facts.orientation,
+        crop=whole,
+        size=size,
+    )
+    top, left, high, wide = geometry.placement
+    return geometry.render(luma.image, black=luma.black, white=luma.white)[top : top + high, left : left + wide]
+
+
+def _deviation(frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Temporal standard deviation of each pixel, global changes of gain and offset taken out; (n, h, w) → (h, w)."""
+    stack = frames.astype(np.float32)
+    reference = np.median(stack, axis=0)
+    spread = stack.std(axis=0)
+    still = spread <= np.median(spread)
+    x = reference[still]
+    centred = x - x.mean()
+    power = float(centred @ centred)
+    for image in stack:
+        y = image[still]
+        gain = float(centred @ (y - y.mean())) / power if power > 0 else 1.0
+        gain = gain if gain > 0.1 else 1.0
+        image -= y.mean()
+        image /= gain
+        image += x.mean()
+    return stack.std(axis=0)
+
+
+def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: str) -> tuple[NDArray[np.bool_], float]:
+    """The connected region with most of the motion's energy in the median run, and its share of it.
+
+    Args:
+        maps: (run, height, width) deviation in each run.
+        motion: (height, width) their root mean square.
+    """
+    smooth = ndimage.gaussian_filter(motion, 1.5)
+    middle = float(np.median(smooth))
+    noise = 1.4826 * float(np.median(np.abs(smooth - middle)))
+    peak = float(np.percentile(smooth, 99.5))
+    if peak - middle < _FAINTEST:
+        raise RefusedError("nothing moves in the image", where=where, fix="give the crop as x,y,width,height")
+    moving = smooth > middle + max(_FAINTEST / 2, min(4 * noise, 0.5 * (peak - middle)), 0.1 * (peak - middle))
+    # Parts of one flag that move apart by a few pixels are one region.
+    labels = np.empty(moving.shape, dtype=np.int32)
+    ndimage.label(ndimage.binary_dilation(moving, iterations=_BRIDGE), output=labels)
+    names = np.arange(1, labels.max() + 1)
+    sums = np.array([ndimage.sum_labels(np.where(moving, run**2, 0.0), labels, index=names) for run in maps])
+    energy = np.median(sums, axis=0)
+    if energy.sum() == 0:
+        raise RefusedError(
+            "motion comes and goes: no region moves in most of the recording", where=where,
+            fix="give the crop as x,y,width,height",
+        )  # fmt: skip
+    best = int(np.argmax(energy))
+    return moving & (labels == best + 1), float(energy[best] / energy.sum())
+
+
+def _box_around(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:
+    """The padded square around `region`, in pixels of the upright image, moved inside it and cut where it is larger."""
+    rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
+    scale = wide / region.shape[1]
+    left, right = columns[0] * scale, (columns[-1] + 1) * scale
+    top, bottom = rows[0] * scale, (rows[-1] + 1) * scale
+    extent = max(right - left, bottom - top)
+    # The padding never makes a box oblong; only motion longer than the image's shorter side does.
+    side = min(extent * (1 + 2 * _PAD), max(extent, min(wide, high)))
+    width, height = min(wide, round(side)), min(high, round(side))
+    x = min(max(0, round((left + right - width) / 2)), wide - width)
+    y = min(max(0, round((top + bottom - height) / 2)), high - height)
+    return CropBox(x=x, y=y, width=width, height=height)
+
+
+def _draw(shown: NDArray[np.uint8], motion: NDArray[np.floating], box: CropBox, *, wide: int) -> bytes:
+    heat = Image.fromarray(motion.astype(np.float32)).resize(
+        (shown.shape[1], shown.shape[0]), Image.Resampling.BILINEAR
+    )
+    strength = np.clip(np.asarray(heat) / max(float(np.percentile(motion, 99.5)), 1e-6), 0.0, 1.0)
+    dim = shown * 0.75
+    rgb = np.stack([dim + (255 - dim) * strength, dim * (1 - strength), dim * (1 - strength)], axis=-1)
+    picture = Image.fromarray(np.rint(rgb).astype(np.uint8), mode="RGB")
+    scale = shown.shape[1] / wide
+    corners = _scaled(box, scale)
+    pen = ImageDraw.Draw(picture)
+    pen.rectangle(corners, outline=(255, 220, 0), width=3)
+    pen.text((corners[0] + 6, corners[1] + 6), str(box), fill=(255, 220, 0))
+    stream = io.BytesIO()
+    picture.save(stream, format="PNG")
+    return stream.getvalue()
+
+
+def _scaled(box: CropBox, scale: float) -> Sequence[float]:
+    return (
+        box.x * scale, box.y * scale, (box.x + box.width) * scale - 1, (box.y + box.height) * scale - 1,
+    )  # fmt: skip

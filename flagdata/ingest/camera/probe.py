@@ -1,0 +1,97 @@
+"""What a camera file says of itself, without choosing a start or reading it through the decoder."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import TimeError
+from flagdata.findings import Finding
+from flagdata.ingest.camera.geometry import upright_size
+from flagdata.ingest.camera.options import CameraOptions
+from flagdata.ingest.camera.start import Start, find_start
+from flagdata.ingest.camera.stream import open_source
+from flagdata.timebase import iso
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraProbe:
+    """A camera file as its headers, packets and first frame describe it.
+
+    Attributes:
+        width, height: of the upright image with square pixels [px].
+        rotation: degrees clockwise that turn the stored picture upright.
+        rate: of the container's stamps [Hz]; true_fps is the user's knowledge.
+        shortest, longest: steps between neighbouring stamps [s].
+        frames: in the file.
+        duration: from the first stamp to the last [s].
+        start: where the metadata tell it, else `None`.
+    """
+
+    container: str
+    codec: str
+    pixel_format: str
+    width: int
+    height: int
+    rotation: int
+    interlaced: bool
+    rate: float
+    variable_rate: bool
+    shortest: float
+    longest: float
+    frames: int
+    duration: float
+    start: Start | None
+    findings: tuple[Finding, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values, the start as ISO 8601 text."""
+        fields = {k: v for k, v in asdict(self).items() if k not in ("start", "findings")}
+        return {
+            **fields,
+            "start": iso(self.start.instant) if self.start else None,
+            "start_from": self.start.source if self.start else None,
+            "start_sigma": self.start.sigma if self.start else None,
+            "findings": [finding.as_dict() for finding in self.findings],
+        }
+
+
+def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe:
+    """Look at a camera file or image sequence: headers, all packets, one decoded frame.
+
+    Raises:
+        NotFoundError, InputError, LimitError, TimeError, UsageError: as `open_camera`, but a missing start is no error.
+    """
+    path = Path(path)
+    options = options or CameraOptions()
+    source = open_source(path, options)
+    try:
+        facts, timing = source.facts, source.facts.timing
+        try:
+            start = find_start(
+                options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=timing.duration,
+                where=str(path),
+            )  # fmt: skip
+        except TimeError:
+            start = None
+        width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
+        return CameraProbe(
+            container=facts.container,
+            codec=facts.codec,
+            pixel_format=facts.pixel_format,
+            width=width,
+            height=height,
+            rotation=facts.orientation.clockwise,
+            interlaced=facts.interlaced,
+            rate=float(timing.rate),
+            variable_rate=timing.variable,
+            shortest=float(timing.shortest * timing.tick),
+            longest=float(timing.longest * timing.tick),
+            frames=timing.count + timing.missing,
+            duration=timing.duration,
+            start=start,
+            findings=(*facts.findings, *(start.findings if start else ())),
+        )
+    finally:
+        source.close()
