@@ -6,123 +6,142 @@ out again from the subset alone. Messages, schemas and metadata are copied byte 
 
 from __future__ import annotations
 
-import heapq
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from types import TracebackType
+from typing import Any, ClassVar, Self
 
-from mcap.exceptions import McapError
-from mcap.reader import McapReader, make_reader
-from mcap.records import Channel, Message, Schema
+import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from flagdata.errors import CorruptError, UsageError
-from flagdata.export.source import Entry, Source, label_units
+from flagdata.errors import UsageError
+from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.record import Coding
+from flagdata.record.container import Messages, open_file, read_exact, read_messages, read_summary
+from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 
 SAMPLE = "sample"
 """Metadata record of a subset: the artifact it is, the object it was cut from, and its label as JSON."""
 CHUNK_BYTES = 1 << 20  # uncompressed, as in committed records: readers reach a frame directly
 
-_Copied: TypeAlias = tuple[Schema | None, Channel, Message]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Mcap:
     """Files <artifact>.mcap."""
 
-    kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA, Kind.WIND})
+    kinds: ClassVar[frozenset[Kind]] = FILMED | {Kind.WIND}
 
     def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         frames = 0
-        for entry in source.entries():
-            target = folder / f"{entry.key}.mcap"
-            if entry.is_slice:
-                if entry.record.coding is Coding.H264:
-                    raise UsageError(
-                        "a clip cut out of H.264 cannot be decoded without the frames before it",
-                        where=entry.key,
-                        fix="export it as mp4 or webdataset, or the whole recording as mcap",
-                    )
-                _cut(entry, target)
-            else:
-                shutil.copyfile(entry.path, target)
-            frames += entry.count
-            advance(1)
+        with ExitStack() as stack:
+            original: _Original | None = None
+            for entry in source.entries():
+                target = folder / f"{entry.key}.mcap"
+                if not entry.is_slice:
+                    shutil.copyfile(entry.path, target)
+                else:
+                    if original is None or original.path != entry.path:
+                        stack.close()
+                        original = stack.enter_context(_Original(entry.path))
+                    _cut(entry, original, target)
+                frames += entry.count
+                advance(1)
         return {"records": len(source), "frames": frames, "units": label_units()}
 
 
-def _cut(entry: Entry, target: Path) -> None:
-    with entry.path.open("rb") as stream, target.open("xb") as sink:
-        reader = make_reader(stream, validate_crcs=True)
+class _Original:
+    """A record that clips are cut from: its file and where each message lies. A context manager."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._where = str(path)
+        self._file = open_file(path)
+        self.summary = read_summary(self._file, where=self._where)
+        self.messages: dict[str, Messages] = {
+            topic: read_messages(self._file, self.summary, topic, where=self._where)
+            for topic in sorted(self.summary.channels)
+        }
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+    def data(self, topic: str, index: int) -> bytes:
+        """The payload of one message."""
+        table = self.messages[topic]
+        return read_exact(self._file, int(table.length[index]), int(table.offset[index]), where=self._where)
+
+
+def _cut(entry: Entry, original: _Original, target: Path) -> None:
+    if entry.record.coding is Coding.H264:
+        raise UsageError(
+            "a clip cut out of H.264 cannot be decoded without the frames before it",
+            where=entry.key,
+            fix="export it as mp4 or webdataset, or the whole recording as mcap",
+        )
+    with target.open("xb") as sink:
         writer = Writer(sink, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_data_crcs=True)
-        try:
-            writer.start(profile=reader.get_header().profile, library=reader.get_header().library)
-            _copy_metadata(reader, writer, entry)
-            copied = _Copier(writer)
-            for schema, channel, message in _messages(reader, entry):
-                copied.add(schema, channel, message)
-        except McapError as error:
-            raise CorruptError(
-                f"the record cannot be read: {error}", where=entry.key, fix="run flagdata verify"
-            ) from None
+        writer.start(profile=PROFILE, library=f"flagdata format {entry.row['format_version']}")
+        for name, values in entry.record.metadata.items():
+            writer.add_metadata(name, dict(values))
+        writer.add_metadata(SAMPLE, _sample(entry))
+        channels: dict[str, int] = {}
+        for topic, index in _order(entry, original):
+            if topic not in channels:
+                channels[topic] = _register(writer, original, topic)
+            table = original.messages[topic]
+            writer.add_message(
+                channels[topic],
+                log_time=int(table.log_time[index]),
+                data=original.data(topic, index),
+                publish_time=int(table.publish_time[index]),
+                sequence=index,
+            )
         writer.finish()
 
 
-def _messages(reader: McapReader, entry: Entry) -> Iterator[_Copied]:
-    """Parameters first, then frames and all other topics in order of log time."""
-    summary = reader.get_summary()
-    topics = {channel.topic for channel in summary.channels.values()} if summary else set()
-    yield from _between(reader, topics & {TOPIC_TRUTH}, None, None)
-    times = entry.frame_times
+def _order(entry: Entry, original: _Original) -> Iterator[tuple[str, int]]:
+    """Topic and index of the messages of a clip: the parameters, then all others in order of log time."""
     begin, end = entry.wind_span
-    yield from heapq.merge(
-        _between(reader, topics - {TOPIC_TRUTH, TOPIC_IMAGE}, begin, end + 1),
-        _between(reader, topics & {TOPIC_IMAGE}, int(times[0]), end + 1),
-        key=lambda copied: copied[2].log_time,
-    )
+    topics, indices, times = [], [], []
+    for number, (topic, table) in enumerate(original.messages.items()):
+        if topic == TOPIC_TRUTH:
+            yield from ((topic, index) for index in range(len(table)))
+            continue
+        first, last = np.searchsorted(table.log_time, [begin, end + 1]).tolist()
+        if topic == TOPIC_IMAGE:
+            first, last = entry.first, entry.first + entry.count
+        topics.append(np.full(last - first, number))
+        indices.append(np.arange(first, last))
+        times.append(table.log_time[first:last])
+    names = list(original.messages)
+    topic_of, index_of = np.concatenate(topics).tolist(), np.concatenate(indices).tolist()
+    for k in np.argsort(np.concatenate(times), kind="stable").tolist():
+        yield names[topic_of[k]], index_of[k]
 
 
-def _between(reader: McapReader, topics: set[str], begin: int | None, end: int | None) -> Iterator[_Copied]:
-    return reader.iter_messages(topics=sorted(topics), starting_at=begin, ending_before=end) if topics else iter(())
+def _register(writer: Writer, original: _Original, topic: str) -> int:
+    channel = original.summary.channels[topic]
+    schema = original.summary.schemas.get(channel.schema_id)
+    known = 0 if schema is None else writer.register_schema(schema.name, schema.encoding, schema.data)
+    return writer.register_channel(topic, channel.message_encoding, known, dict(channel.metadata))
 
 
-def _copy_metadata(reader: McapReader, writer: Writer, entry: Entry) -> None:
-    for metadata in reader.iter_metadata():
-        writer.add_metadata(metadata.name, dict(metadata.metadata))
-    left_out = sorted(entry.record.attachments)
-    label = json.dumps(entry.label(), sort_keys=True, allow_nan=False, ensure_ascii=False)
-    writer.add_metadata(
-        SAMPLE,
-        {
-            "artifact": entry.key,
-            "object": entry.row["object"],
-            "parents": ",".join(entry.row["parents"]),
-            "label": label,
-            "attachments_left_out": json.dumps(left_out, ensure_ascii=False),
-        },
-    )
-
-
-class _Copier:
-    """Writes messages of one file into another, with their schemas and channels."""
-
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
-        self._schemas: dict[int, int] = {0: 0}
-        self._channels: dict[int, int] = {}
-
-    def add(self, schema: Schema | None, channel: Channel, message: Message) -> None:
-        if channel.id not in self._channels:
-            if schema is not None and schema.id not in self._schemas:
-                self._schemas[schema.id] = self._writer.register_schema(schema.name, schema.encoding, schema.data)
-            self._channels[channel.id] = self._writer.register_channel(
-                channel.topic, channel.message_encoding, self._schemas[channel.schema_id], dict(channel.metadata)
-            )
-        self._writer.add_message(
-            self._channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence
-        )
+def _sample(entry: Entry) -> dict[str, str]:
+    return {
+        "artifact": entry.key,
+        "object": entry.row["object"],
+        "parents": ",".join(entry.row["parents"]),
+        "label": json.dumps(entry.label(), sort_keys=True, allow_nan=False, ensure_ascii=False),
+        "attachments_left_out": json.dumps(sorted(entry.record.attachments), ensure_ascii=False),
+    }

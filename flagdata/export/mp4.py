@@ -21,8 +21,8 @@ from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from flagdata.export.source import IDENTITY, TRUTH, Entry, Source
-from flagdata.schema import CATALOG, Kind
+from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, Source
+from flagdata.schema import CATALOG, FRAME_RATE, Kind
 from flagdata.timebase import iso
 
 MICROSECOND = Fraction(1, 1_000_000)
@@ -39,7 +39,7 @@ class Mp4:
         crf: constant rate factor of x264: 0 is lossless, 51 is worst.
     """
 
-    kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
+    kinds: ClassVar[frozenset[Kind]] = FILMED
 
     crf: int = 18
 
@@ -83,7 +83,9 @@ def presentation_times(times: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _encode(entry: Entry, path: Path, crf: int) -> None:
     pts = presentation_times(entry.frame_times)
-    rate = Fraction(entry.row["rate"] or 25).limit_denominator(1001)
+    steps = np.diff(pts)
+    # Nominal, for the encoder's own planning; the frames' times are `pts`.
+    rate = Fraction(MICROSECOND.denominator, round(float(np.median(steps)))) if len(steps) else Fraction(FRAME_RATE)
     options = {"movflags": "+faststart", "video_track_timescale": str(MICROSECOND.denominator)}
     with av.open(str(path), "w", format="mp4", options=options) as container:
         container.metadata["creation_time"] = iso(int(entry.frame_times[0]))
@@ -92,7 +94,7 @@ def _encode(entry: Entry, path: Path, crf: int) -> None:
         instants = iter(pts.tolist())
         for images in entry.images():
             if stream is None:
-                stream = container.add_stream("libx264", rate=rate)
+                stream = container.add_stream("libx264", rate=rate.limit_denominator(1001))
                 _configure(stream, images.shape[1:], crf, where=entry.key)
             for image in images:
                 frame = _luma_frame(image)
@@ -111,7 +113,7 @@ def _configure(stream: VideoStream, shape: Sequence[int], crf: int, *, where: st
     context.time_base = MICROSECOND
     context.color_range = ColorRange.JPEG
     # One thread: the bytes then do not depend on the machine. No B-frames: packets are in order of presentation.
-    context.options = {"crf": str(crf), "preset": "medium", "bf": "0", "threads": "1"}
+    context.options = {"crf": str(crf), "preset": "veryfast", "bf": "0", "threads": "1"}
 
 
 def _luma_frame(image: NDArray[np.uint8]) -> av.VideoFrame:

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flagdata.errors import UsageError
-from flagdata.export.source import Source
+from flagdata.export.source import FILMED, Source
 from flagdata.schema import CATALOG, Kind, catalog_schema
 
 FRAME_COLUMNS = (
@@ -39,8 +39,6 @@ class Parquet:
         shard_bytes: a part is closed when its frames reach this size [B]; the catalog alone is one part.
     """
 
-    kinds: ClassVar[frozenset[Kind]] = frozenset(Kind)
-
     frames: Literal["none", "jpg"] = "none"
     shard_bytes: int = 512 << 20
 
@@ -49,6 +47,10 @@ class Parquet:
             raise UsageError(f"frames {self.frames!r} in Parquet", where="--frames", fix="choose none or jpg")
         if self.shard_bytes < 1:
             raise UsageError(f"shards of {self.shard_bytes} bytes", where="--shard-bytes", fix="give at least 1")
+
+    @property
+    def kinds(self) -> frozenset[Kind]:
+        return frozenset(Kind) if self.frames == "none" else FILMED
 
     def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         (folder / ROWS).mkdir()

@@ -7,13 +7,14 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import pyarrow as pa
 
 from flagdata.errors import NotFoundError, UsageError
-from flagdata.export.source import Source, Store
+from flagdata.export.source import Source
 from flagdata.export.target import fresh_folder, write_manifest
+from flagdata.lake import Lake
 from flagdata.provenance import code_version, digest, recipe_hash
 from flagdata.query import Request, Selection
 from flagdata.registry import Registry
@@ -31,13 +32,12 @@ FORMATS = Registry(
 
 
 class Exporter(Protocol):
-    """A format: a frozen dataclass whose fields are its options.
+    """A format: a frozen dataclass whose fields are its options."""
 
-    Attributes:
-        kinds: of rows it can write.
-    """
-
-    kinds: ClassVar[frozenset[Kind]]
+    @property
+    def kinds(self) -> frozenset[Kind]:
+        """Of rows it can write, with these options."""
+        ...
 
     def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         """Write `source` into the empty `folder`, the same bytes for the same rows; call `advance` by rows done.
@@ -89,7 +89,7 @@ class ExportResult:
 
 
 def export(
-    lake: Store, request: Export, target: Path, *, advance: Callable[[int], None] = lambda count: None
+    lake: Lake, request: Export, target: Path, *, advance: Callable[[int], None] = lambda count: None
 ) -> ExportResult:
     """Write a selection of a lake into the new folder `target`.
 
@@ -112,7 +112,7 @@ def export(
         "where": request.where,
     }  # fmt: skip
     with fresh_folder(target) as folder:
-        content = exporter.write(Source(store=lake, rows=rows), folder, advance)
+        content = exporter.write(Source(lake=lake, rows=rows), folder, advance)
         manifest = write_manifest(
             folder,
             {

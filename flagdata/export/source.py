@@ -7,20 +7,22 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError
-from flagdata.lake.refs import View
+from flagdata.lake import Lake
 from flagdata.record import Coding, Record
 from flagdata.record.writer import encode_jpeg
-from flagdata.schema import CATALOG, TRUTH_WINDOW
+from flagdata.schema import CATALOG, TRUTH_WINDOW, Kind
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, iso
 
+FILMED = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
+"""Kinds of rows that have frames."""
 # Columns that say what a sample is and where it comes from; written beside the data by every format.
 IDENTITY = (
     "artifact", "kind", "name", "object", "parents", "recipe_hash", "code_version", "seed",
@@ -30,16 +32,6 @@ TRUTH = (
     "wind", "wind_sigma", "wind_coverage", "wind_staleness",
     "clock_method", "clock_offset", "clock_drift", "clock_sigma", "quality",
 )  # fmt: skip
-
-
-class Store(Protocol):
-    """What an export needs of a lake."""
-
-    def view(self, at: str | None) -> View: ...
-
-    def table(self, view: View) -> pa.Table: ...
-
-    def object_path(self, object: str) -> Path: ...  # noqa: A002 - the catalog's name for it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,11 +125,11 @@ class Source:
     """The rows of one export, in their order.
 
     Attributes:
-        store: the lake.
+        lake: that they are in.
         rows: with all columns of `schema.CATALOG`.
     """
 
-    store: Store
+    lake: Lake
     rows: pa.Table
 
     def __len__(self) -> int:
@@ -146,18 +138,24 @@ class Source:
     def entries(self, order: np.ndarray | None = None) -> Iterator[Entry]:
         """The rows with their records, in order or in the order of the indices given. One record is open at a time.
 
+        Each object is hashed before the first of its frames leaves the lake: what is exported is what was committed.
+
         Raises:
-            CorruptError: a row without an object, or that reaches beyond its record.
+            CorruptError: an object that has changed, a row without one, or a row that reaches beyond its record.
         """
         table = self.rows if order is None else self.rows.take(pa.array(order))
         opened: tuple[str, Record] | None = None
+        checked: set[str] = set()
         for batch in table.to_batches(max_chunksize=1024):
             for row in batch.to_pylist():
                 name = row["object"]
                 if name is None:
                     raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
+                if name not in checked:
+                    self.lake.objects.check(name)
+                    checked.add(name)
                 if opened is None or opened[0] != name:
-                    opened = (name, Record.open(self.store.object_path(name)))
+                    opened = (name, Record.open(self.lake.object_path(name)))
                 yield self._entry(row, opened[1])
 
     def _entry(self, row: Mapping[str, Any], record: Record) -> Entry:
@@ -171,5 +169,5 @@ class Source:
                 where=row["artifact"],
                 fix="run flagdata verify",
             )
-        path = self.store.object_path(row["object"])
+        path = self.lake.object_path(row["object"])
         return Entry(row=row, path=path, record=record, first=first, count=count)

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from flagdata.errors import LimitError, UsageError
-from flagdata.export.source import Entry, Source, label_units
+from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.rng import stream
 from flagdata.schema import Kind
 
@@ -38,7 +38,7 @@ class WebDataset:
             buffer only, so neighbours in a recording stay neighbours in training unless they are shuffled here.
     """
 
-    kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
+    kinds: ClassVar[frozenset[Kind]] = FILMED
 
     frames: Literal["jpg", "npy"] = "jpg"
     shard_bytes: int = 512 << 20

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 import pytest
 
-from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.export import FORMATS, Export, export
 from flagdata.export.target import fresh_folder
 from flagdata.lake import Artifact, Lake
@@ -86,14 +87,32 @@ def test_a_target_made_meanwhile_is_not_replaced(tmp_path: Path) -> None:
     assert list((tmp_path / "out").iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["webdataset", "mp4", "mcap"])
-def test_rows_that_a_format_cannot_hold_are_refused_with_the_filter_to_write(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "options"), [("webdataset", {}), ("mp4", {}), ("mcap", {}), ("parquet", {"frames": "jpg"})]
+)
+def test_rows_that_a_format_cannot_hold_are_refused_with_the_filter_to_write(
+    name: str, options: dict[str, str], tmp_path: Path
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     with lake.transaction("a model") as tx:
         tx.add(Artifact(kind=Kind.MODEL, name="regressor"))
     with pytest.raises(UsageError, match="1 of kind model") as caught:
-        export(lake, Export(format=name), tmp_path / "out")
+        export(lake, Export(format=name, options=options), tmp_path / "out")
     assert "kind = '" in caught.value.fix
+
+
+@pytest.mark.parametrize("name", ["webdataset", "mp4", "mcap"])
+def test_bytes_that_have_changed_in_the_lake_do_not_leave_it(name: str, known: Any, tmp_path: Path) -> None:
+    shutil.copytree(known.lake.path, tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake")
+    stored = lake.object_path(lake.artifact(known.recording).object or "")
+    data = bytearray(stored.read_bytes())
+    data[data.index(known.jpegs[45]) + 200] ^= 1  # one bit of one frame
+    stored.chmod(0o644)
+    stored.write_bytes(data)
+    with pytest.raises(CorruptError, match="changed"):
+        export(lake, Export(format=name, where=CLIPS), tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["lake"]
 
 
 def test_nothing_to_export_is_an_error(known: Any, tmp_path: Path) -> None:
