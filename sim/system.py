@@ -25,6 +25,21 @@ class Effect(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Drive:
+    """What moves a cloth from outside during a short time, linear between its start and its end.
+
+    Attributes:
+        wind: (3, batch) at the start and at the end [m/s].
+        targets: (held, 3, batch) of the handles at the start and at the end [m].
+        rate: (held, 3, batch) velocity of the handles [m/s].
+    """
+
+    wind: tuple[Tensor, Tensor]
+    targets: tuple[Tensor, Tensor]
+    rate: Tensor
+
+
+@dataclass(frozen=True, kw_only=True)
 class System:
     """A batch: m a = membrane + bending + gravity + air + handle springs + effects.
 
@@ -52,10 +67,18 @@ class System:
         """Membrane and bending, elastic and damping: (vertex, 3, batch) [N]."""
         return membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
 
-    def external(self, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """Gravity, air and effects: (vertex, 3, batch) [N]."""
-        wind = self.wind.velocity(time)
-        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, position, velocity, wind)
+    def external(
+        self, wind: Tensor, time: float, position: Tensor, velocity: Tensor, *, air_position: Tensor | None = None
+    ) -> Tensor:
+        """Gravity, air and effects: (vertex, 3, batch) [N].
+
+        Args:
+            wind: (3, batch) [m/s].
+            time: of the effects [s].
+            air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
+        """
+        seen = position if air_position is None else air_position
+        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, seen, velocity, wind)
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
         return total
@@ -65,17 +88,40 @@ class System:
         offset = torch.as_tensor(self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device)
         return self.anchors + offset[:, None]
 
-    def springs(self, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """Force of the handle springs with the cloth's damping: (held, 3, batch) [N]."""
-        stretch = position[self.held] - self.targets(time) + self.cloth.damping * velocity[self.held]
-        return -self.handles.stiffness * stretch
+    def drive(self, start: float, end: float) -> Drive:
+        """Wind and handles between two times [s], taken as linear."""
+        first, last = self.targets(start), self.targets(end)
+        return Drive(
+            wind=(self.wind.velocity(start), self.wind.velocity(end)),
+            targets=(first, last),
+            rate=(last - first) / (end - start),
+        )
 
-    def force(self, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """All forces: (vertex, 3, batch) [N]. Rigid handles add none."""
-        total = self.internal(position, velocity) + self.external(time, position, velocity)
-        if self.handles.vertices and not self.handles.rigid:
-            total = total.index_add(0, self.held, self.springs(time, position, velocity))
-        return total
+    @property
+    def sprung(self) -> bool:
+        """Whether any vertex is held by springs."""
+        return bool(self.handles.vertices) and not self.handles.rigid
+
+    @property
+    def clamped(self) -> bool:
+        """Whether any vertex is held rigidly."""
+        return bool(self.handles.vertices) and self.handles.rigid
+
+    def force(self, drive: Drive, share: float, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """All forces: (vertex, 3, batch) [N]. Rigid handles add none.
+
+        Args:
+            drive: wind and handles.
+            share: where between its start (0) and its end (1).
+            time: of the effects [s].
+        """
+        wind = torch.lerp(*drive.wind, share)
+        total = self.internal(position, velocity) + self.external(wind, time, position, velocity)
+        if not self.sprung:
+            return total
+        stretch = position[self.held] - torch.lerp(*drive.targets, share)
+        stretch = stretch + self.cloth.damping * (velocity[self.held] - drive.rate)
+        return total.index_add(0, self.held, -self.handles.stiffness * stretch)
 
     def energies(self, state: State) -> dict[str, Tensor]:
         """Kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].
@@ -89,7 +135,7 @@ class System:
             "bending": bending.energy(self.cloth, state.position),
             "gravity": -(mass * (state.position * self.gravity).sum(1)).sum(0),
         }
-        if self.handles.vertices and not self.handles.rigid:
+        if self.sprung:
             stretch = state.position[self.held] - self.targets(state.time)
             result["handles"] = self.handles.stiffness * (stretch**2).sum((0, 1)) / 2
         return result

@@ -47,7 +47,7 @@ def stiffest(system: System, state: State) -> Tensor:
         product = gather_sum(at.corner_products(field), cloth.face_slots)
         if len(cloth.hinges):
             product = product + gather_sum(folds.corner_products(field), cloth.hinge_slots)
-        if system.handles.vertices and not system.handles.rigid:
+        if system.sprung:
             product = product.index_add(0, system.held, system.handles.stiffness * field[system.held])
         return product / cloth.mass.unsqueeze(1) * free
 
@@ -77,6 +77,6 @@ def _free(system: System) -> Tensor:
     """(vertex, 1, 1): 0 for rigidly held vertices, 1 for all others."""
     cloth = system.cloth
     free = torch.ones((cloth.mesh.vertex_count, 1, 1), dtype=cloth.dtype, device=cloth.device)
-    if system.handles.rigid:
+    if system.clamped:
         free[system.held] = 0
     return free

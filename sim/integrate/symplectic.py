@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import torch
-from torch import Tensor
-
 from flagdata.errors import UsageError
 from sim.integrate.stability import stable_step
 from sim.state import State
@@ -53,36 +50,20 @@ class Symplectic:
 
 
 def advance(system: System, state: State, duration: float, *, steps: int) -> State:
-    """`steps` equal leapfrog steps over `duration` seconds."""
+    """`steps` equal leapfrog steps over `duration` seconds; wind and handles are linear in between."""
     h = duration / steps
+    drive = system.drive(state.time, state.time + duration)
     inverse_mass = 1 / system.cloth.mass.unsqueeze(1)
+    if system.clamped:
+        inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
     x, v = state.position, state.velocity
-    rigid = system.handles.rigid and bool(system.handles.vertices)
-    time = state.time
-
-    def kick(time: float, x: Tensor, v: Tensor, h: float) -> Tensor:
-        return v + h * inverse_mass * system.force(time, x, v)
-
-    def hold(start: float, end: float, v: Tensor) -> Tensor:
-        if not rigid:
-            return v
-        moved = (system.targets(end) - system.targets(start)) / (end - start)
-        return v.index_copy(0, system.held, moved)
-
-    v = kick(time, x, v, h / 2)
-    for index in range(steps):
-        start, end = time + index * h, time + (index + 1) * h
-        v = hold(start, end, v)
-        x = x + h * v
-        v = kick(end, x, v, h if index < steps - 1 else h / 2)
-    v = hold(time + duration - h, time + duration, v)
+    if system.clamped:
+        v = v.index_copy(0, system.held, drive.rate)
+    for index in range(steps + 1):
+        share = index / steps
+        weight = h / 2 if index in (0, steps) else h
+        force = system.force(drive, share, state.time + share * duration, x, v)
+        v = v + weight * inverse_mass * force
+        if index < steps:
+            x = x + h * v
     return State(position=x, velocity=v, time=state.time + duration)
-
-
-def trajectory(system: System, state: State, duration: float, *, frames: int, steps: int) -> Tensor:
-    """Positions at `frames` times, `duration` seconds apart: (frame, vertex, 3, batch) [m]."""
-    result = []
-    for _ in range(frames):
-        state = advance(system, state, duration, steps=steps)
-        result.append(state.position)
-    return torch.stack(result)
