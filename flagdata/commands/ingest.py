@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import CameraIngest, IngestResult, Labels, WindIngest
     from flagdata.lake import Lake
 
-# Parameters that mean something for one kind of source only, and those that name or time one single source.
+# Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
 CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "rate", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = ("sensor", "date", "date_order", "platform", "azimuth", "zero_offset", "encoding")
+SNIFF = ("sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture")
 ONE_SOURCE = ("start", "date", "name", "crop_picture")
 
 
@@ -144,6 +145,8 @@ def ingest(
         crop_picture=crop_picture,
     )  # fmt: skip
     if sniff:
+        for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):
+            raise UsageError(f"{_option(parameter)} means nothing to --sniff", fix="leave it out")
         _sniff(sources, options, as_json=as_json)
         return
     from flagdata.lake import Lake
@@ -160,7 +163,7 @@ def _one_source_only(given: frozenset[str], sources: Sequence[Path]) -> None:
 
 
 def _option(parameter: str) -> str:
-    return f"--{parameter.replace('_', '-')}"
+    return "--as" if parameter == "format_name" else f"--{parameter.replace('_', '-')}"
 
 
 def _camera_options(

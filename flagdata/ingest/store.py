@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.errors import ConflictError, InputError
+from flagdata.errors import ConflictError, InputError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
@@ -198,7 +199,7 @@ def ingest_wind(
                 text = recipe_text(options.wind.recipe)
                 record.attach(name, text, media_type="application/toml", log_time=int(time[0]))
         source.check_unchanged()
-        report = _wind_report(log, findings)
+        report = _wind_report(log, findings, named=options.wind.recipe)
         artifact = _artifact(
             Kind.WIND, source, recipe, labels, findings=findings, report=report, start=int(time[0]), end=int(time[-1]),
             rate=report["rate"], frame_count=None, stored=transaction.put(staged),
@@ -211,11 +212,14 @@ def recipe_text(recipe: str) -> bytes:
     """The TOML of a sensor recipe, by name or path.
 
     Raises:
+        UnknownNameError: no recipe of that name.
         InputError: it cannot be read.
     """
     try:
         if recipe.endswith(".toml"):
             return Path(recipe).read_bytes()
+        if recipe not in recipes.names():
+            raise UnknownNameError.of("sensor recipe", recipe, recipes.names())
         return (files("catalogs") / "sensors" / f"{recipe}.toml").read_bytes()
     except OSError as error:
         raise InputError(f"the recipe cannot be read: {error.strerror}", where=recipe, fix="check its path") from None
@@ -363,7 +367,8 @@ def _camera_report(
     }
 
 
-def _wind_report(log: WindLog, findings: Iterable[Finding]) -> dict[str, Any]:
+def _wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None) -> dict[str, Any]:
+    """The report of a log; of a recipe file that was named, only its base name stays."""
     series = log.series
     time = series.time
     steps = np.diff(time)
@@ -373,7 +378,7 @@ def _wind_report(log: WindLog, findings: Iterable[Finding]) -> dict[str, Any]:
         "schema": REPORT_SCHEMA,
         "kind": Kind.WIND.value,
         "format": log.format,
-        "reasons": list(log.reasons),
+        "reasons": [r.replace(named, Path(named).name) if named else r for r in log.reasons],
         **_span(int(time[0]), int(time[-1])),
         "samples": len(series),
         "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,

@@ -1,0 +1,166 @@
+"""`flagdata ingest` as people and programs use it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from flagdata.cli import main
+from flagdata.lake import Lake
+
+
+@pytest.fixture
+def lake(tmp_path: Path) -> Lake:
+    return Lake.create(tmp_path / "lake")
+
+
+@pytest.fixture
+def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Runs `flagdata ingest` on the lake: exit code, stdout, stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as exit_:
+            main(["ingest", *map(str, arguments), "--lake", str(lake.path)])
+        printed = capsys.readouterr()
+        return int(exit_.value.code or 0), printed.out, printed.err
+
+    return run
+
+
+def test_kind_is_told_by_content_not_by_name(run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(video.read_bytes())
+    (tmp_path / "b.mp4").write_bytes(wind_log.read_bytes())
+    code, out, _ = run(tmp_path / "a.csv", tmp_path / "b.mp4", "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert found["schema"] == "flagdata.ingest/1"
+    assert [(r["kind"], r["created"]) for r in found["results"]] == [("camera", True), ("wind", True)]
+    assert lake.rows().num_rows == 2
+
+
+def test_the_report_for_people_says_format_time_rate_error_and_findings(run, video: Path, wind_log: Path) -> None:
+    code, out, _ = run(video, wind_log, "--session", "field-1")
+    assert code == 0
+    for expected in (
+        "h264", "2026-05-01T10:00:00Z", "50 at 25 Hz", "worst stamp error 0.000 ms", "container 50 Hz",
+        "letterboxed", "missing-values", "line 32", "120, median rate 1 Hz", "wind_speed [m/s]",
+    ):  # fmt: skip
+        assert expected in out, expected
+
+
+def test_the_second_time_says_already_in_the_lake_and_exits_0(run, lake: Lake, video: Path) -> None:
+    first = json.loads(run(video, "--json")[1])["results"][0]["artifact"]
+    code, out, _ = run(video)
+    assert code == 0
+    assert out.startswith(f"already in the lake: {first}")
+    assert lake.rows().num_rows == 1
+
+
+def test_sniff_says_what_and_why_and_touches_no_lake(run, lake: Lake, video: Path, wind_log: Path) -> None:
+    code, out, _ = run("--sniff", video, wind_log)
+    assert code == 0
+    assert "camera: video" in out
+    assert "100 frames at 50 Hz" in out
+    assert "generic-csv" in out
+    assert "because" in out
+    code, out, _ = run("--sniff", video, "--json")
+    assert code == 0
+    assert json.loads(out)["sources"][0]["camera"]["frames"] == 100
+    assert lake.rows().num_rows == 0
+
+
+def test_a_failing_source_stops_neither_the_others_nor_goes_unnamed(
+    run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path
+) -> None:
+    bad = tmp_path / "bad.mp4"
+    bad.write_bytes(b"\0\0\0\x18ftypmp42" + b"\0" * 200)
+    code, out, err = run(video, bad, wind_log)
+    assert code == 1
+    assert "bad.mp4" in err
+    assert "1 of 3 sources failed" in err
+    assert "camera field" in out
+    assert lake.rows().num_rows == 2
+    code, out, _ = run(video, bad, "--json")
+    found = json.loads(out)
+    assert code == 1
+    assert [f["source"] for f in found["failures"]] == [str(bad)]
+    assert [r["created"] for r in found["results"]] == [False]
+
+
+def test_a_single_failure_has_its_own_exit_code_and_one_document(run, tmp_path: Path) -> None:
+    code, out, err = run(tmp_path / "nothing.mp4", "--json")
+    assert code == 1
+    assert json.loads(out)["schema"] == "flagdata.error/1"
+    assert "fix:" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{log}", "--crop", "auto"], "--crop means nothing for an anemometer log"),
+        (["{log}", "--true-fps", "1000"], "--true-fps means nothing"),
+        (["{log}", "--archive", "h264"], "--archive means nothing"),
+        (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start means nothing"),
+        (["{video}", "--date-order", "dmy"], "--date-order means nothing for a camera file"),
+        (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
+        (["{video}", "{log}", "--zero-offset", "estimate"], "--zero-offset means nothing"),
+        (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
+        (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
+        (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
+        (["{video}", "--crop", "auto", "--crop-picture", "{video}"], "exists"),
+        (["{video}", "--crop", "1,2,3"], "not a crop"),
+        (["{video}", "--rate", "fast"], "not a number"),
+        (["{video}", "--as", "vidoe"], "unknown format"),
+        (["{log}", "--sensor", "generic-cvs"], "did you mean 'generic-csv'"),
+        (["{log}", "--date", "1/5/2026"], "not a date"),
+        (["{video}", "--zone", "Europe/Amsterdm"], "did you mean 'Europe/Amsterdam'"),
+        (["{video}", "--sniff", "--session", "a"], "--session means nothing to --sniff"),
+        (["{video}", "--branch", "nowhere"], "nowhere"),
+    ],
+)
+def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
+    run, lake: Lake, video: Path, wind_log: Path, arguments: list[str], said: str
+) -> None:
+    code, _, err = run(*(a.format(video=video, log=wind_log) for a in arguments))
+    assert code == 2
+    assert said in err
+    assert lake.rows().num_rows == 0
+
+
+def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(run, lake: Lake, video: Path) -> None:
+    code, _, err = run(video, "--start", "2026-05-01T12:00:00")
+    assert code == 1
+    assert "no zone" in err
+    code, _, _ = run(video, "--start", "2026-05-01T12:00:00", "--zone", "Europe/Amsterdam")
+    assert code == 0
+    assert lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000  # 10:00 UTC, summer time
+
+
+def test_crop_auto_writes_the_picture_that_was_asked_for(run, video: Path, tmp_path: Path) -> None:
+    code, out, _ = run("--sniff", video, "--crop", "auto", "--crop-picture", tmp_path / "seen.png")
+    assert code == 0
+    assert "of the motion" in out
+    code, _, _ = run(video, "--crop", "auto", "--crop-picture", tmp_path / "crop.png")
+    assert code == 0
+    assert (tmp_path / "crop.png").read_bytes() == (tmp_path / "seen.png").read_bytes()
+
+
+def test_artifacts_go_to_the_branch_that_was_named(run, lake: Lake, wind_log: Path) -> None:
+    lake.branch("trial")
+    code, _, _ = run(wind_log, "--branch", "trial")
+    assert code == 0
+    assert lake.rows().num_rows == 0
+    assert lake.rows(at="trial").num_rows == 1
+
+
+def test_what_is_neither_camera_nor_wind_says_what_to_do(run, tmp_path: Path) -> None:
+    (tmp_path / "flag.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "letter.txt").write_text("Dear diary,\nit blew hard today.\n")
+    for name in ("flag.obj", "letter.txt"):
+        code, _, err = run(tmp_path / name)
+        assert code == 1
+        assert "neither a camera file nor an anemometer log" in err
+        assert "fix:" in err

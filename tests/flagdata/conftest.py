@@ -1,0 +1,55 @@
+"""A small camera file and an anemometer log as devices write them, made here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+VIDEO_START = "2026-05-01T10:00:00Z"
+
+
+@pytest.fixture(scope="session")
+def write_video() -> Callable[..., Path]:
+    """Writes an MP4 of a bright bar that sways, (48, 64) pixels, constant rate."""
+
+    def write(path: Path, *, frames: int = 100, rate: int = 50, creation_time: str | None = VIDEO_START) -> Path:
+        column, row = np.meshgrid(np.arange(64), np.arange(48))
+        with av.open(str(path), "w") as container:
+            if creation_time is not None:
+                container.metadata["creation_time"] = creation_time
+            stream = container.add_stream("libx264", rate=rate, options={"threads": "1"})
+            stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+            stream.codec_context.time_base = Fraction(1, rate)
+            for k in range(frames):
+                bar = np.abs(column - 32 - 12 * np.sin(row / 9 + 2 * np.pi * 2 * k / rate)) < 4
+                image = (40 + row + 150 * bar).astype(np.uint8)
+                frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
+                frame.pts = k
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def video(tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., Path]) -> Path:
+    """100 frames at 50 Hz from 2026-05-01T10:00:00Z on."""
+    return write_video(tmp_path_factory.mktemp("video") / "field.mp4")
+
+
+@pytest.fixture(scope="session")
+def wind_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """120 s at 1 Hz in the columns of recipe generic-csv, stamps at +02:00, one value missing in row 31."""
+    rows = ["time,wind_speed,wind_direction"]
+    for k in range(120):
+        speed = "" if k == 30 else f"{5 + np.sin(k / 7):.2f}"
+        rows.append(f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,{speed},{200 + k % 9}")
+    path = tmp_path_factory.mktemp("wind") / "mast.csv"
+    path.write_text("\n".join(rows) + "\n")
+    return path

@@ -1,0 +1,237 @@
+"""From a source file to an artifact: identity, provenance, and a lake that is unchanged by what fails."""
+
+from __future__ import annotations
+
+import json
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import ConflictError, FlagdataError, InputError, NotFoundError, TimeError
+from flagdata.ingest import store
+from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest.camera import CameraOptions, CropBox, open_camera
+from flagdata.ingest.store import CameraIngest, Labels, WindIngest, ingest_camera, ingest_wind
+from flagdata.lake import Lake
+from flagdata.provenance import file_hash
+from flagdata.record import Coding, Record
+from flagdata.schema import Kind
+
+START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
+
+
+@pytest.fixture
+def lake(tmp_path: Path) -> Lake:
+    return Lake.create(tmp_path / "lake")
+
+
+def _everything(lake: Lake) -> list[str]:
+    return sorted(
+        str(p.relative_to(lake.path)) for p in lake.path.rglob("*") if p.is_file() and "staging" not in p.parts
+    )
+
+
+def test_a_camera_file_becomes_one_row_and_one_record_on_its_own_clock(lake: Lake, video: Path) -> None:
+    result = ingest_camera(lake, video, labels=Labels(session="field-1"))
+    assert result.created
+    row = lake.rows().to_pylist()[0]
+    assert (row["kind"], row["name"], row["session"], row["day"]) == ("camera", "field", "field-1", "2026-05-01")
+    assert (row["source_name"], row["source_hash"]) == ("field.mp4", file_hash(video))
+    # 100 frames at 50 Hz last from 0 to 1.98 s; at 25 Hz that is every second frame, 0 to 1.96 s.
+    assert (row["frame_count"], row["rate"], row["start"], row["end"]) == (50, 25.0, START, START + 1_960_000_000)
+    record = Record.open(lake.object_path(row["object"]))
+    np.testing.assert_array_equal(record.frame_times, START + 40_000_000 * np.arange(50))
+    np.testing.assert_array_equal(record.device_frame_times, record.frame_times)
+    assert record.frames(0, 50).shape == (50, 300, 300)
+    assert record.metadata["camera"]["codec"] == "h264"
+    assert record.metadata["provenance"]["source_hash"] == file_hash(video)
+    assert json.loads(record.metadata["provenance"]["recipe"]) == json.loads(row["recipe"])
+
+
+def test_the_frames_stored_are_the_frames_of_the_stream(lake: Lake, video: Path) -> None:
+    artifact = ingest_camera(lake, video).artifact
+    assert artifact.object is not None
+    stored = Record.open(lake.object_path(artifact.object)).frames(0, 50)
+    with open_camera(video) as stream:
+        frames = np.stack([frame.image for frame in stream])
+    # JPEG at quality 90: a few grey levels, on edges more.
+    assert np.abs(stored.astype(int) - frames).mean() < 2
+
+
+def test_a_log_becomes_one_row_with_the_vendor_file_attached(lake: Lake, wind_log: Path) -> None:
+    result = ingest_wind(lake, wind_log)
+    row = lake.rows().to_pylist()[0]
+    assert (row["kind"], row["name"], row["rate"], row["frame_count"]) == ("wind", "mast", 1.0, None)
+    assert (row["start"], row["end"]) == (START, START + 119_000_000_000)
+    record = Record.open(lake.object_path(row["object"]))
+    assert record.attachment("mast.csv") == wind_log.read_bytes()
+    series = record.wind()
+    assert series is not None
+    assert len(series) == 120
+    assert np.flatnonzero(np.isnan(series.channels["wind_speed"])).tolist() == [30]
+    assert series.channels["wind_direction"][0] == pytest.approx(np.deg2rad(200))
+    means = record.wind_1hz()
+    assert means is not None
+    assert len(means.time) == 119
+    assert result.report["samples"] == 120
+    assert "missing-values" in row["quality"]
+
+
+@pytest.mark.parametrize("kind", [Kind.CAMERA, Kind.WIND])
+def test_ingesting_again_finds_what_is_there_and_writes_nothing(
+    lake: Lake, video: Path, wind_log: Path, kind: Kind, tmp_path: Path
+) -> None:
+    def ingest(path: Path) -> store.IngestResult:
+        return ingest_camera(lake, path) if kind is Kind.CAMERA else ingest_wind(lake, path)
+
+    source = video if kind is Kind.CAMERA else wind_log
+    first = ingest(source)
+    before = _everything(lake)
+    again = ingest(source)
+    renamed = tmp_path / f"other{source.suffix}"
+    renamed.write_bytes(source.read_bytes())
+    third = ingest(renamed)
+    assert (first.created, again.created, third.created) == (True, False, False)
+    assert again.artifact == third.artifact
+    assert again.artifact.id == first.artifact.id
+    assert again.report == first.report
+    assert _everything(lake) == before
+
+
+def test_other_options_or_other_bytes_are_another_artifact_and_labels_are_not(lake: Lake, video: Path) -> None:
+    whole = ingest_camera(lake, video)
+    cropped = ingest_camera(
+        lake, video, CameraIngest(camera=CameraOptions(crop=CropBox(x=8, y=0, width=48, height=48)))
+    )
+    archived = ingest_camera(lake, video, CameraIngest(coding=Coding.H264))
+    labelled = ingest_camera(lake, video, labels=Labels(name="another", session="another"))
+    assert len({whole.artifact.id, cropped.artifact.id, archived.artifact.id}) == 3
+    assert labelled.artifact.id == whole.artifact.id
+    assert not labelled.created
+
+
+def test_the_same_ingest_in_two_lakes_gives_the_same_object(tmp_path: Path, video: Path, wind_log: Path) -> None:
+    lakes = [Lake.create(tmp_path / name) for name in ("a", "b")]
+    assert len({ingest_camera(lake, video).artifact.object for lake in lakes}) == 1
+    assert len({ingest_wind(lake, wind_log).artifact.object for lake in lakes}) == 1
+
+
+def test_a_recipe_file_counts_by_its_content_and_is_attached(lake: Lake, wind_log: Path, tmp_path: Path) -> None:
+    recipe = tmp_path / "mine.toml"
+    text = """
+name = "mine"
+about = "a test"
+source = "this test"
+[file]
+delimiter = ","
+[time]
+columns = ["time"]
+format = "iso"
+[channels.wind_speed]
+column = "wind_speed"
+unit = "{unit}"
+[sensor]
+name = "mine"
+"""
+    recipe.write_text(text.format(unit="m/s"))
+    options = WindIngest(wind=WindOptions(recipe=str(recipe)))
+    first = ingest_wind(lake, wind_log, options)
+    assert first.artifact.object is not None
+    record = Record.open(lake.object_path(first.artifact.object))
+    assert record.attachment("mine.recipe.toml") == recipe.read_bytes()
+    assert str(tmp_path) not in json.dumps(first.as_dict())
+    recipe.write_text(text.format(unit="km/h"))
+    second = ingest_wind(lake, wind_log, WindIngest(wind=WindOptions(recipe=str(recipe))))
+    assert second.artifact.id != first.artifact.id
+    assert second.report["mean_speed"] == pytest.approx(first.report["mean_speed"] / 3.6)
+
+
+def test_an_interruption_leaves_the_lake_unchanged(lake: Lake, video: Path) -> None:
+    before = _everything(lake)
+
+    def interrupt(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ingest_camera(lake, video, progress=interrupt)
+    assert _everything(lake) == before
+    assert lake.rows().num_rows == 0
+    assert list(lake.staging.rglob("*.mcap")) == []
+
+
+def test_a_source_that_changes_while_it_is_read_is_refused(
+    lake: Lake, tmp_path: Path, write_video: Callable[..., Path]
+) -> None:
+    growing = write_video(tmp_path / "growing.mp4")
+
+    def grow(_: int) -> None:
+        with growing.open("ab") as stream:
+            stream.write(b"more")
+
+    with pytest.raises(ConflictError, match="changed"):
+        ingest_camera(lake, growing, progress=grow)
+    assert lake.rows().num_rows == 0
+
+
+def _bad_sources(folder: Path, video: Path, write_video: Callable[..., Path]) -> dict[str, Path]:
+    made = {
+        "empty.mp4": b"", "noise.mp4": np.random.default_rng(1).bytes(5000), "head.mp4": video.read_bytes()[:40],
+        "empty.csv": b"", "zeros.csv": b"\0" * 4096, "header.csv": b"time,wind_speed\n",
+        "words.csv": b"time,wind_speed\nnever,fast\nnever,slow\n",
+    }  # fmt: skip
+    for name, data in made.items():
+        (folder / name).write_bytes(data)
+    found = {name: folder / name for name in made}
+    found["no-start.mp4"] = write_video(folder / "no-start.mp4", creation_time=None)
+    found["missing.mp4"] = folder / "missing.mp4"
+    return found
+
+
+def test_bad_sources_end_in_flagdata_errors_and_leave_the_lake_unchanged(
+    lake: Lake, tmp_path: Path, video: Path, write_video: Callable[..., Path]
+) -> None:
+    before = _everything(lake)
+    for name, path in _bad_sources(tmp_path, video, write_video).items():
+        with pytest.raises(FlagdataError) as error:
+            ingest_camera(lake, path) if name.endswith(".mp4") else ingest_wind(lake, path)
+        assert error.value.fix, name
+        assert _everything(lake) == before, name
+
+
+def test_a_missing_start_is_a_time_error_and_a_missing_file_is_named(
+    lake: Lake, tmp_path: Path, write_video: Callable[..., Path]
+) -> None:
+    with pytest.raises(TimeError, match="--start"):
+        ingest_camera(lake, write_video(tmp_path / "a.mp4", creation_time=None))
+    with pytest.raises((InputError, NotFoundError), match="nothing"):
+        ingest_wind(lake, tmp_path / "nothing.csv")
+
+
+def test_a_log_over_the_attachment_limit_is_ingested_and_says_so(
+    lake: Lake, wind_log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "ATTACHMENT_LIMIT", 100)
+    result = ingest_wind(lake, wind_log)
+    assert "log-not-attached" in result.artifact.quality
+    assert result.artifact.object is not None
+    assert Record.open(lake.object_path(result.artifact.object)).attachments == ()
+
+
+def test_a_crop_from_motion_is_attached_as_a_picture(lake: Lake, video: Path) -> None:
+    artifact = ingest_camera(lake, video, CameraIngest(camera=CameraOptions(crop="auto"))).artifact
+    assert artifact.object is not None
+    picture = Record.open(lake.object_path(artifact.object)).attachment(store.CROP_PICTURE)
+    assert picture.startswith(b"\x89PNG")
+
+
+def test_memory_does_not_grow_with_the_video(lake: Lake, tmp_path: Path, write_video: Callable[..., Path]) -> None:
+    """400 frames of 300×300 are 36 MB; a stream keeps a chunk of 1 MiB and a few frames."""
+    path = write_video(tmp_path / "long.mp4", frames=400, rate=25)
+    tracemalloc.start()
+    ingest_camera(lake, path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 12e6
