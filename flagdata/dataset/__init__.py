@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from flagdata.dataset.clips import clip_rows
     from flagdata.dataset.loader import PairLoader
     from flagdata.dataset.pairs import Pairs
-    from flagdata.dataset.resolve import Refusal, Tolerance
     from flagdata.dataset.sample import Batch, Sample, collate
     from flagdata.dataset.source import Source
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+    from flagdata.dataset.tolerance import Refusal, Tolerance
     from flagdata.dataset.truth import TruthSeries, WindTruth
 
 __all__ = [
@@ -51,10 +51,10 @@ _PLACES = {
     "HashedSplit": "splits",
     "PairLoader": "loader",
     "Pairs": "pairs",
-    "Refusal": "resolve",
+    "Refusal": "tolerance",
     "Sample": "sample",
     "Source": "source",
-    "Tolerance": "resolve",
+    "Tolerance": "tolerance",
     "TruthSeries": "truth",
     "WindTruth": "truth",
     "clip_rows": "clips",

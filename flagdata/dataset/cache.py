@@ -20,8 +20,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import UsageError
-from flagdata.lake.durable import disk_errors
+from flagdata.errors import FlagdataError, UsageError
 
 _FORMAT = "flagdata.decoded/1"
 _SUFFIX = ".clip"
@@ -115,13 +114,20 @@ class DecodedCache:
         size = len(line) + frames.nbytes
         if size > self.limit:
             return
-        with disk_errors("writing the decoded cache", self.path), self._locked() as tally:
-            self._take_room(tally, size)
-            written = self.path / _WRITING
-            with written.open("wb") as stream:
-                stream.write(line)
-                stream.write(pixels)
-            written.replace(self.path / name)
+        try:
+            with self._locked() as tally:
+                self._take_room(tally, size)
+                written = self.path / _WRITING
+                with written.open("wb") as stream:
+                    stream.write(line)
+                    stream.write(pixels)
+                written.replace(self.path / name)
+        except OSError as error:
+            raise FlagdataError(
+                f"writing the decoded cache failed: {error.strerror or error}",
+                where=str(error.filename or self.path),
+                fix="free some space, give a lower limit or another folder, or load pairs without a cache",
+            ) from error
 
     def _take_room(self, tally: BinaryIO, size: int) -> None:
         """Add `size` to the tally of bytes, evicting when it would exceed the limit. Counted before the file is there,

@@ -79,11 +79,11 @@ class PairLoader:
         self._batch_size = batch_size
         self._order: Order = order
         self._last: Last = last
-        self._todo: list[list[int]] = []
+        self._todo = _Todo()
         self._iteration = 0
         self._loader = DataLoader(
             pairs,
-            batch_sampler=_Todo(self),
+            batch_sampler=self._todo,
             num_workers=workers,
             collate_fn=collate,
             pin_memory=memory == "pinned",
@@ -114,7 +114,7 @@ class PairLoader:
         return self._run(self._iteration)
 
     def _run(self, iteration: int) -> Iterator[Batch]:
-        self._todo = self.batches(self.epoch)[self.cursor :]
+        self._todo.batches = self.batches(self.epoch)[self.cursor :]
         for batch in self._loader:
             if iteration != self._iteration:
                 raise UsageError("another iteration of this loader has begun", fix="use one loader for each iteration")
@@ -162,13 +162,17 @@ class PairLoader:
 
 
 class _Todo:
-    """The batch sampler that the `DataLoader` asks for the lists of indices left in the epoch."""
+    """The batch sampler that the `DataLoader` asks for the lists of indices left in the epoch.
 
-    def __init__(self, loader: PairLoader) -> None:
-        self._loader = loader
+    It does not know its loader: a reference cycle would leave the end of the workers to the garbage collector, which
+    takes their queues apart first, and each worker then costs five seconds.
+    """
+
+    def __init__(self) -> None:
+        self.batches: list[list[int]] = []
 
     def __iter__(self) -> Iterator[list[int]]:
-        return iter(self._loader._todo)
+        return iter(self.batches)
 
     def __len__(self) -> int:
-        return len(self._loader._todo)
+        return len(self.batches)

@@ -11,9 +11,9 @@ from torch.utils.data import Dataset
 
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.loader import Last, Memory, Order, PairLoader
-from flagdata.dataset.resolve import Refusal
 from flagdata.dataset.sample import Sample
 from flagdata.dataset.table import PairTable
+from flagdata.dataset.tolerance import Refusal
 from flagdata.record import Record
 
 OPEN_RECORDS = 256  # record files a process keeps open

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flagdata.dataset.clips import TRUTH_SPEED, clip_truth
 from flagdata.dataset.splits import ExplicitSplit, HashedSplit, Origin, check_side, groups, refuse_leaks
 from flagdata.dataset.table import COLUMNS, PairTable
+from flagdata.dataset.tolerance import Refusal, Tolerance, judge
 from flagdata.dataset.truth import TruthSeries
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
@@ -25,37 +26,6 @@ from flagdata.schema import Kind
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
 _SOURCES = (Kind.CAMERA, Kind.MESHES)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tolerance:
-    """How uncertain a pair may be. A pair outside is refused with the reason, never filled in.
-
-    Attributes:
-        clock_sigma: of the camera's clock on the wind's, at most [s].
-        staleness: age of the newest wind sample at the clip's end, at most [s].
-        coverage: share of the window that wind samples speak for, at least.
-
-    Raises:
-        UsageError: a bound that is not a number of its kind.
-    """
-
-    clock_sigma: float = 1.0
-    staleness: float = 5.0
-    coverage: float = 0.8
-
-    def __post_init__(self) -> None:
-        if not (self.clock_sigma >= 0 and self.staleness >= 0 and 0 <= self.coverage <= 1):
-            raise UsageError(f"{self}", fix="give σ and staleness of 0 s or more, and a coverage between 0 and 1")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Refusal:
-    """A pair that was refused, and every reason for it."""
-
-    artifact: str
-    recording: str
-    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +57,7 @@ def resolve(
         )
     table = PairTable.of(clips)
     if split is not None:
-        check_side(split, split_by)
-        if isinstance(split_by, ExplicitSplit):
-            wanted = _explicit_side(catalog, split_by, split)
-        else:
-            wanted = _hashed_side(catalog, split_by, split)
+        wanted = clips_on_side(catalog, split, split_by)
         table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))
         if not len(table):
             count = len(set(groups(_origins(catalog, _clips(catalog, None, _ORIGIN))).tolist()))
@@ -101,7 +67,7 @@ def resolve(
                 fix="record more days and sessions, or give an ExplicitSplit",
             )
     table = _with_window(lake, table, _windows(clips, table), window)
-    refused = _judge(table, tolerance)
+    refused = judge(table, tolerance)
     kept = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
     if not kept.any():
         first = next(iter(refused.values()))
@@ -157,6 +123,19 @@ def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:
     return found
 
 
+def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | ExplicitSplit) -> set[str]:
+    """Artifacts of all clips of a catalog that are on one side of the split.
+
+    Raises:
+        UnknownNameError: no such side.
+        RefusedError: an explicit split that leaks.
+    """
+    check_side(split, split_by)
+    if isinstance(split_by, ExplicitSplit):
+        return _explicit_side(catalog, split_by, split)
+    return _hashed_side(catalog, split_by, split)
+
+
 def _hashed_side(catalog: pa.Table, split_by: HashedSplit, split: str) -> set[str]:
     """Clips of the side. Every clip of the catalog takes part, so that two filters never disagree about a group."""
     clips = _clips(catalog, None, _ORIGIN)
@@ -207,38 +186,3 @@ def _with_window(lake: Lake, table: PairTable, windows: NDArray[np.float64], win
             )
             wind[k], sigma[k], coverage[k], staleness[k] = truth.wind, truth.sigma, truth.coverage, truth.staleness
     return replace(table, wind=wind, wind_sigma=sigma, coverage=coverage, staleness=staleness)
-
-
-def _judge(table: PairTable, tolerance: Tolerance) -> dict[int, Refusal]:
-    """Refusals by the pair's index."""
-    checks = (
-        (np.isnan(table.wind), lambda k: "no usable wind sample in the window"),
-        (
-            table.coverage < tolerance.coverage,
-            lambda k: f"wind samples cover {table.coverage[k]:.2f} of the window, less than {tolerance.coverage:g}",
-        ),
-        (
-            table.staleness > tolerance.staleness,
-            lambda k: f"the newest wind sample is {table.staleness[k]:.3g} s old, above {tolerance.staleness:g} s",
-        ),
-        (np.isnan(table.clock_sigma), lambda k: "the uncertainty of the camera's clock is unknown"),
-        (
-            table.clock_sigma > tolerance.clock_sigma,
-            lambda k: (
-                f"the camera's clock is known to ±{table.clock_sigma[k]:.3g} s, above {tolerance.clock_sigma:g} s"
-            ),
-        ),
-        (
-            np.isnan(table.wind_sigma) & ~np.isnan(table.wind) & ~np.isnan(table.clock_sigma),
-            lambda k: "too few wind samples to know the uncertainty of their mean",
-        ),
-    )
-    bad = np.any([mask for mask, _ in checks], axis=0)
-    return {
-        int(k): Refusal(
-            artifact=str(table.artifact[k]),
-            recording=str(table.recording[k]),
-            reasons=tuple(reason(k) for mask, reason in checks if mask[k]),
-        )
-        for k in np.nonzero(bad)[0]
-    }

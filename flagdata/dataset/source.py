@@ -6,8 +6,9 @@ from pathlib import Path
 
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.pairs import Pairs
-from flagdata.dataset.resolve import Tolerance, resolve
+from flagdata.dataset.resolve import resolve
 from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+from flagdata.dataset.tolerance import Tolerance
 from flagdata.lake import Lake
 from flagdata.schema import TRUTH_WINDOW
 

@@ -1,0 +1,203 @@
+"""The same (tag, seed) gives the same batches, whatever the workers, and a saved cursor takes them up bit for bit."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import time
+from dataclasses import fields
+
+import numpy as np
+import pytest
+import torch
+
+import flagdata
+from flagdata.dataset import DecodedCache
+from flagdata.errors import RefusedError, UsageError
+
+
+@pytest.fixture(scope="module")
+def pairs(field_lake):
+    return flagdata.open(field_lake.path).pairs(at="v1", seed=11)
+
+
+def contents(batch):
+    """All of a batch in comparable form: bytes of tensors, tuples as they are."""
+    out = {}
+    for field in fields(batch):
+        value = getattr(batch, field.name)
+        if isinstance(value, torch.Tensor):
+            out[field.name] = (value.dtype, tuple(value.shape), value.numpy().tobytes())
+        elif field.name == "parameters":
+            out[field.name] = {name: column.numpy().tobytes() for name, column in value.items()}
+        else:
+            out[field.name] = value
+    return out
+
+
+def epoch(loader):
+    return [contents(batch) for batch in loader]
+
+
+@pytest.fixture(scope="module")
+def expected(pairs):
+    """Two epochs read in this process."""
+    loader = pairs.loader(7)
+    return [epoch(loader), epoch(loader)]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_batches_are_identical_with_0_1_and_2_workers(pairs, expected, workers):
+    loader = pairs.loader(7, workers=workers)
+    assert epoch(loader) == expected[0]
+    assert epoch(loader) == expected[1]
+
+
+@pytest.mark.parametrize("start_method", ["fork", "spawn"])
+def test_batches_are_identical_however_workers_start(field_lake, expected, start_method):
+    # The catalog was used in this process just now: what the workers inherit must not need it.
+    fresh = flagdata.open(field_lake.path).pairs(at="v1", seed=11)
+    assert epoch(fresh.loader(7, workers=2, start_method=start_method)) == expected[0]
+
+
+def test_an_epoch_holds_every_pair_once_in_another_order_than_the_last(pairs, expected):
+    seen = [[artifact for batch in one for artifact in batch["artifact"]] for one in expected]
+    assert sorted(seen[0]) == sorted(seen[1]) == sorted(pairs.table.artifact.tolist())
+    assert seen[0] != seen[1]
+    assert len(expected[0]) == 7  # 48 pairs in batches of 7
+    assert len(expected[0][-1]["artifact"]) == 6
+
+
+def test_another_seed_is_another_order_of_the_same_pairs(field_lake, expected):
+    other = flagdata.open(field_lake.path).pairs(at="v1", seed=12)
+    assert epoch(other.loader(7)) != expected[0]
+
+
+def test_stored_order_is_by_recording_and_frame(pairs):
+    seen = [artifact for batch in pairs.loader(5, order="stored") for artifact in batch.artifact]
+    assert seen == pairs.table.artifact.tolist()
+
+
+def test_the_last_batch_may_be_dropped(pairs):
+    loader = pairs.loader(7, last="drop")
+    assert len(loader) == 6
+    assert [len(batch) for batch in loader] == [7] * 6
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+@pytest.mark.parametrize("stop", [1, 6, 7, 9])
+def test_a_saved_cursor_continues_bit_for_bit_in_another_process(field_lake, expected, workers, stop):
+    flat = expected[0] + expected[1]
+    pairs = flagdata.open(field_lake.path).pairs(at="v1", seed=11)
+    loader = pairs.loader(7, workers=workers)
+    done = 0
+    while done < stop:
+        for _ in loader:
+            done += 1
+            if done == stop:
+                break
+    state = json.loads(json.dumps(loader.state_dict()))  # a state survives as text
+    again = flagdata.open(field_lake.path).pairs(at="v1", seed=11).loader(7)
+    again.load_state_dict(state)
+    rest = epoch(again)
+    if again.epoch < 2:
+        rest += epoch(again)
+    assert rest == flat[stop:]
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_an_iteration_left_early_is_taken_up_where_it_stopped(pairs, expected, workers):
+    loader = pairs.loader(7, workers=workers)
+    first = [contents(batch) for batch, _ in zip(loader, range(3), strict=False)]
+    # zip asks for a fourth batch before it stops: that one was handed out too.
+    assert first == expected[0][:3]
+    assert (loader.epoch, loader.cursor) == (0, 4)
+    assert epoch(loader) == expected[0][4:]
+
+
+def test_a_state_of_other_data_or_options_is_refused_by_name(field_lake, pairs):
+    state = pairs.loader(7).state_dict()
+    with pytest.raises(RefusedError, match="batch_size was 7, is 8"):
+        pairs.loader(8).load_state_dict(state)
+    part = flagdata.open(field_lake.path).pairs("wind < 6", at="v1", seed=11)
+    with pytest.raises(RefusedError, match="fingerprint was"):
+        part.loader(7).load_state_dict(state)
+    other = flagdata.open(field_lake.path).pairs(at="v1", seed=12)
+    with pytest.raises(RefusedError, match="seed was 11, is 12"):
+        other.loader(7).load_state_dict(state)
+    with pytest.raises(UsageError):
+        pairs.loader(7).load_state_dict({"epoch": 0})
+    with pytest.raises(UsageError, match="no batch 99"):
+        pairs.loader(7).load_state_dict({**state, "cursor": 99})
+
+
+def test_two_iterations_of_one_loader_do_not_mix_silently(pairs):
+    loader = pairs.loader(7)
+    first = iter(loader)
+    next(first)
+    second = iter(loader)
+    next(second)
+    with pytest.raises(UsageError, match="another iteration"):
+        next(first)
+
+
+def test_loading_draws_nothing_from_the_global_random_stream(pairs):
+    torch.manual_seed(5)
+    expected = torch.rand(3)
+    torch.manual_seed(5)
+    next(iter(pairs.loader(7, workers=1)))
+    assert torch.equal(torch.rand(3), expected)
+
+
+def test_batches_from_the_decoded_cache_are_the_same(field_lake, expected, tmp_path):
+    cache = DecodedCache(tmp_path / "cache", limit=10**8)
+    cached = flagdata.open(field_lake.path).pairs(at="v1", seed=11, cache=cache)
+    loader = cached.loader(7, workers=2)
+    assert epoch(loader) == expected[0]  # filled by two workers at once
+    assert epoch(loader) == expected[1]  # read back
+    assert cache.size() > 48 * 30 * 32 * 32
+
+
+def test_workers_end_with_their_loader(pairs):
+    loader = pairs.loader(7, workers=2)
+    next(iter(loader))
+    children = multiprocessing.active_children()
+    assert len(children) >= 2
+    began = time.monotonic()
+    del loader
+    # Workers that were not told to end are killed after 5 s each.
+    assert time.monotonic() - began < 4
+    assert not any(child.is_alive() for child in children)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"batch_size": 0},
+        {"batch_size": 1, "workers": -1},
+        {"batch_size": 1, "order": "random"},
+        {"batch_size": 1, "last": "pad"},
+        {"batch_size": 1, "memory": "fast"},
+        {"batch_size": 1, "start_method": "spawn"},
+        {"batch_size": 49, "last": "drop"},
+    ],
+)
+def test_options_that_cannot_be_are_usage_errors(pairs, options):
+    with pytest.raises(UsageError):
+        pairs.loader(**options)
+
+
+def read_in_child(pairs, connection):
+    connection.send(np.asarray(pairs[5].clip))
+    connection.close()
+
+
+def test_a_record_that_is_open_may_be_read_after_a_fork(pairs):
+    mine = pairs[5].clip.numpy()  # opens the record here
+    receive, send = multiprocessing.Pipe(duplex=False)
+    child = multiprocessing.get_context("fork").Process(target=read_in_child, args=(pairs, send))
+    child.start()
+    theirs = receive.recv()
+    child.join()
+    assert child.exitcode == 0
+    assert np.array_equal(mine, theirs)
