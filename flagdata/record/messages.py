@@ -55,6 +55,7 @@ WIND_FIELDS: dict[str, tuple[str, int]] = {
     "tracking_quality": ("tracking_quality", 20),
     "flutter_frequency": ("flutter_frequency", 21),
     "deflection_angle": ("deflection_angle", 22),
+    "sonic_temperature": ("sonic_temperature", 23),
 }
 _FLAGS_NUMBER = 100
 _HOST_TIME_NUMBER = 101

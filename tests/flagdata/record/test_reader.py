@@ -110,6 +110,7 @@ def test_field_numbers_of_released_files_have_not_changed() -> None:
         ("air_pressure", 11), ("relative_humidity", 12), ("platform_speed", 13), ("platform_heading", 14),
         ("theoretical_speed", 15), ("theoretical_direction", 16), ("speed_estimate", 17), ("tracked_rms", 18),
         ("tracked_points", 19), ("tracking_quality", 20), ("flutter_frequency", 21), ("deflection_angle", 22),
+        ("sonic_temperature", 23),
         ("flags", 100), ("host_time", 101),
     ]  # fmt: skip
     assert [(f.name, f.number) for f in messages.WindMean.DESCRIPTOR.fields] == [
