@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.errors import UsageError
 
 
 @click.command()
@@ -14,6 +15,8 @@ from flagdata.console import document, json_option, lake_option, progress, say
 @click.option("--to", "target", required=True, type=click.Path(path_type=Path), help="New folder to write.")
 @click.option("--where", metavar="EXPR", help="SQL condition as in flagdata query; all rows by default.")
 @click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
+@click.option("--split", metavar="SIDE", help="Only this side of the leakage-safe split: train, validation or test.")
+@click.option("--salt", default="", metavar="TEXT", help="Another text gives another split.")
 @click.option("--frames", metavar="FORM", help="webdataset: jpg (default) or npy; parquet: none (default) or jpg.")
 @click.option("--shard-bytes", type=click.IntRange(min=1), help="webdataset, parquet: size of a file at most.")
 @click.option("--shuffle", type=int, metavar="SEED", help="webdataset: order the samples at random.")
@@ -25,6 +28,8 @@ def export(
     target: Path,
     where: str | None,
     at: str | None,
+    split: str | None,
+    salt: str,
     frames: str | None,
     shard_bytes: int | None,
     shuffle: int | None,
@@ -38,18 +43,22 @@ def export(
     version, the filter and the hash of every file:
 
     \b
-      flagdata export webdataset --where "kind = 'clip'" --at v1 --to shards/train
+      flagdata export webdataset --where "kind = 'clip'" --at v1 --split train --to shards/train
       flagdata export parquet --to catalog
     """
     from flagdata.export import Export
     from flagdata.export import export as run
     from flagdata.lake import Lake
 
+    if salt and split is None:
+        raise UsageError("--salt without --split", fix="name the side by --split, or leave out --salt")
     given = {"frames": frames, "shard_bytes": shard_bytes, "shuffle": shuffle, "crf": crf}
     request = Export(
         format=format_name,
         where=where,
         at=at,
+        split=split,
+        salt=salt,
         options={name: value for name, value in given.items() if value is not None},
     )
     with progress(None, label=f"export {format_name}", unit="artifact") as advance:

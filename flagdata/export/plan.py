@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
+from flagdata.dataset.resolve import clips_on_side
+from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.source import Source
 from flagdata.export.target import fresh_folder, write_manifest
@@ -56,12 +59,16 @@ class Export:
         format: a name of `FORMATS`.
         where: filter as in `flagdata.query`; `None` is every row.
         at: ref; `None` is the head of main.
+        split: side of the leakage-safe split: only its clips, and the recordings they are of; `None` is everything.
+        salt: of the split, see `flagdata.dataset.splits.HashedSplit`.
         options: of the format, by name; what is not named keeps its default.
     """
 
     format: str
     where: str | None = None
     at: str | None = None
+    split: str | None = None
+    salt: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def exporter(self) -> Exporter:
@@ -101,15 +108,18 @@ def export(
     exporter = request.exporter()
     view = lake.view(request.at)
     version = view[0].version
-    rows = Selection(lake.table(view), Request(where=request.where)).table()
+    catalog = lake.table(view)
+    rows = Selection(catalog, Request(where=request.where)).table()
+    if request.split is not None:
+        rows = _on_side(catalog, rows, request.split, salt=request.salt)
     _check_kinds(rows, request.format, exporter.kinds)
-    if request.where is not None and not rows.num_rows:
-        raise NotFoundError("no rows match", where=request.where, fix="try the filter with flagdata query")
     if not rows.num_rows:
-        raise NotFoundError("no rows", where=f"version {version}", fix="see flagdata ls")
+        given = {"where": request.where, "split": request.split, "version": str(version)}
+        where = ", ".join(f"{name} {value}" for name, value in given.items() if value is not None)
+        raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
     recipe = {
         "format": request.format, "options": dataclasses.asdict(exporter), "version": version,  # pyright: ignore[reportArgumentType]
-        "where": request.where,
+        "where": request.where, "split": request.split, "salt": request.salt if request.split else None,
     }  # fmt: skip
     with fresh_folder(target) as folder:
         content = exporter.write(Source(lake=lake, rows=rows), folder, advance)
@@ -128,6 +138,16 @@ def export(
             },
         )
     return ExportResult(folder=target, manifest=manifest)
+
+
+def _on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.Table:
+    """The rows on one side: clips, and recordings by their clips. Sides are decided over all clips of the version, so
+    that two exports of one version never put a session, day, seed or camera file on two sides."""
+    _check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
+    clips = clips_on_side(catalog, split, HashedSplit(salt=salt))
+    on_side = catalog.filter(pc.field("artifact").isin(list(clips)))
+    wanted = {*clips, *on_side["recording"].drop_null().to_pylist()}
+    return rows.filter(pc.field("artifact").isin(list(wanted)))
 
 
 def _check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:
