@@ -1,9 +1,10 @@
-"""Delimited text by a sensor recipe."""
+"""Delimited text by a sensor recipe: the format "delimited", and the table reading that other formats build on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,22 +19,13 @@ from flagdata.ingest.anemometer.recipe import ChannelLayout, Recipe
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
+from flagdata.ingest.anemometer.stamps import Stamps
 from flagdata.ingest.anemometer.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.wall import to_utc
 from flagdata.schema import CHANNELS, SampleFlag
+from flagdata.signals import Instants
 from flagdata.timebase import zone
 from flagdata.units import unit
-
-
-@dataclass
-class _Column:
-    """One channel as its blocks come in."""
-
-    layout: ChannelLayout
-    index: int
-    values: list[NDArray[np.float64]] = field(default_factory=list)
-    states: list[NDArray[np.uint8]] = field(default_factory=list)
-    decimals: int = 0
 
 
 class Delimited:
@@ -41,7 +33,7 @@ class Delimited:
 
     name = "delimited"
     about = "delimited text described by a sensor recipe"
-    uses = frozenset({"zone", "encoding", "zero_offset"})
+    uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
         """The recipe whose columns the header names, if one does; the one with most columns in common."""
@@ -56,14 +48,22 @@ class Delimited:
         """Read a file by the recipe in `options`."""
         if options.recipe is None:
             raise UsageError("the format delimited needs a recipe", where=str(source.path), fix="name one by --recipe")
-        return read_by_recipe(source, recipes.load(options.recipe), options)
+        recipe = recipes.load(options.recipe)
+        if recipe.file.host:
+            raise UsageError(
+                f"the recipe {recipe.name} is for host-stamped lines", where=str(source.path), fix="use that format"
+            )
+        return read_table(source, recipe, RowReader(source, recipe.file), zone_name=options.zone).reading
 
 
 def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
     layout = recipe.file
-    if layout.header == 0 or len(head.lines) <= layout.preamble:
+    if layout.host or layout.header == 0 or len(head.lines) <= layout.preamble:
         return None
-    cells = [cell.strip().strip('"') for cell in _cut(head.lines[layout.preamble], layout.delimiter)]
+    line = head.lines[layout.preamble]
+    cells = [
+        cell.strip().strip('"') for cell in (line.split() if layout.delimiter == " " else line.split(layout.delimiter))
+    ]
     needed = [c.column for c in recipe.channels.values() if not c.optional] + list(recipe.time.columns)
     if not all(column in cells for column in needed):
         return None
@@ -76,102 +76,170 @@ def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
     )
 
 
-def _cut(line: str, delimiter: str) -> list[str]:
-    return line.split() if delimiter == " " else line.split(delimiter)
+class Rows(Protocol):
+    """Where the cells come from; `shift` is the index of the column that recipes call 1."""
+
+    header: list[str] | None
+    shift: int
+    first_line: int
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]: ...
+
+    def findings(self) -> tuple[Finding, ...]: ...
 
 
-def read_by_recipe(source: TextFile, recipe: Recipe, options: WindOptions) -> Reading:
-    """Read a delimited log.
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A log read by a recipe.
+
+    Attributes:
+        reading: its channels.
+        extra: (n,) float64 of the columns asked for beside the channels, as written.
+    """
+
+    reading: Reading
+    extra: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass
+class _Column:
+    """One column as its blocks come in."""
+
+    index: int
+    values: list[NDArray[np.float64]] = field(default_factory=list)
+    states: list[NDArray[np.uint8]] = field(default_factory=list)
+
+    def value(self) -> NDArray[np.float64]:
+        return np.concatenate(self.values)
+
+    def state(self) -> NDArray[np.uint8]:
+        return np.concatenate(self.states)
+
+
+@dataclass
+class _Clock:
+    """One clock's stamps as their blocks come in."""
+
+    form: str
+    step: int = 2**62
+    ns: list[NDArray[np.int64]] = field(default_factory=list)
+    utc: list[NDArray[np.bool_]] = field(default_factory=list)
+
+    def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
+        self.ns.append(stamps.ns[keep])
+        self.utc.append(stamps.utc[keep])
+        self.step = min(self.step, stamps.step)
+
+    def instants(
+        self, line: NDArray[np.int64], zone_name: str | None, where: str
+    ) -> tuple[Instants, tuple[Finding, ...]]:
+        return instants(np.concatenate(self.ns), np.concatenate(self.utc), line=line, zone_name=zone_name, where=where)
+
+
+def read_table(
+    source: TextFile, recipe: Recipe, rows: Rows, *, zone_name: str | None, extra: Sequence[str] = ()
+) -> Table:
+    """Read cells by a recipe.
+
+    Args:
+        rows: the file's rows.
+        zone_name: of wall-clock stamps; goes before the recipe's.
+        extra: further columns to read, by name.
 
     Raises:
-        InputError: no such columns, or no row that can be read.
+        InputError: no such columns, or hardly a row that can be read.
         TimeError: stamps without a zone, or impossible ones.
     """
     where = str(source.path)
-    rows = RowReader(source, recipe.file)
-    columns = _columns(recipe, rows.header, where)
-    stamp_index = [_index(column, rows.header, where) for column in recipe.time.columns]
-    walls: list[NDArray[np.int64]] = []
-    utcs: list[NDArray[np.bool_]] = []
+    columns = {name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()}
+    others = {name: _Column(index=_index(name, rows, where)) for name in extra}
+    stamp_index = [_index(column, rows, where) for column in recipe.time.columns]
+    clock = _Clock(form=recipe.time.format)
+    host = _Clock(form=recipe.file.host)
+    if not stamp_index:
+        clock, stamp_index = host, [0]
     lines: list[NDArray[np.int64]] = []
     bad_stamps: list[int] = []
-    step = 2**62
-    width = 1 + max([*stamp_index, *(column.index for column in columns.values())])
+    width = 1 + max([*stamp_index, *(column.index for column in [*columns.values(), *others.values()])])
     for block_lines, block in rows.blocks(width):
-        texts = [" ".join(row[i].strip() for i in stamp_index) for row in block]
-        stamps = parse_stamps(texts, recipe.time.format)
-        bad_stamps.extend(block_lines[~stamps.valid].tolist())
-        walls.append(stamps.ns[stamps.valid])
-        utcs.append(stamps.utc[stamps.valid])
-        lines.append(block_lines[stamps.valid])
-        step = min(step, stamps.step)
-        for column in columns.values():
+        stamps = parse_stamps([" ".join(row[i].strip() for i in stamp_index) for row in block], clock.form)
+        keep = stamps.valid
+        if recipe.file.host and clock is not host:
+            host_stamps = parse_stamps([row[0] for row in block], host.form)
+            keep = keep & host_stamps.valid
+            host.add(host_stamps, keep)
+        clock.add(stamps, keep)
+        bad_stamps.extend(block_lines[~keep].tolist())
+        lines.append(block_lines[keep])
+        for column in [*columns.values(), *others.values()]:
             cells = [row[column.index] for row in block]
             parsed = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing)
-            column.values.append(parsed.value[stamps.valid])
-            column.states.append(parsed.state[stamps.valid])
-            column.decimals = max(column.decimals, parsed.decimals)
+            column.values.append(parsed.value[keep])
+            column.states.append(parsed.state[keep])
     findings = list(rows.findings())
     line = np.concatenate(lines) if lines else np.zeros(0, dtype=np.int64)
     if len(line) == 0:
         raise InputError(
             "no row with a readable time stamp",
             where=f"{where}, line {bad_stamps[0] if bad_stamps else rows.first_line}",
-            fix=f"the recipe {recipe.name} expects stamps as {recipe.time.format}; check the recipe, or the file",
+            fix=f"stamps are expected as {clock.form}; check the recipe, or that the logger recorded anything",
         )
     if bad_stamps:
+        refuse_if_most(len(bad_stamps), len(line), f"rows without a stamp as {clock.form}", where)
         findings.append(
             Finding(
                 kind="unreadable-stamps", severity=Severity.ERROR, count=len(bad_stamps), where=f"line {bad_stamps[0]}",
-                what=f"{len(bad_stamps)} rows whose stamp is not {recipe.time.format}; left out",
+                what=f"{len(bad_stamps)} rows whose stamp is not {clock.form} or no date; left out",
             )
         )  # fmt: skip
-        refuse_if_most(len(bad_stamps), len(line), f"rows without a stamp as {recipe.time.format}", where)
-    wall, utc = np.concatenate(walls), np.concatenate(utcs)
-    time, found = instants(wall, utc, line=line, zone_name=options.zone or recipe.time.zone, where=where)
+    zone_name = zone_name or recipe.time.zone
+    time, found = clock.instants(line, zone_name, where)
     findings.extend(found)
+    host_time = host.instants(line, zone_name, where)[0] if host.ns and clock is not host else None
     channels: dict[str, NDArray[np.float64]] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     for name, column in columns.items():
-        value, state = np.concatenate(column.values), np.concatenate(column.states)
-        channels[name] = calibrated(value, name, column.layout)
-        channel_flags, found = cell_flags(name, column.layout, channels[name], state, line)
+        layout = recipe.channels[name]
+        state = column.state()
+        refuse_if_most(int((state == Cell.UNREADABLE).sum()), len(line), f"unreadable values of {name}", where)
+        channels[name] = calibrated(column.value(), name, layout)
+        channel_flags, found = cell_flags(name, layout, channels[name], state, line)
         findings.extend(found)
         if name in WIND_CHANNELS:
             flags |= channel_flags
-        refuse_if_most(int((state == Cell.UNREADABLE).sum()), len(line), f"unreadable values of {name}", where)
-    return Reading(
-        time=time, channels=channels, flags=flags, line=line, sensor=recipe.sensor, step=step, rules=recipe.quality,
-        findings=tuple(findings),
+    reading = Reading(
+        time=time, channels=channels, flags=flags, line=line, sensor=recipe.sensor, step=clock.step,
+        rules=recipe.quality, host_time=host_time, findings=tuple(findings),
     )  # fmt: skip
+    return Table(reading=reading, extra={name: column.value() for name, column in others.items()})
 
 
-def _columns(recipe: Recipe, header: Sequence[str] | None, where: str) -> dict[str, _Column]:
-    found: dict[str, _Column] = {}
+def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
+    absent = set(rows.header).isdisjoint if rows.header is not None else None
+    found: dict[str, int] = {}
     for name, layout in recipe.channels.items():
-        if layout.optional and isinstance(layout.column, str) and header is not None and layout.column not in header:
+        if layout.optional and isinstance(layout.column, str) and absent is not None and absent([layout.column]):
             continue
-        found[name] = _Column(layout=layout, index=_index(layout.column, header, where))
+        found[name] = _index(layout.column, rows, where)
     return found
 
 
-def _index(column: str | int, header: Sequence[str] | None, where: str) -> int:
+def _index(column: str | int, rows: Rows, where: str) -> int:
+    header = rows.header
     if isinstance(column, int):
         if header is not None and column > len(header):
             raise InputError(f"no column {column}, only {len(header)}", where=where, fix="correct the recipe")
-        return column - 1
+        return column - 1 + rows.shift
     names = list(header or ())
     if column not in names:
-        raise InputError(
-            f"no column {column!r} in the header", where=where,
-            fix=UnknownNameError.of("column", column, names).fix,
-        )  # fmt: skip
+        fix = UnknownNameError.of("column", column, names).fix
+        raise InputError(f"no column {column!r} in the header", where=where, fix=fix)
     return names.index(column)
 
 
 def instants(
     wall: NDArray[np.int64], utc: NDArray[np.bool_], *, line: NDArray[np.int64], zone_name: str | None, where: str
-) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+) -> tuple[Instants, tuple[Finding, ...]]:
     """UTC nanoseconds of stamps, some of which may state their own zone.
 
     Raises:

@@ -40,6 +40,10 @@ FORMATS = Registry(
     "anemometer format",
     {
         "delimited": "flagdata.ingest.anemometer.delimited:Delimited",
+        "nmea": "flagdata.ingest.anemometer.nmea:Nmea",
+        "kestrel": "flagdata.ingest.anemometer.kestrel:Kestrel",
+        "toa5": "flagdata.ingest.anemometer.toa5:Toa5",
+        "host-stamped": "flagdata.ingest.anemometer.host:HostStamped",
     },
     group="flagdata.formats",
 )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding
-from flagdata.ingest.anemometer import quality, zero
+from flagdata.ingest.anemometer import quality, sonic, zero
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
@@ -53,7 +53,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
     reading = zero.settle(in_order(reading, where=str(path)), choice)
-    for check in (quality.negative, quality.dead_zone, quality.stale, quality.at_nyquist):
+    reading = sonic.with_horizontal(reading, options.azimuth, where=str(path))
+    for check in (quality.faults, quality.negative, quality.dead_zone, quality.stale, quality.at_nyquist):
         reading = _apply(reading, check)
     findings = (*reading.findings, *quality.gaps(reading))
     if not any(np.isfinite(values).any() for values in reading.channels.values()):
@@ -77,7 +78,8 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
             FORMATS[options.format]
         return options.format, options, (f"the format {options.format} was named",)
     if options.recipe is not None:
-        return "delimited", options, (f"the recipe {options.recipe} was named",)
+        name = "host-stamped" if recipes.load(options.recipe).file.host else "delimited"
+        return name, options, (f"the recipe {options.recipe} was named",)
     guesses = recognise(source)
     if not guesses or guesses[0].score < SURE:
         seen = "; ".join(reason for guess in guesses for reason in guess.reasons)

@@ -46,6 +46,7 @@ class WindOptions:
         date: of the first sentence, for streams that carry the time of day alone.
         date_order: "dmy" or "mdy" for dates that are written with numbers only; `None` decides by evidence or refuses.
         platform: "fixed" for a mast, "moving" for a boat or vehicle; `None` where the log shows it or does not need it.
+        talker: NMEA talker whose wind is read, for streams with several instruments.
         azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative
             direction stays sensor-relative.
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
@@ -59,6 +60,7 @@ class WindOptions:
     date: dt.date | None = None
     date_order: Literal["dmy", "mdy"] | None = None
     platform: Literal["fixed", "moving"] | None = None
+    talker: str | None = None
     azimuth: float | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)

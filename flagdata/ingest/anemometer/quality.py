@@ -21,16 +21,22 @@ STALE_CHANCE = 1e-3
 """Probability of flagging one run of repeats in a log without any, see `stale`."""
 STALE_SHORTEST = 5
 """Rows; a shorter run of repeats is never called stale."""
+STALE_SECONDS = 1.0
+"""A shorter run is never called stale either: fast loggers read a smoothed signal several times over."""
 
 
 def gaps(reading: Reading) -> tuple[Finding, ...]:
-    """Stretches without rows: longer than 1.5 times the median interval and than its jitter (6 σ, from the MAD)."""
+    """Stretches without rows: longer than the jitter of the stamps explains.
+
+    A gap is an interval beyond 1.5 times the median m, and beyond m + 3 (q - m) with the 99th percentile q, but in any
+    case one beyond 3 m.
+    """
     if len(reading.time) < 4:
         return ()
     steps = np.diff(reading.time)
     usual = float(np.median(steps))
-    jitter = 1.4826 * float(np.median(np.abs(steps - usual)))
-    wide = np.flatnonzero(steps > max(1.5 * usual, usual + 6 * jitter))
+    jitter = 3 * (float(np.quantile(steps, 0.99)) - usual)
+    wide = np.flatnonzero(steps > max(1.5 * usual, min(usual + jitter, 3 * usual)))
     if len(wide) == 0:
         return ()
     longest = int(wide[np.argmax(steps[wide])])
@@ -44,6 +50,23 @@ def gaps(reading: Reading) -> tuple[Finding, ...]:
             f"the longest, {seconds:.3f} s, ends at the line named",
         ),
     )  # fmt: skip
+
+
+def faults(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Rows in which a channel of the recipe's `fault-where-zero` is 0: SENSOR_FAULT."""
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    found: list[Finding] = []
+    for name in reading.rules.fault_where_zero:
+        blind = reading.channels[name] == 0 if name in reading.channels else np.zeros(len(reading.time), dtype=bool)
+        if blind.any():
+            flags[blind] = SampleFlag.SENSOR_FAULT
+            found.append(
+                Finding(
+                    kind="sensor-fault", severity=Severity.WARNING, count=int(blind.sum()),
+                    where=f"line {reading.line[blind][0]}", what=f"{int(blind.sum())} rows in which {name} is 0",
+                )
+            )  # fmt: skip
+    return flags, tuple(found)
 
 
 def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
@@ -96,8 +119,9 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
 
     Were repeats independent with probability p, n rows would hold a run of L or more repeats with probability at most
     n p^L (Feller, An Introduction to Probability Theory I, XIII.7). A run is stale from the L on at which that is
-    `STALE_CHANCE`. p is the share of repeats in the log, taken again without the runs found (three passes), and never
-    below 5 %. Readings of a calm (0, or dead zone) are no repeats. A recipe's `stale_after` replaces the rule.
+    `STALE_CHANCE`, if it lasts `STALE_SECONDS`. p is the share of repeats in the log, taken again without the runs
+    found (three passes), and never below 5 %. Readings of a calm (0, or dead zone) are no repeats. A recipe's
+    `stale_after` replaces the rule.
     """
     names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
     names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
@@ -113,13 +137,13 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     starts, lengths = _runs(same)
     if len(starts) == 0:
         return flags, ()
+    span = (reading.time[starts + lengths] - reading.time[starts]) / NANOSECONDS
     if reading.rules.stale_after is not None:
-        span = (reading.time[starts + lengths] - reading.time[starts]) / NANOSECONDS
         long = span > reading.rules.stale_after
         text = f"for longer than the {reading.rules.stale_after:g} s its recipe allows"
     else:
         limit = _longest_by_chance(n, lengths)
-        long = lengths >= limit
+        long = (lengths >= limit) & (span >= STALE_SECONDS)
         text = f"{limit} times or more, which chance and resolution do not explain"
     if not long.any():
         return flags, ()
@@ -160,8 +184,9 @@ def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...
     """Frequencies found in frames taken once a row that lie within one step of half the frame rate: ALIASED.
 
     A sampled oscillation of frequency f is the same as one of |k·rate - f| for every whole k (Shannon 1949); close to
-    rate/2 the two lowest candidates cannot be told apart within the resolution of the estimate. The step is the most
-    common spacing of the frequencies above a quarter of the rate.
+    rate/2 the two lowest candidates cannot be told apart within the resolution of the estimate: two of its steps, or
+    5 % of rate/2. The step is the median spacing of the frequencies above a quarter of the rate; the rate is the
+    mean one.
     """
     flags = np.zeros(len(reading.time), dtype=np.uint16)
     found: list[Finding] = []
@@ -169,7 +194,7 @@ def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...
         values = reading.channels.get(name)
         if values is None or len(values) < 10:
             continue
-        rate = NANOSECONDS / float(np.median(np.diff(reading.time)))
+        rate = NANOSECONDS / float(np.mean(np.diff(reading.time)))
         limit = rate / 2
         high = np.unique(np.round(values[values > rate / 4], 6))
         step = float(np.median(np.diff(high))) if len(high) > 2 else 1.0

@@ -3,12 +3,12 @@
 A recipe is parsed here and nowhere else; unknown keys are refused with the nearest known one. Tables:
 
     name, about, source       what it is, and where its facts come from
-    [file]                    delimiter, decimal, encoding, preamble, header, comment, missing
+    [file]                    delimiter, decimal, encoding, preamble, header, comment, missing, host
     [time]                    columns, format, zone
     [channels.<channel>]      column, unit, gain, offset, range, convention, rotation, optional
     [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
                               accuracy-relative (all SI)
-    [quality]                 zero-offset, stale-after, frame-rate-of
+    [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ class FileLayout:
         header: header lines; the first names the columns, further ones (units) are skipped. 0: columns have no names.
         comment: lines that start with it are skipped; "" for none.
         missing: further spellings of "no value"; those that are numbers are compared as numbers.
+        host: format of the stamp that the logging computer wrote before each raw line (see `TimeLayout.format`), "" for
+            none. Columns are then numbered within the raw line.
     """
 
     delimiter: str = ","
@@ -56,8 +58,15 @@ class FileLayout:
     header: int = 1
     comment: str = ""
     missing: tuple[str, ...] = ()
+    host: str = ""
 
     def __post_init__(self) -> None:
+        if self.host and (self.preamble or self.comment or self.delimiter == " "):
+            raise UsageError(
+                "a host stamp goes with neither preamble, comment nor blanks",
+                where="[file] host",
+                fix="leave those keys out",
+            )
         if self.delimiter not in DELIMITERS.values():
             raise UnknownNameError.of("delimiter", self.delimiter, DELIMITERS, where="[file] delimiter")
         if self.decimal not in (".", ","):
@@ -73,7 +82,8 @@ class TimeLayout:
     """How a row says when it was.
 
     Attributes:
-        columns: names or numbers (from 1) of the columns that are joined with a blank.
+        columns: names or numbers (from 1) of the columns that are joined with a blank; none where the host's stamp is
+            all there is.
         format: "iso", "epoch-s", "epoch-ms", or strptime directives (see stamps.py).
         zone: of wall-clock stamps; `None` leaves it to the user.
     """
@@ -83,8 +93,6 @@ class TimeLayout:
     zone: str | None = None
 
     def __post_init__(self) -> None:
-        if not self.columns:
-            raise UsageError("no time column", where="[time] columns", fix="name the column of the stamps")
         if self.zone is not None:
             zone(self.zone, where="[time] zone")
 
@@ -131,11 +139,13 @@ class QualityRules:
         zero_offset: see options.ZeroOffset.
         stale_after: repeats longer than this [s] are stale; `None` derives it from the readings themselves.
         frame_rate_of: channels that are frequencies found in frames, one a row: checked against the Nyquist limit.
+        fault_where_zero: channels that are exactly 0 when the instrument saw nothing: such rows are SENSOR_FAULT.
     """
 
     zero_offset: ZeroOffset = "report"
     stale_after: float | None = None
     frame_rate_of: tuple[str, ...] = ()
+    fault_where_zero: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_zero_offset(self.zero_offset, where="[quality] zero-offset")
@@ -157,6 +167,8 @@ class Recipe:
     quality: QualityRules = field(default_factory=QualityRules)
 
     def __post_init__(self) -> None:
+        if not self.time.columns and not self.file.host:
+            raise UsageError("no time column", where="[time] columns", fix="name the column of the stamps")
         if not self.channels:
             raise UsageError("no channels", where=self.name, fix="add a table [channels.wind_speed]")
         for name, layout in self.channels.items():
@@ -168,8 +180,8 @@ class Recipe:
                     where=self.name, fix="correct the unit or the channel",
                 )  # fmt: skip
         named = [c.column for c in self.channels.values()] + list(self.time.columns)
-        if self.file.header == 0 and any(isinstance(column, str) for column in named):
-            raise UsageError("columns by name in a file without header", where=self.name, fix="give their numbers")
+        if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in named):
+            raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
 
 
 def names() -> tuple[str, ...]:
@@ -243,7 +255,7 @@ class _Reader:
         )  # fmt: skip
 
     def _file(self, table: Mapping[str, Any]) -> FileLayout:
-        self._known(table, "[file]", "delimiter decimal encoding preamble header comment missing")
+        self._known(table, "[file]", "delimiter decimal encoding preamble header comment missing host")
         delimiter = self._typed(table, "delimiter", str, ",")
         return FileLayout(
             delimiter=DELIMITERS.get(delimiter, delimiter),
@@ -253,6 +265,7 @@ class _Reader:
             header=self._typed(table, "header", int, 1),
             comment=self._typed(table, "comment", str, ""),
             missing=tuple(str(code).strip().lower() for code in self._typed(table, "missing", list, [])),
+            host=self._typed(table, "host", str, ""),
         )
 
     def _time(self, table: Mapping[str, Any]) -> TimeLayout:
@@ -303,15 +316,17 @@ class _Reader:
         )
 
     def _quality(self, table: Mapping[str, Any]) -> QualityRules:
-        self._known(table, "[quality]", "zero-offset stale-after frame-rate-of")
-        channels = self._typed(table, "frame-rate-of", list, [])
-        for name in channels:
-            if name not in CHANNELS:
-                raise UnknownNameError.of("channel", str(name), CHANNELS, where="[quality] frame-rate-of")
+        self._known(table, "[quality]", "zero-offset stale-after frame-rate-of fault-where-zero")
+        lists = {key: self._typed(table, key, list, []) for key in ("frame-rate-of", "fault-where-zero")}
+        for key, channels in lists.items():
+            for name in channels:
+                if name not in CHANNELS:
+                    raise UnknownNameError.of("channel", str(name), CHANNELS, where=f"[quality] {key}")
         return QualityRules(
             zero_offset=table.get("zero-offset", "report"),
             stale_after=self._number(table, "stale-after", None),
-            frame_rate_of=tuple(channels),
+            frame_rate_of=tuple(lists["frame-rate-of"]),
+            fault_where_zero=tuple(lists["fault-where-zero"]),
         )
 
     def _known(self, table: Mapping[str, Any], where: str, known: str) -> None:

@@ -38,6 +38,7 @@ class RowReader:
                 fix="check the recipe's preamble and header, or copy the file from the logger again",
             )  # fmt: skip
         self.first_line = layout.preamble + layout.header + 1
+        self.shift = 0
         self.header: list[str] | None = None
         if layout.header:
             self.header = [cell.strip() for cell in _cut([head[layout.preamble]], layout.delimiter)[0]]

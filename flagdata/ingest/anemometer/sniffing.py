@@ -39,4 +39,4 @@ class Head:
     lines: tuple[str, ...]
 
 
-HEAD_LINES = 200
+HEAD_LINES = 1000

@@ -1,0 +1,99 @@
+"""Which number of a date is the day: decided by evidence in the log, or not at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from flagdata.errors import TimeError
+from flagdata.ingest.anemometer.stamps import DAY, parse
+
+Order = Literal["ymd", "dmy", "mdy"]
+_ISO = re.compile(r"^\s*\d{4}[-/.]")
+_PARTS = re.compile(r"^\s*(\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{2})(?!\d)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """The order of the numbers of a date.
+
+    Attributes:
+        order: "ymd", "dmy" or "mdy".
+        separator: between them.
+        long_year: whether the year has four digits.
+        reason: the evidence.
+    """
+
+    order: Order
+    separator: str
+    long_year: bool
+    reason: str
+
+    def directives(self) -> str:
+        """The date as strptime directives."""
+        year = "%Y" if self.long_year else "%y"
+        return self.separator.join({"y": year, "m": "%m", "d": "%d"}[letter] for letter in self.order)
+
+
+def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: str) -> Decision:
+    """The order in which dates at the start of `texts` are written.
+
+    Evidence: a number above 12 is a day; where there is none, the order in which the log moves on by less than two
+    days between rows while the other jumps.
+
+    Args:
+        told: the user's word; refused when a date contradicts it.
+
+    Raises:
+        TimeError: no date, contradictory dates, or no evidence.
+    """
+    dated = [text for text in texts if text.strip()]
+    if dated and sum(1 for text in dated if _ISO.match(text)) * 2 > len(dated):
+        first = dated[0].strip()
+        return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
+    parts = [match for text in dated if (match := _PARTS.match(text))]
+    if len(parts) * 2 <= len(dated) or not parts:
+        raise TimeError("the rows do not begin with a date", where=where, fix="describe the file by a recipe")
+    separator, long_year = parts[0][2], len(parts[0][4]) == 4
+    first = np.array([int(match[1]) for match in parts])
+    second = np.array([int(match[3]) for match in parts])
+    days_first, days_second = int((first > 12).sum()), int((second > 12).sum())
+    if days_first and days_second:
+        raise TimeError(
+            f"{days_first} dates have a first number above 12 and {days_second} a second one", where=where,
+            fix="the file mixes two orders: split it",
+        )  # fmt: skip
+    if days_first or days_second:
+        order: Order = "dmy" if days_first else "mdy"
+        number = "first" if days_first else "second"
+        reason = f"{days_first or days_second} of {len(parts)} dates have a {number} number above 12"
+        if told is not None and told != order:
+            raise TimeError(
+                f"dates are not {told}: {reason}", where=where, fix=f"leave the date order out, it is {order}"
+            )
+        return Decision(order=order, separator=separator, long_year=long_year, reason=reason)
+    if told is not None:
+        return Decision(order=told, separator=separator, long_year=long_year, reason=f"the date order {told} was given")
+    candidates: tuple[Literal["dmy", "mdy"], ...] = ("dmy", "mdy")
+    smooth: list[Literal["dmy", "mdy"]] = [
+        order for order in candidates if _moves_on(dated, order, separator, long_year)
+    ]
+    if len(smooth) == 1:
+        reason = "no number above 12, but only in this order the log moves on from day to day"
+        return Decision(order=smooth[0], separator=separator, long_year=long_year, reason=reason)
+    raise TimeError(
+        f"{dated[0].strip()[:10]} may be day/month or month/day, and nothing in the log tells", where=where,
+        fix="give the date order: dmy or mdy",
+    )  # fmt: skip
+
+
+def _moves_on(texts: Sequence[str], order: Literal["dmy", "mdy"], separator: str, long_year: bool) -> bool:
+    decision = Decision(order=order, separator=separator, long_year=long_year, reason="")
+    dates = [text.split()[0] + " 0" for text in texts]
+    stamps = parse(dates, decision.directives() + " %H")
+    steps = np.diff(np.unique(stamps.ns[stamps.valid]))
+    return bool(stamps.valid.all()) and len(steps) > 0 and int(steps.max()) <= 2 * DAY

@@ -1,0 +1,153 @@
+"""Raw lines of a serial port with the stamp of the computer that logged them: `laptop_time,raw_line`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.delimited import read_table
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.source import TextFile
+
+_FIELD = r"[ \t]*(?:[+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?[nN][aA][nN]|[+-]?[iI][nN][fF]|-{2,}|)[ \t]*"
+_STAMP = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}|^\d{10}(?:\.\d+)?(?=[,;\t])")
+LEAST = 0.05
+"""Share of lines that must be data: devices print menus and counters, but a log of nothing else is no log."""
+
+
+class HostStamped:
+    """Format "host-stamped": a recipe whose [file] names the host's stamp."""
+
+    name = "host-stamped"
+    about = "raw serial lines, each after the stamp of the computer that logged it"
+    uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """The recipe whose fields most lines after the stamp have, within its ranges."""
+        lines = [line for line in head.lines if _STAMP.match(line)]
+        if len(lines) < max(1, len(head.lines) // 2):
+            return None
+        best: Guess | None = None
+        for name in recipes.names():
+            recipe = recipes.load(name)
+            if not recipe.file.host:
+                continue
+            share = sum(_in_range(recipe, line) for line in lines) / len(lines)
+            if share > LEAST and (best is None or share > best.score):
+                best = Guess(
+                    format="host-stamped",
+                    recipe=name,
+                    score=max(0.55, min(0.9, share)),
+                    reasons=(
+                        f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
+                        f"{share:.0%} of them go on with the fields of recipe {name}",
+                    ),
+                )
+        return best
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read a file by the recipe in `options`."""
+        if options.recipe is None:
+            raise UsageError("the format host-stamped needs a recipe", where=str(source.path), fix="give --recipe")
+        recipe = recipes.load(options.recipe)
+        if not recipe.file.host:
+            raise UsageError(
+                f"the recipe {recipe.name} says nothing of a host's stamp", where=str(source.path),
+                fix="add host = \"iso\" to its [file], or use the format delimited",
+            )  # fmt: skip
+        return read_table(source, recipe, HostRows(source, recipe), zone_name=options.zone).reading
+
+
+def _shape(recipe: Recipe) -> re.Pattern[str]:
+    fields = max([int(c.column) for c in recipe.channels.values()] + [int(c) for c in recipe.time.columns])
+    between = re.escape(recipe.file.delimiter)
+    return re.compile(f"^{_FIELD}(?:{between}{_FIELD}){{{fields - 1}}}$")
+
+
+def _payload(line: str, delimiter: str) -> tuple[str, str]:
+    stamp, _, raw = line.partition(delimiter)
+    raw = raw.strip()
+    if len(raw) > 1 and raw[0] == raw[-1] == '"':
+        raw = raw[1:-1].replace('""', '"')
+    return stamp.strip(), raw
+
+
+def _in_range(recipe: Recipe, line: str) -> bool:
+    raw = _payload(line, recipe.file.delimiter)[1]
+    if not _shape(recipe).match(raw):
+        return False
+    cells = raw.split(recipe.file.delimiter)
+    for layout in recipe.channels.values():
+        try:
+            value = float(cells[int(layout.column) - 1].replace(",", "."))
+        except ValueError:
+            continue
+        if layout.range is not None and not layout.range[0] <= value <= layout.range[1]:
+            return False
+    return True
+
+
+class HostRows:
+    """Rows of [host stamp, field, field, …] out of stamped raw lines; other lines are counted, not read."""
+
+    header: list[str] | None = None
+    shift = 1
+
+    def __init__(self, source: TextFile, recipe: Recipe) -> None:
+        self._source = source
+        self._layout = recipe.file
+        self._shape = _shape(recipe)
+        self._other: list[int] = []
+        self._read = 0
+        self.first_line = recipe.file.header + 1
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        """Line numbers and rows of `width` cells."""
+        delimiter = self._layout.delimiter
+        for first, lines in self._source.blocks():
+            numbers: list[int] = []
+            rows: list[list[str]] = []
+            for number, line in enumerate(lines, start=first):
+                if number < self.first_line or not line.strip(" \t\x00"):
+                    continue
+                stamp, raw = _payload(line, delimiter)
+                if raw and self._shape.match(raw):
+                    row = [stamp, *raw.split(delimiter)]
+                    if len(row) >= width:
+                        numbers.append(number)
+                        rows.append(row)
+                        continue
+                self._other.append(number)
+            self._read += len(rows)
+            if rows:
+                yield np.array(numbers, dtype=np.int64), rows
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Lines that are no data; complete when `blocks` has been read.
+
+        Raises:
+            InputError: hardly any line is data.
+        """
+        other = len(self._other)
+        if not other:
+            return ()
+        if self._read < LEAST * (self._read + other):
+            raise InputError(
+                f"{other} of {other + self._read} lines do not have the fields of the recipe",
+                where=f"{self._source.path}, line {self._other[0]}", fix="check the recipe, or the device's settings",
+            )  # fmt: skip
+        return (
+            Finding(
+                kind="non-data-lines", severity=Severity.WARNING, count=other, where=f"line {self._other[0]}",
+                what=f"{other} lines without the fields of a reading (counters, menus, fragments); left out",
+            ),
+        )  # fmt: skip

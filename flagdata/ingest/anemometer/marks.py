@@ -1,0 +1,163 @@
+"""Time marks of a stream: times of day at some lines, made into instants for all lines between."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.sentences import TimeMark
+from flagdata.signals import Instants
+from flagdata.timebase import NANOSECONDS
+
+DAY = 86_400 * NANOSECONDS
+# The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
+_TRUST = ("ZDA", "RMC", "GGA", "GLL")
+DISORDER = 2 * NANOSECONDS
+"""A mark this much behind the one before it is reported; less is the order of sentences within a second."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """Instants of the lines asked for.
+
+    Attributes:
+        time: (n,) UTC nanoseconds.
+        spacing: median distance of the marks [s].
+        marks: number of marks used.
+        kind: sentence they come from, or "TAG".
+        findings: about midnight and marks that run backwards.
+    """
+
+    time: Instants
+    spacing: float
+    marks: int
+    kind: str
+    findings: tuple[Finding, ...]
+
+
+@dataclass
+class TimeLine:
+    """Marks as they come in, by the kind of sentence."""
+
+    line: dict[str, list[int]] = field(default_factory=dict)
+    clock: dict[str, list[int]] = field(default_factory=dict)
+    dated: tuple[int, int, dt.date] | None = None
+    """First date the stream states: its line, time of day [ns] and date."""
+
+    def add(self, kind: str, line: int, mark: TimeMark) -> None:
+        """A time sentence. Dates that no calendar has are left out."""
+        self.line.setdefault(kind, []).append(line)
+        self.clock.setdefault(kind, []).append(mark.clock)
+        if mark.date is not None and self.dated is None:
+            try:
+                self.dated = (line, mark.clock, dt.date(*mark.date))
+            except ValueError:
+                return
+
+    def add_instant(self, line: int, instant: int) -> None:
+        """A whole instant, of a TAG block [UTC ns]."""
+        self.line.setdefault("TAG", []).append(line)
+        self.clock.setdefault("TAG", []).append(instant)
+
+    def place(self, lines: NDArray[np.int64], *, date: dt.date | None, where: str) -> Placed:
+        """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
+
+        Args:
+            date: day (UTC) of the first mark, for a stream that states none.
+
+        Raises:
+            TimeError: fewer than two marks, or no date.
+            UsageError: a date given that the stream contradicts, or does not need.
+        """
+        kind = self._kind(where)
+        at = np.array(self.line[kind], dtype=np.int64)
+        clock = np.array(self.clock[kind], dtype=np.int64)
+        found: list[Finding] = []
+        if kind == "TAG":
+            if date is not None:
+                raise UsageError("a date was given, but TAG blocks carry their own", where=where, fix="leave it out")
+            day = np.zeros(len(clock), dtype=np.int64)
+            start = 0
+        else:
+            # More than half a day back is midnight; less is disorder.
+            day = np.cumsum(np.concatenate(([0], np.diff(clock) < -DAY // 2)).astype(np.int64))
+            start = self._start(at, clock, day, date, where) * DAY
+            if day[-1]:
+                text = f"{day[-1]} times the clock passes midnight: the day is counted on"
+                found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
+        marks = start + day * DAY + clock
+        rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
+        behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
+        if behind.any():
+            found.append(
+                Finding(
+                    kind="time-backwards", severity=Severity.WARNING, count=int(behind.sum()),
+                    where=f"line {at[behind][0]}",
+                    what=f"{int(behind.sum())} times the stream's clock runs backwards; marks behind earlier ones are "
+                    "not used",
+                )
+            )  # fmt: skip
+        at, marks = at[rising], marks[rising]
+        if len(marks) < 2:
+            raise TimeError(
+                "the stream's clock stands still",
+                where=f"{where}, line {at[0]}",
+                fix="check that the receiver has a fix",
+            )
+        spacing = float(np.median(np.diff(marks))) / NANOSECONDS
+        return Placed(
+            time=_interpolate(lines, at, marks), spacing=spacing, marks=len(marks), kind=kind, findings=tuple(found)
+        )
+
+    def _kind(self, where: str) -> str:
+        counts = {kind: len(lines) for kind, lines in self.line.items()}
+        if max(counts.values(), default=0) < 2:
+            raise TimeError(
+                "the stream carries no time" if not counts else "the stream carries only one time", where=where,
+                fix="record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line",
+            )  # fmt: skip
+        if counts.get("TAG", 0) >= 2:
+            return "TAG"
+        enough = max(counts.values()) / 2
+        return next(kind for kind in _TRUST if counts.get(kind, 0) >= enough)
+
+    def _start(
+        self, at: NDArray[np.int64], clock: NDArray[np.int64], day: NDArray[np.int64], date: dt.date | None, where: str
+    ) -> int:
+        """Days since 1970 of the first mark."""
+        epoch = dt.date(1970, 1, 1).toordinal()
+        if self.dated is None:
+            if date is None:
+                raise TimeError(
+                    "the stream carries the time of day, but no date", where=f"{where}, line {at[0]}",
+                    fix="give the date (UTC) of its first sentence: --date 2026-05-01",
+                )  # fmt: skip
+            return date.toordinal() - epoch
+        line, time, stated = self.dated
+        nearest = int(np.argmin(np.abs(at - line)))
+        # The dated sentence may lie across midnight from its nearest mark.
+        across = round((int(clock[nearest]) - time) / DAY)
+        start = stated.toordinal() - epoch - int(day[nearest]) - across
+        if date is not None and date.toordinal() - epoch != start:
+            raise UsageError(
+                f"the date {date} was given, but the stream begins on {dt.date.fromordinal(start + epoch)}",
+                where=where, fix="leave the date out",
+            )  # fmt: skip
+        return start
+
+
+def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:
+    """Instants of lines between marks, exact to a nanosecond relative to the marks' first."""
+    base = int(marks[0])
+    relative = (marks - base).astype(np.float64)
+    pace = float(np.median(np.diff(relative) / np.diff(at)))
+    place = lines.astype(np.float64)
+    out = np.interp(place, at.astype(np.float64), relative)
+    out = np.where(lines < at[0], (place - at[0]) * pace, out)
+    out = np.where(lines > at[-1], relative[-1] + (place - at[-1]) * pace, out)
+    return base + np.round(out).astype(np.int64)

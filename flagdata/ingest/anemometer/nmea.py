@@ -1,0 +1,282 @@
+"""NMEA 0183 streams: wind from MWV and MWD, time from the sentences around them.
+
+Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
+GGA, GLL, or the time of a TAG block), and the flag TIME_UNSURE. MWV,R is wind past the platform; MWV,T is
+"theoretical": what the instrument computed as if the platform stood still; both are relative to the bow. They stay in
+channels of their own, and neither is ground truth unless the user says the platform is fixed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.marks import Placed, TimeLine
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.sentences import (
+    SPEED_UNITS,
+    ChecksumError,
+    Sentence,
+    number,
+    speed_over_ground,
+    split,
+    tag_time,
+    time_mark,
+)
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.source import TextFile
+from flagdata.schema import SampleFlag
+from flagdata.signals import Sensor
+from flagdata.timebase import NANOSECONDS
+from flagdata.units import UNITS
+
+MOVING = 0.5
+"""Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
+_CHANNELS = (
+    "apparent_wind_speed", "apparent_wind_direction", "theoretical_wind_speed", "theoretical_wind_direction",
+    "wind_speed", "wind_direction", "wind_direction_magnetic",
+)  # fmt: skip
+
+
+@dataclass
+class _Stream:
+    """What one pass over the lines gathers."""
+
+    line: list[int] = field(default_factory=list)
+    values: list[dict[str, float]] = field(default_factory=list)
+    flags: list[int] = field(default_factory=list)
+    times: TimeLine = field(default_factory=TimeLine)
+    kinds: Counter[str] = field(default_factory=Counter)
+    talkers: Counter[str] = field(default_factory=Counter)
+    bad_checksums: list[int] = field(default_factory=list)
+    unchecked: int = 0
+    not_sentences: list[int] = field(default_factory=list)
+    invalid: list[int] = field(default_factory=list)
+    undirected: int = 0
+    speeds: list[float] = field(default_factory=list)
+
+
+class Nmea:
+    """Format "nmea"."""
+
+    name = "nmea"
+    about = "NMEA 0183 sentences MWV and MWD"
+    uses = frozenset({"date", "encoding", "platform", "azimuth", "talker", "zero_offset"})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """Lines that are sentences, most of them with a right checksum, some of them of wind."""
+        right = wrong = wind = 0
+        for line in head.lines:
+            try:
+                sentence = split(line)
+            except ChecksumError:
+                wrong += 1
+                continue
+            if sentence is not None:
+                right += 1
+                wind += sentence.kind in ("MWV", "MWD")
+        if right < max(1, len(head.lines) // 2):
+            return None
+        reasons = (
+            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences with right checksums, {wrong} wrong",
+            f"{wind} of them are wind (MWV or MWD)",
+        )
+        return Guess(format="nmea", score=0.95 if wind else 0.3, reasons=reasons)
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read all wind sentences."""
+        stream = _Stream()
+        for first, lines in source.blocks():
+            for at, line in enumerate(lines, start=first):
+                if line.strip(" \t\x00"):
+                    _take(stream, line, at, options.talker)
+        where = str(source.path)
+        if not stream.line:
+            seen = ", ".join(f"{count} {kind}" for kind, count in stream.kinds.most_common(6))
+            raise InputError(
+                f"no valid MWV or MWD sentence{'; there are ' + seen if seen else ''}", where=where,
+                fix="have the instrument send MWV, or check its baud rate if sentences are broken",
+            )  # fmt: skip
+        if len(stream.talkers) > 1:
+            raise InputError(
+                f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments",
+                where=where, fix=f"choose one by talker, e.g. {min(stream.talkers)}",
+            )  # fmt: skip
+        line = np.array(stream.line, dtype=np.int64)
+        placed = stream.times.place(line, date=options.date, where=where)
+        channels = {
+            name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
+        }
+        channels = {name: values for name, values in channels.items() if np.isfinite(values).any()}
+        if not channels:
+            raise InputError(
+                "every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix="check the sensor"
+            )
+        channels, found = _platform(channels, stream, options, where)
+        flags = np.array(stream.flags, dtype=np.uint16) | np.uint16(SampleFlag.TIME_UNSURE)
+        talkers = ", ".join(sorted(stream.talkers))
+        return Reading(
+            time=placed.time, channels=channels, flags=flags, line=line,
+            sensor=Sensor(name=f"NMEA 0183 talker {talkers}"), step=NANOSECONDS,
+            findings=(*_findings(stream, placed), *found),
+        )  # fmt: skip
+
+
+def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
+    tagged = tag_time(line) if line.startswith("\\") else None
+    try:
+        sentence = split(line)
+    except ChecksumError:
+        stream.bad_checksums.append(at)
+        return
+    if sentence is None:
+        stream.not_sentences.append(at)
+        return
+    stream.kinds[sentence.kind] += 1
+    stream.unchecked += not sentence.checked
+    if tagged is not None:
+        stream.times.add_instant(at, tagged * 1_000_000)
+    mark = time_mark(sentence)
+    if mark is not None:
+        stream.times.add(sentence.kind, at, mark)
+    over_ground = speed_over_ground(sentence)
+    if over_ground is not None:
+        stream.speeds.append(over_ground)
+    if talker is not None and sentence.talker != talker:
+        return
+    if sentence.kind == "MWV":
+        _mwv(stream, sentence, at)
+    elif sentence.kind == "MWD":
+        _mwd(stream, sentence, at)
+
+
+def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
+    fields = sentence.fields
+    if len(fields) < 5 or fields[1] not in ("R", "T"):
+        stream.invalid.append(at)
+        return
+    kind = "apparent" if fields[1] == "R" else "theoretical"
+    angle, speed, unit = number(fields[0]), number(fields[2]), SPEED_UNITS.get(fields[3])
+    row: dict[str, float] = {}
+    flag = SampleFlag.OK if fields[4] == "A" else SampleFlag.SENSOR_FAULT
+    if angle is not None and angle <= 360:
+        row[f"{kind}_wind_direction"] = float(np.radians(angle % 360))
+    if speed is not None and unit is not None:
+        row[f"{kind}_wind_speed"] = speed * UNITS[unit].scale
+    else:
+        flag |= SampleFlag.MISSING
+    _add(stream, sentence, at, row, flag)
+
+
+def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
+    fields = sentence.fields
+    if len(fields) < 8:
+        stream.invalid.append(at)
+        return
+    true, magnetic, knots, metres = (number(fields[index]) for index in (0, 2, 4, 6))
+    speed = metres if metres is not None else None if knots is None else knots * UNITS["kn"].scale
+    if true is None and magnetic is None:
+        stream.undirected += 1
+        return
+    row: dict[str, float] = {}
+    if true is not None:
+        row["wind_direction"] = float(np.radians(true % 360))
+    if magnetic is not None:
+        row["wind_direction_magnetic"] = float(np.radians(magnetic % 360))
+    flag = SampleFlag.OK
+    if speed is None:
+        flag = SampleFlag.MISSING
+    else:
+        row["wind_speed"] = speed
+    _add(stream, sentence, at, row, flag)
+
+
+def _add(stream: _Stream, sentence: Sentence, at: int, row: dict[str, float], flag: SampleFlag) -> None:
+    stream.talkers[sentence.talker] += 1
+    stream.line.append(at)
+    stream.values.append(row)
+    stream.flags.append(int(flag))
+
+
+def _platform(
+    channels: dict[str, np.ndarray], stream: _Stream, options: WindOptions, where: str
+) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
+    """Which channels are wind over ground, by what is known of the platform."""
+    moving = float(np.median(stream.speeds)) if stream.speeds else None
+    if options.platform == "fixed":
+        if moving is not None and moving > MOVING:
+            raise InputError(
+                f"the platform was said to be fixed, but moves at {moving:.1f} kn over ground in the median",
+                where=where, fix="leave out the platform",
+            )  # fmt: skip
+        return _fixed(channels, options)
+    if options.azimuth is not None:
+        raise UsageError(
+            "an azimuth belongs to a fixed platform", where=where, fix="say platform fixed, or leave it out"
+        )
+    if "wind_speed" in channels:
+        text = "wind over ground (MWD) was computed by the instrument from a moving platform's heading and speed"
+        return channels, (Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),)
+    known = (
+        f"a platform that moves at {moving:.1f} kn" if moving and moving > MOVING else "a platform of unknown motion"
+    )
+    fix = None if moving and moving > MOVING else "if the sensor stands on a mast, say so: platform fixed"
+    return channels, (
+        Finding(
+            kind="apparent-wind-only", severity=Severity.WARNING, value=moving,
+            what=f"wind relative to {known}: no ground truth", fix=fix,
+        ),
+    )  # fmt: skip
+
+
+def _fixed(channels: dict[str, np.ndarray], options: WindOptions) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
+    kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
+    out = dict(channels)
+    if "wind_speed" not in out and f"{kind}_wind_speed" in out:
+        out["wind_speed"] = out.pop(f"{kind}_wind_speed")
+        angle = f"{kind}_wind_direction"
+        if options.azimuth is not None and angle in out:
+            out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
+    text = f"fixed platform, as told: {kind} wind is wind over ground"
+    return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
+
+
+def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
+    count = len(stream.line)
+    found = [
+        Finding(
+            kind="time-interpolated", severity=Severity.WARNING, count=count, value=placed.spacing,
+            what=f"{count} wind sentences carry no time: interpolated between {placed.marks} {placed.kind} marks "
+            f"{placed.spacing:g} s apart",
+        ),
+        *placed.findings,
+    ]  # fmt: skip
+
+    def note(places: list[int], kind: str, severity: Severity, what: str) -> None:
+        if places:
+            text = f"{len(places)} {what}"
+            found.append(Finding(kind=kind, severity=severity, count=len(places), where=f"line {places[0]}", what=text))
+
+    note(stream.bad_checksums, "checksum-errors", Severity.ERROR, "sentences with a wrong checksum; left out")
+    note(stream.not_sentences, "malformed-lines", Severity.WARNING, "lines that are no sentence; left out")
+    note(stream.invalid, "malformed-sentences", Severity.ERROR, "wind sentences with fields missing; left out")
+    faults = sum(1 for flag in stream.flags if flag & SampleFlag.SENSOR_FAULT)
+    if faults:
+        text = f"{faults} wind sentences that the instrument itself marks invalid; left out of averages"
+        found.append(Finding(kind="sensor-fault", severity=Severity.WARNING, count=faults, what=text))
+    if stream.unchecked:
+        text = f"{stream.unchecked} sentences without a checksum; taken as they are"
+        found.append(Finding(kind="no-checksum", severity=Severity.WARNING, count=stream.unchecked, what=text))
+    if stream.undirected:
+        text = f"{stream.undirected} MWD sentences without a direction: no wind over ground, not read"
+        found.append(Finding(kind="mwd-without-direction", severity=Severity.NOTE, count=stream.undirected, what=text))
+    missing = sum(1 for flag in stream.flags if flag & SampleFlag.MISSING)
+    if missing:
+        text = f"{missing} wind sentences without a speed"
+        found.append(Finding(kind="missing-values", severity=Severity.WARNING, count=missing, what=text))
+    return tuple(found)
