@@ -145,9 +145,12 @@ def _on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.
     that two exports of one version never put a session, day, seed or camera file on two sides."""
     _check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
     clips = clips_on_side(catalog, split, HashedSplit(salt=salt))
-    on_side = catalog.filter(pc.field("artifact").isin(list(clips)))
-    wanted = {*clips, *on_side["recording"].drop_null().to_pylist()}
-    return rows.filter(pc.field("artifact").isin(list(wanted)))
+    of_clips = catalog.filter(_is_one_of(clips))["recording"].drop_null().to_pylist()
+    return rows.filter(_is_one_of({*clips, *of_clips}))
+
+
+def _is_one_of(artifacts: set[str]) -> pc.Expression:
+    return pc.field("artifact").isin(pa.array(sorted(artifacts), pa.string()))
 
 
 def _check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:
