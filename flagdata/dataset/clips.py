@@ -12,7 +12,7 @@ import numpy as np
 
 from flagdata import provenance
 from flagdata.align.clock import ClockModel
-from flagdata.dataset.truth import TruthSeries, WindTruth
+from flagdata.dataset.truth import TruthSeries, WindTruth, over_ground
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact
 from flagdata.record import Record
@@ -59,11 +59,10 @@ def clip_rows(record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES)
         recording: the artifact of the record; its identity, session, seed, clock model and object are passed on.
 
     Raises:
-        UsageError, InputError: see `runs` and `truth.horizontal_speed`.
+        UsageError, InputError: see `runs`.
     """
     times = record.frame_times
-    wind = record.wind()
-    series = TruthSeries.of(wind) if wind is not None else None
+    series = truth_series(record)
     clock = ClockModel.from_json(recording.clock_model) if recording.clock_model else None
     known = record.truth or {}
     parameters = recording.parameters or (provenance.canonical(known) if known else None)
@@ -83,6 +82,12 @@ def clip_rows(record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES)
             )
         )  # fmt: skip
     return rows
+
+
+def truth_series(record: Record) -> TruthSeries | None:
+    """The record's wind over ground; `None` where it has none, such as the log of a moving platform."""
+    series = record.wind()
+    return TruthSeries.of(series) if series is not None and over_ground(series) is not None else None
 
 
 def clip_truth(

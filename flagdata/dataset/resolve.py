@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +11,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from flagdata.dataset.clips import TRUTH_SPEED, clip_truth
-from flagdata.dataset.splits import ExplicitSplit, HashedSplit, Origin, check_side, groups, refuse_leaks
+from flagdata.dataset.clips import TRUTH_SPEED, clip_truth, truth_series
+from flagdata.dataset.lineage import origins_of, superseded
+from flagdata.dataset.splits import ExplicitSplit, HashedSplit, check_side, groups, refuse_leaks
 from flagdata.dataset.table import COLUMNS, PairTable
 from flagdata.dataset.tolerance import Refusal, Tolerance, judge
-from flagdata.dataset.truth import TruthSeries
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.query import Request, Selection
@@ -25,7 +23,6 @@ from flagdata.record import Record
 from flagdata.schema import Kind
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
-_SOURCES = (Kind.CAMERA, Kind.MESHES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,14 +57,14 @@ def resolve(
         wanted = clips_on_side(catalog, split, split_by)
         table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))
         if not len(table):
-            count = len(set(groups(_origins(catalog, _clips(catalog, None, _ORIGIN))).tolist()))
+            count = len(set(groups(origins_of(catalog, _clips(catalog, None, _ORIGIN))).tolist()))
             raise RefusedError(
                 f"split {split!r} holds none of the clips; the catalog has {count} independent groups",
                 where=where,
                 fix="record more days and sessions, or give an ExplicitSplit",
             )
     table = _with_window(lake, table, _windows(clips, table), window)
-    refused = judge(table, tolerance)
+    refused = judge(table, tolerance, superseded=superseded(catalog, set(table.recording.tolist())))
     kept = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
     if not kept.any():
         first = next(iter(refused.values()))
@@ -83,44 +80,6 @@ def _clips(catalog: pa.Table, where: str | None, columns: tuple[str, ...]) -> pa
     # The line break ends a comment that the filter may close with.
     condition = f"kind = '{Kind.CLIP}'" + (f" and ({where}\n)" if where is not None else "")
     return Selection(catalog, Request(where=condition, columns=columns)).table()
-
-
-def _origins(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
-    """One origin a recording, with the days of `clips` only."""
-    parents = dict(zip(catalog["artifact"].to_pylist(), catalog["parents"].to_pylist(), strict=True))
-    kinds = catalog.filter(pc.field("kind").isin([kind.value for kind in _SOURCES]))
-    sources = {
-        artifact: f"{kind} {source or artifact}"
-        for artifact, kind, source in zip(
-            kinds["artifact"].to_pylist(), kinds["kind"].to_pylist(), kinds["source_hash"].to_pylist(), strict=True
-        )
-    }
-    days: dict[str, set[str]] = defaultdict(set)
-    known: dict[str, Origin] = {}
-    for row in clips.group_by(["recording", "session", "seed", "day"]).aggregate([]).to_pylist():
-        recording = row["recording"]
-        if row["day"]:
-            days[recording].add(row["day"])
-        if recording not in known:
-            ancestry = _ancestors(recording, parents)
-            known[recording] = Origin(
-                recording=recording,
-                session=row["session"],
-                seed=row["seed"],
-                sources=tuple(sorted({sources[a] for a in ancestry if a in sources})),
-            )
-    return [replace(known[recording], days=tuple(sorted(days[recording]))) for recording in sorted(known)]
-
-
-def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:
-    found: set[str] = set()
-    open_ = [artifact]
-    while open_:
-        for parent in parents.get(open_.pop(), ()):
-            if parent not in found:
-                found.add(parent)
-                open_.append(parent)
-    return found
 
 
 def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | ExplicitSplit) -> set[str]:
@@ -139,7 +98,7 @@ def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | Explici
 def _hashed_side(catalog: pa.Table, split_by: HashedSplit, split: str) -> set[str]:
     """Clips of the side. Every clip of the catalog takes part, so that two filters never disagree about a group."""
     clips = _clips(catalog, None, _ORIGIN)
-    origins = _origins(catalog, clips)
+    origins = origins_of(catalog, clips)
     sides = zip(origins, split_by.assign(origins), strict=True)
     recordings = pa.array([origin.recording for origin, side in sides if side == split], pa.string())
     return set(clips.filter(pc.field("recording").isin(recordings))["artifact"].to_pylist())
@@ -148,7 +107,7 @@ def _hashed_side(catalog: pa.Table, split_by: HashedSplit, split: str) -> set[st
 def _explicit_side(catalog: pa.Table, split_by: ExplicitSplit, split: str) -> set[str]:
     """Clips of the side. All sides are resolved and compared, whichever is asked for."""
     taken = {side: _clips(catalog, where, _ORIGIN) for side, where in split_by.where.items()}
-    refuse_leaks({side: _origins(catalog, clips) for side, clips in taken.items()})
+    refuse_leaks({side: origins_of(catalog, clips) for side, clips in taken.items()})
     return set(taken[split]["artifact"].to_pylist())
 
 
@@ -173,8 +132,7 @@ def _with_window(lake: Lake, table: PairTable, windows: NDArray[np.float64], win
     for number in np.unique(table.object[other]):
         record = Record.open(lake.object_path(str(table.objects[number])))
         known = (record.truth or {}).get(TRUTH_SPEED)
-        samples = record.wind()
-        series = TruthSeries.of(samples) if samples is not None else None
+        series = truth_series(record)
         for k in other[table.object[other] == number]:
             clock = float(table.clock_sigma[k])
             truth = clip_truth(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,9 +42,17 @@ class Refusal:
     reasons: tuple[str, ...]
 
 
-def judge(table: PairTable, tolerance: Tolerance) -> dict[int, Refusal]:
-    """Refusals by the pair's index."""
+def judge(table: PairTable, tolerance: Tolerance, *, superseded: Mapping[str, str]) -> dict[int, Refusal]:
+    """Refusals by the pair's index.
+
+    Args:
+        superseded: recording → the one that replaces it.
+    """
     checks = (
+        (
+            np.isin(table.recording, np.array(sorted(superseded), dtype=np.str_)),
+            lambda k: f"recording {superseded[str(table.recording[k])]} aligned the same camera and wind later",
+        ),
         (np.isnan(table.wind), lambda k: "no usable wind sample in the window"),
         (
             table.coverage < tolerance.coverage,

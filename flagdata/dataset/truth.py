@@ -66,22 +66,18 @@ class WindTruth:
         )  # fmt: skip
 
 
-def horizontal_speed(series: WindSeries) -> Series:
+def over_ground(series: WindSeries) -> Series | None:
     """Speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a sonic.
 
-    Raises:
-        InputError: the series knows neither (the apparent wind of a moving platform is not ground truth).
+    `None` when the series has neither. The wind that a moving platform feels, or that its instrument computes as if the
+    platform stood still, is not the wind at a flag.
     """
     channels = series.channels
     if "wind_speed" in channels:
         return np.asarray(channels["wind_speed"], dtype=np.float64)
     if "wind_x" in channels and "wind_y" in channels:
         return np.hypot(channels["wind_x"], channels["wind_y"])
-    raise InputError(
-        "no wind over ground among the channels " + ", ".join(sorted(channels)),
-        where=series.sensor.name,
-        fix="give a log with wind_speed, or wind_x and wind_y; apparent wind is not ground truth",
-    )
+    return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,20 +104,30 @@ class TruthSeries:
     def of(cls, series: WindSeries) -> TruthSeries:
         """Prepare `series`, whose times must be on the clock of the clips.
 
+        Rows that hold other channels only (the sentences of one stream) are as if they were not there.
+
         Raises:
-            InputError: see `horizontal_speed`.
+            InputError: no wind over ground.
         """
-        speed = horizontal_speed(series)
-        usable = np.isfinite(speed) & ((series.flags & int(UNUSABLE)) == 0)
-        spacing = np.diff(series.time) / NANOSECONDS
+        speed = over_ground(series)
+        if speed is None:
+            raise InputError(
+                "no wind over ground among the channels " + ", ".join(sorted(series.channels)),
+                where=series.sensor.name,
+                fix="give a log with wind_speed, or wind_x and wind_y; apparent wind is not ground truth",
+            )
+        present = np.isfinite(speed) | ((series.flags & int(SampleFlag.MISSING)) != 0)
+        time, speed, flags = series.time[present], speed[present], series.flags[present]
+        usable = np.isfinite(speed) & ((flags & int(UNUSABLE)) == 0)
+        spacing = np.diff(time) / NANOSECONDS
         period = float(np.quantile(spacing, 0.9, method="lower")) if len(spacing) else BLOCK
         since = np.concatenate([[period], spacing])[: len(speed)]
         held = np.where(since <= GAP * period, since, period)
         return cls(
-            time=series.time[usable],
+            time=time[usable],
             speed=speed[usable],
             held=held[usable],
-            dead=((series.flags & int(SampleFlag.DEAD_ZONE)) != 0)[usable],
+            dead=((flags & int(SampleFlag.DEAD_ZONE)) != 0)[usable],
             period=period,
             sensor=series.sensor,
         )

@@ -13,7 +13,9 @@ from flagdata.align.clock import ClockModel
 from flagdata.dataset.clips import clip_rows, runs
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact
+from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
+from flagdata.signals import Sensor, WindSeries
 
 NS = 1_000_000_000
 PERIOD = NS // 25
@@ -114,3 +116,22 @@ def test_a_simulated_record_states_its_wind_exactly_and_has_no_day(tmp_path, wri
     assert all((r.wind, r.wind_sigma, r.wind_coverage, r.wind_staleness) == (4.5, 0.0, 1.0, 0.0) for r in rows)
     assert all((r.seed, r.day) == (7, None) for r in rows)
     assert json.loads(rows[0].parameters) == truth
+
+
+def test_the_wind_of_a_moving_platform_is_no_ground_truth(tmp_path):
+    path = tmp_path / "boat.mcap"
+    with RecordWriter(path, metadata={}) as writer:
+        for index in range(30):
+            time = NOON + index * PERIOD
+            writer.frame(log_time=time, publish_time=time, timestamp=time, image=np.zeros((8, 8), dtype=np.uint8))
+        writer.wind(
+            WindSeries(
+                time=NOON - 60 * NS + np.arange(62) * NS,
+                channels={"apparent_wind_speed": np.full(62, 7.0)},
+                flags=np.zeros(62, dtype=np.uint16),
+                sensor=Sensor(name="masthead"),
+            )
+        )
+    row = clip_rows(Record.open(path), recording(clock_sigma=0.1))[0]
+    assert row.wind is None
+    assert "wind-missing" in row.quality

@@ -166,6 +166,19 @@ def test_two_recordings_of_one_camera_file_are_never_on_two_sides(lake, add_reco
         flagdata.open(lake.path).pairs(split="train", split_by=split_by)
 
 
+def test_a_recording_that_was_aligned_anew_gives_its_clips_once(lake, add_recording, made):
+    old = add_recording(lake, made(number=1))
+    lake.tag("before")
+    new = add_recording(lake, made(number=1, start=NOON + NS))
+    pairs = flagdata.open(lake.path).pairs()
+    assert set(pairs.table.recording.tolist()) == {new}
+    assert [(r.recording, r.reasons) for r in pairs.refused] == [
+        (old, (f"recording {new} aligned the same camera and wind later",))
+    ] * 3
+    assert set(flagdata.open(lake.path).pairs(at="before").table.recording.tolist()) == {old}
+    assert set(flagdata.open(lake.path).pairs(f"recording = '{old}'").table.recording.tolist()) == {old}
+
+
 def test_what_is_not_there_is_said(source):
     with pytest.raises(NotFoundError, match="no clips match"):
         source.pairs("wind > 100")

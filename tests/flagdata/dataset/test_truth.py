@@ -205,6 +205,21 @@ def test_sonic_components_give_the_horizontal_speed():
     assert truth(both, 100).wind == pytest.approx(5.0, rel=1e-12)
 
 
+def test_rows_of_other_channels_take_nothing_from_the_coverage():
+    # Two sentences a second, one with the wind over ground, one with the apparent wind 0.1 s later.
+    seconds = np.sort(np.concatenate([np.arange(0, 121), np.arange(0, 121) + 0.1]))
+    ground = np.arange(len(seconds)) % 2 == 0
+    wind = series(seconds, np.where(ground, 4.0, np.nan))
+    both = WindSeries(
+        time=wind.time,
+        channels={**wind.channels, "apparent_wind_speed": np.where(ground, np.nan, 9.0)},
+        flags=wind.flags,
+        sensor=wind.sensor,
+    )
+    result = truth(both, 100)
+    assert (result.wind, result.coverage, result.count) == (4.0, 1.0, 60)
+
+
 def test_apparent_wind_is_refused_as_ground_truth():
     with pytest.raises(InputError, match="apparent wind is not ground truth"):
         TruthSeries.of(series(np.arange(0, 121), 3.0, channel="apparent_wind_speed"))
