@@ -18,7 +18,7 @@ from sim.tables import GRIDS, Evaluation, StrainGrid, bending_segments, directio
 _COLUMN = 0.2  # 1 / tables.CURVATURE_SPACING
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Cloth:
     """Constants of a batch. Batch innermost; every member has its own material on the shared mesh.
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from sim import bending, membrane
-from sim.air import AirForce
+from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
 from sim.handles import Handles
 from sim.state import State
@@ -39,7 +39,7 @@ class Drive:
     rate: Tensor
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class System:
     """A batch: m a = membrane + bending + gravity + air + handle springs + effects.
 
@@ -122,6 +122,26 @@ class System:
         stretch = position[self.held] - torch.lerp(*drive.targets, share)
         stretch = stretch + self.cloth.damping * (velocity[self.held] - drive.rate)
         return total.index_add(0, self.held, -self.handles.stiffness * stretch)
+
+    @property
+    def extra(self) -> bool:
+        """Whether anything acts that the compiled kernel does not know."""
+        return bool(self.effects) or not isinstance(self.air, QuadraticNormal)
+
+    def extra_force(self, drive: Drive, share: float, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """What the compiled kernel does not know: effects, and other air forces: (vertex, 3, batch) [N]."""
+        wind = torch.lerp(*drive.wind, share)
+        total = torch.zeros_like(position)
+        if not isinstance(self.air, QuadraticNormal):
+            total = total + self.air.force(self.cloth, position, velocity, wind)
+        for effect in self.effects:
+            total = total + effect.force(self.cloth, time, position, velocity, wind)
+        return total
+
+    def tensors(self) -> tuple[Tensor, ...]:
+        """The parameters that gradients may be wanted of."""
+        cloth = self.cloth
+        return (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
 
     def energies(self, state: State) -> dict[str, Tensor]:
         """Kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].

@@ -8,14 +8,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
+
+import torch
 
 from flagdata.errors import UsageError
 from sim.integrate.stability import stable_step
+from sim.kernel.fused import Kernel
 from sim.state import State
 from sim.system import System
 
 # Share of the linear stability limit that is used: large deformation stiffens faces beyond the estimate.
 _SAFETY = 0.7
+
+
+class Backend(StrEnum):
+    """What computes the forces."""
+
+    AUTO = "auto"
+    """The kernel where it can; torch on other devices, where gradients are wanted, and, with one warning, where the
+    kernel cannot be built."""
+    TORCH = "torch"
+    KERNEL = "kernel"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,9 +38,11 @@ class Symplectic:
 
     Attributes:
         step: upper bound of the step [s]; None for 0.7 of the stability limit of the system's start.
+        backend: what computes the forces.
     """
 
     step: float | None = None
+    backend: Backend = Backend.AUTO
 
     def steps(self, system: System, state: State, duration: float) -> int:
         """How many steps a duration [s] takes.
@@ -46,24 +62,51 @@ class Symplectic:
 
     def advance(self, system: System, state: State, duration: float) -> State:
         """The state `duration` seconds later."""
-        return advance(system, state, duration, steps=self.steps(system, state, duration))
+        return advance(system, state, duration, steps=self.steps(system, state, duration), backend=self.backend)
 
 
-def advance(system: System, state: State, duration: float, *, steps: int) -> State:
-    """`steps` equal leapfrog steps over `duration` seconds; wind and handles are linear in between."""
+def advance(system: System, state: State, duration: float, *, steps: int, backend: Backend = Backend.AUTO) -> State:
+    """`steps` equal leapfrog steps over `duration` seconds; wind and handles are linear in between.
+
+    Raises:
+        UsageError: the kernel was asked for and cannot run this system, or gradients are wanted from it.
+    """
     h = duration / steps
     drive = system.drive(state.time, state.time + duration)
-    inverse_mass = 1 / system.cloth.mass.unsqueeze(1)
-    if system.clamped:
-        inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
     x, v = state.position, state.velocity
     if system.clamped:
         v = v.index_copy(0, system.held, drive.rate)
+    kernel = _kernel(system, state, backend)
+    if kernel is not None and not system.extra:
+        x, v = kernel.advance(drive, x, v, h, steps)
+        return State(position=x, velocity=v, time=state.time + duration)
+    inverse_mass = 1 / system.cloth.mass.unsqueeze(1)
+    if system.clamped:
+        inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
     for index in range(steps + 1):
         share = index / steps
-        weight = h / 2 if index in (0, steps) else h
-        force = system.force(drive, share, state.time + share * duration, x, v)
-        v = v + weight * inverse_mass * force
+        time = state.time + share * duration
+        if kernel is None:
+            force = system.force(drive, share, time, x, v)
+        else:
+            force = kernel.forces(drive, share, x, v) + system.extra_force(drive, share, time, x, v)
+        v = v + (h / 2 if index in (0, steps) else h) * inverse_mass * force
         if index < steps:
             x = x + h * v
     return State(position=x, velocity=v, time=state.time + duration)
+
+
+def _kernel(system: System, state: State, backend: Backend) -> Kernel | None:
+    differentiated = torch.is_grad_enabled() and any(
+        tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
+    )
+    if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
+        return None
+    kernel = Kernel.of(system)
+    if backend is Backend.KERNEL and (kernel is None or differentiated):
+        raise UsageError(
+            "the compiled kernel cannot run this batch",
+            where="integrator symplectic",
+            fix="it needs a C++ compiler, a CPU, float32 or 64 and no gradients; or leave the choice to AUTO",
+        )
+    return kernel

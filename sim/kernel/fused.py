@@ -1,0 +1,167 @@
+"""Hands a system's tensors to the compiled kernel, in blocks of as many members as fit a vector register."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import torch
+from torch import Tensor
+
+from sim.air import QuadraticNormal
+from sim.kernel.build import library
+from sim.system import Drive, System
+from sim.tables import Evaluation
+
+_POINTERS = (
+    "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "samples",
+)  # fmt: skip
+_SCALARS = ("origin", "spacing", "air_density", "air_drag", "stiffness")
+_BLOCKED = ("mass", "inverse_mass", "segments", "damping", "table", "gravity", "wind", "targets", "rate")
+
+
+class _Problem(ctypes.Structure):
+    """Mirrors `Problem` of kernel.cpp field by field."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("vertices", "faces", "hinges", "held")),
+        ("counts", ctypes.c_int64 * 3),
+        ("fold", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in _POINTERS),
+        *((name, ctypes.c_double) for name in _SCALARS),
+        *((name, ctypes.c_void_p) for name in _BLOCKED),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kernel:
+    """The kernel for one system.
+
+    Attributes:
+        lanes: members of a block.
+        blocks: how many blocks the batch takes; spare lanes of the last repeat its last member.
+        tensors: what the kernel reads, kept alive here.
+    """
+
+    system: System
+    code: ctypes.CDLL
+    lanes: int
+    blocks: int
+    problem: _Problem
+    tensors: dict[str, Tensor] = field(repr=False)
+
+    @classmethod
+    def of(cls, system: System) -> Kernel | None:
+        """The kernel for a system; None where there is none: not a CPU, not float32 or 64, or it cannot be built."""
+        cloth = system.cloth
+        if cloth.device.type != "cpu" or cloth.dtype not in (torch.float32, torch.float64):
+            return None
+        if system not in _KERNELS:
+            code = library()
+            if code is None:
+                return None
+            _KERNELS[system] = cls._build(system, code)
+        return _KERNELS[system]
+
+    @classmethod
+    def _build(cls, system: System, code: ctypes.CDLL) -> Kernel:
+        cloth = system.cloth
+        lanes = int(_function(code, "lanes", cloth.dtype)())
+        blocks = math.ceil(cloth.batch / lanes)
+        inverse_mass = 1 / cloth.mass
+        if system.clamped:
+            inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
+        air = system.air if isinstance(system.air, QuadraticNormal) else QuadraticNormal(density=0.0)
+
+        def block(tensor: Tensor) -> Tensor:
+            return _to_blocks(tensor, lanes, blocks)
+
+        tensors = {
+            "face": cloth.faces.int(),
+            "gradients": cloth.gradients,
+            "areas": cloth.areas,
+            "hinge": cloth.hinges.int(),
+            "hinge_shape": cloth.hinge_shape,
+            "hinge_column": cloth.hinge_column,
+            "hinge_rows": cloth.hinge_rows,
+            "held_vertex": system.held.int(),
+            "samples": cloth.samples,
+            "mass": block(cloth.mass),
+            "inverse_mass": block(inverse_mass),
+            "segments": block(cloth.segments),
+            "damping": block(cloth.damping),
+            "table": block(cloth.table_of.int()),
+            "gravity": block(system.gravity),
+        }
+        tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
+        problem = _Problem(
+            vertices=cloth.mesh.vertex_count, faces=len(cloth.faces), hinges=len(cloth.hinges), held=len(system.held),
+            fold=int(cloth.evaluation is Evaluation.CORRECTED), origin=cloth.grid.origin, spacing=cloth.grid.spacing,
+            air_density=air.density, air_drag=air.drag, stiffness=system.handles.stiffness if system.sprung else 0.0,
+        )  # fmt: skip
+        problem.counts[:] = cloth.grid.counts
+        for name, tensor in tensors.items():
+            setattr(problem, name, tensor.data_ptr())
+        return cls(system=system, code=code, lanes=lanes, blocks=blocks, problem=problem, tensors=tensors)
+
+    def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
+        """The problem with wind and handles set; the tensors must outlive the call it is made for."""
+
+        def both(pair: tuple[Tensor, Tensor]) -> Tensor:
+            return torch.stack([self.pack(tensor) for tensor in pair])
+
+        given = {"wind": both(drive.wind), "targets": both(drive.targets), "rate": self.pack(drive.rate)}
+        problem = _Problem.from_buffer_copy(self.problem)
+        for name, tensor in given.items():
+            setattr(problem, name, tensor.data_ptr())
+        return problem, list(given.values())
+
+    def pack(self, tensor: Tensor) -> Tensor:
+        """(…, batch) → (block, …, lane), contiguous and not shared with the argument."""
+        return _to_blocks(tensor, self.lanes, self.blocks).clone(memory_format=torch.contiguous_format)
+
+    def unpack(self, blocks: Tensor) -> Tensor:
+        """(block, …, lane) → (…, batch)."""
+        return blocks.movedim(0, -2).flatten(-2)[..., : self.system.cloth.batch].contiguous()
+
+    def advance(self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int) -> tuple[Tensor, Tensor]:
+        """Leapfrog without effects: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
+        problem, alive = self._drive(drive)
+        xb, vb = self.pack(x), self.pack(v)
+        scratch = torch.empty_like(xb[0])
+        self._call("advance", problem, xb, vb, scratch, ctypes.c_double(h), ctypes.c_int64(steps))
+        del alive
+        return self.unpack(xb), self.unpack(vb)
+
+    def forces(self, drive: Drive, share: float, x: Tensor, v: Tensor) -> Tensor:
+        """The base model's forces (vertex, 3, batch) [N]: all but effects and winds' forces other than quadratic."""
+        problem, alive = self._drive(drive)
+        xb, vb = self.pack(x), self.pack(v)
+        out = torch.empty_like(xb)
+        self._call("forces", problem, xb, vb, out, ctypes.c_double(share))
+        del alive
+        return self.unpack(out)
+
+    def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes.c_double | ctypes.c_int64) -> None:
+        function = _function(self.code, name, self.system.cloth.dtype)
+        function.restype = None
+        passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
+        function(ctypes.byref(problem), ctypes.c_int64(self.blocks), *passed)
+
+
+_KERNELS: WeakKeyDictionary[System, Kernel] = WeakKeyDictionary()
+
+
+def _function(code: ctypes.CDLL, name: str, dtype: torch.dtype) -> Any:
+    return getattr(code, f"{name}_f32" if dtype == torch.float32 else f"{name}_f64")
+
+
+def _to_blocks(tensor: Tensor, lanes: int, blocks: int) -> Tensor:
+    """(…, batch) → (block, …, lane); spare lanes repeat the last member."""
+    spare = lanes * blocks - tensor.shape[-1]
+    if spare:
+        tensor = torch.cat([tensor, tensor[..., -1:].expand(*tensor.shape[:-1], spare)], dim=-1)
+    return tensor.unflatten(-1, (blocks, lanes)).movedim(-2, 0)
