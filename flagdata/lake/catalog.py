@@ -4,9 +4,10 @@ Each append is one Parquet file and one log entry. The file is written and flush
 only if its version number is free, so of two writers at the same version one wins and the other is told (`Moved`) and
 looks again. The log is never expired: a tag must be readable for as long as the lake exists.
 
-Small files are merged when `_MERGE_AT` of them have gathered, in a commit of its own that changes no row; the old files
-stay, since old versions are made of them. (Each file costs a reader about 1 ms, a merge of 32 about 60 ms.) Delta's own
-checkpoint, every 100 versions, bounds the log that must be replayed.
+Every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row, and a checkpoint is
+written, which bounds the log that must be replayed. The old files stay, since old versions are made of them. (Each file
+costs a fresh reader about 1 ms; tidying takes about 50 ms.) The library's own checkpoints are off: it does not flush
+them to the disk, so a power cut could leave one that is empty and a table that cannot be opened.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ import random
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -26,10 +26,10 @@ import deltalake
 import pyarrow as pa
 import pyarrow.parquet as pq
 from deltalake import CommitProperties, DeltaTable, PostCommitHookProperties
-from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
+from deltalake.exceptions import CommitFailedError, DeltaError
 from deltalake.transaction import AddAction, RemoveAction
 
-from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
+from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.lake.durable import flush_file, flush_folder
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 
@@ -41,8 +41,9 @@ _CONFIGURATION = {
     "delta.logRetentionDuration": "interval 36500 days",
 }
 _INFO_PREFIX = "flagdata."
+ROW_ORDER = ("created", "start", "frame_first", "artifact")
 _LOG_NAME = "{:020d}.json"
-_MERGE_AT = 32
+_TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
 _PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
 _FIRST_WAIT = 0.01  # s
@@ -100,10 +101,12 @@ class Catalog:
         self.path = path
         self._log = path / "_delta_log"
         self._newest = 0
-        self._last_read: tuple[int, pa.Table] | None = None
+        self._table: DeltaTable | None = None
+        self._files: dict[str, pa.Table] = {}
+        self._rows: tuple[int, pa.Table] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_last_read": None}
+        return {**self.__dict__, "_table": None, "_files": {}, "_rows": None}
 
     @_in_one_process
     def create(self, info: Mapping[str, str]) -> None:
@@ -135,18 +138,22 @@ class Catalog:
     def rows(self, version: int) -> pa.Table:
         """All rows of one version, of all branches, in the catalog's schema; absent columns of old rows are null.
 
+        Args:
+            version: at most `head()`.
+
         Raises:
-            NotFoundError: no such version.
             ConflictError: written by a newer format.
             CorruptError: the log or a file of the table cannot be read.
         """
-        if self._last_read is not None and self._last_read[0] == version:
-            return self._last_read[1]
-        table = self._conform(self._read(self._open(version)))
-        order = [(name, "ascending") for name in ("created", "start", "frame_first", "artifact")]
-        table = table.sort_by(order)
-        self._last_read = (version, table)
-        return table
+        if self._rows is not None and self._rows[0] == version:
+            return self._rows[1]
+        known = self._files
+        self._files = {name: known[name] if name in known else self._read(name) for name in self._names(version)}
+        parts = list(self._files.values())
+        rows = pa.concat_tables(parts) if parts else catalog_schema().empty_table()
+        rows = rows.sort_by([(name, "ascending") for name in ROW_ORDER])
+        self._rows = (version, rows)
+        return rows
 
     @_in_one_process
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
@@ -167,32 +174,41 @@ class Catalog:
             Moved: `base` is no longer the newest version; nothing was published.
         """
         table = self._writable(base)
-        files = pa.table(table.get_add_actions(flatten=True))["path"].to_pylist()
+        files = self._names(base)
         self._commit(table, rows, removed=files, rows_change=True, info=info)
         return base + 1
 
     @_in_one_process
-    def merge_small_files(self) -> None:
-        """Rewrite the small files as one if there are many; left to the next commit if another writer comes between."""
-        table = self._open(self.head())
-        files = pa.table(table.get_add_actions(flatten=True)).select(["path", "size_bytes"]).to_pylist()
-        small = [f["path"] for f in files if f["size_bytes"] < _SMALL]
-        if len(small) < _MERGE_AT:
+    def tidy(self) -> None:
+        """Every `_TIDY_EVERY` versions, merge the small files and write a checkpoint; called before an append.
+
+        If another writer intervenes, the merge is left to the next time.
+        """
+        version = self.head()
+        if version % _TIDY_EVERY != _TIDY_EVERY - 1:
             return
-        rows = pa.concat_tables(self._conform(pq.read_table(self.path / name)) for name in small)
-        info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
-        with suppress(Moved):
+        table = self._writable(version)
+        table.create_checkpoint()
+        for name in (f"{version:020d}.checkpoint.parquet", "_last_checkpoint"):
+            flush_file(self._log / name)
+        flush_folder(self._log)
+        small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
+        if len(small) > 1:
+            rows = pa.concat_tables(self._read(name) for name in small)
+            info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
             self._commit(table, rows, removed=small, rows_change=False, info=info)
 
-    def untracked_files(self) -> list[Path]:
-        """Parquet files that no version refers to: written by a process that died before, or lost, its commit."""
+    def unpublished_files(self) -> list[Path]:
+        """What is left by processes that died before, or while, they put their log entry: no version refers to it."""
         tracked = set()
         for entry in self._log.glob("*.json"):
             for line in entry.read_text().splitlines():
                 added = json.loads(line).get("add")
                 if added is not None:
                     tracked.add(added["path"])
-        return sorted(path for path in self.path.glob("*.parquet") if path.name not in tracked)
+        rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked]
+        entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
+        return sorted([*rows, *entries])
 
     @_in_one_process
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
@@ -208,7 +224,7 @@ class Catalog:
                 "operation": entry["operation"],
                 **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
             }
-            for entry in self._open(None).history(limit)
+            for entry in self._open(self.head()).history(limit)
         ]
 
     def _commit(
@@ -248,19 +264,23 @@ class Catalog:
         except FileNotFoundError:
             return 0
 
-    def _open(self, version: int | None) -> DeltaTable:
+    def _open(self, version: int) -> DeltaTable:
         try:
-            return DeltaTable(str(self.path), version=version)
-        except TableNotFoundError:
-            raise CorruptError("the catalog is gone", where=str(self.path), fix="restore it from a copy") from None
+            if self._table is not None and self._table.version() < version:
+                self._table.update_incremental()
+            if self._table is None or self._table.version() != version:
+                self._table = DeltaTable(str(self.path), version=version)
         except DeltaError as error:
-            if version is not None and version > self.head():
-                raise NotFoundError(
-                    f"there is no version {version}", where=str(self.path), fix=f"the newest is {self.head()}"
-                ) from None
             raise CorruptError(
-                f"the catalog's log cannot be read: {error}", where=str(self.path), fix="run flagdata doctor"
+                f"the catalog's log cannot be read: {error}",
+                where=str(self._log),
+                fix="delete _last_checkpoint and *.checkpoint.parquet there: they save time, the .json files hold all;"
+                " if that does not help, restore the folder from a copy",
             ) from None
+        return self._table
+
+    def _names(self, version: int) -> list[str]:
+        return [Path(uri).name for uri in self._open(version).file_uris()]
 
     def _writable(self, version: int) -> DeltaTable:
         """The table at `version`, if it has all columns of this format; else they are added, and `Moved` is raised."""
@@ -272,12 +292,14 @@ class Catalog:
             raise Moved
         return table
 
-    def _read(self, table: DeltaTable) -> pa.Table:
+    def _read(self, name: str) -> pa.Table:
         try:
-            return table.to_pyarrow_dataset().to_table()
+            return self._conform(pq.read_table(self.path / name))
         except (OSError, pa.ArrowException) as error:
             raise CorruptError(
-                f"a file of the catalog cannot be read: {error}", where=str(self.path), fix="restore it from a copy"
+                f"a file of the catalog cannot be read: {error}",
+                where=str(self.path / name),
+                fix="restore it from a copy",
             ) from None
 
     def _conform(self, table: pa.Table) -> pa.Table:
@@ -306,7 +328,7 @@ class Catalog:
         flush_folder(self._log)
 
 
-_HOOKS = PostCommitHookProperties(create_checkpoint=True, cleanup_expired_logs=False)
+_HOOKS = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
 
 
 def _properties(info: Mapping[str, str]) -> CommitProperties:

@@ -16,7 +16,7 @@ from flagdata import provenance
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog, newer, persist
+from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
 from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.leases import keeping_collectors_out
 from flagdata.lake.objects import STORES, Objects
@@ -234,7 +234,7 @@ class Lake:
 
     def unpublished_files(self) -> list[Path]:
         """Files that a process left which died while it wrote to the catalog or the refs."""
-        return [*self.catalog.untracked_files(), *self.refs.scratch_files()]
+        return [*self.catalog.unpublished_files(), *self.refs.scratch_files()]
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
@@ -262,4 +262,4 @@ class Lake:
 def _filter(table: pa.Table, where: str) -> pa.Table:
     from flagdata.query import Request, Selection  # it knows what a view is, so it imports this package
 
-    return Selection(table, Request(where=where, order="created, start, frame_first, artifact")).table()
+    return Selection(table, Request(where=where, order=", ".join(ROW_ORDER))).table()

@@ -6,6 +6,7 @@ import secrets
 import shutil
 import uuid
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,7 +15,7 @@ import pyarrow as pa
 
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog, persist
+from flagdata.lake.catalog import Catalog, Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease
 from flagdata.lake.objects import Objects, size_of
@@ -127,8 +128,8 @@ class Transaction:
     def _commit(self) -> None:
         with disk_errors("committing", self._catalog.path):
             if self._pending:
-                with self._lease.keeping_collectors_out():
-                    self._catalog.merge_small_files()
+                with self._lease.keeping_collectors_out(), suppress(Moved):
+                    self._catalog.tidy()
             self.result = self._publish()
 
     def _close(self) -> None:

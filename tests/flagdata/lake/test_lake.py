@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
@@ -10,24 +10,11 @@ from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind, catalog_schema
 
-
-def put_text(lake: Lake, text: str, *, branch: str = "main") -> str:
-    with lake.transaction(f"ingest {text}", branch=branch) as tx:
-        path = tx.staging(".mcap")
-        path.write_text(text)
-        name = tx.put(path)
-        artifact = Artifact(kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2])
-        tx.add(artifact)
-    return artifact.id
+Put = Callable[..., Artifact]
 
 
-@pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
-
-
-def test_a_committed_row_and_its_object_are_found_by_a_fresh_handle(lake: Lake) -> None:
-    identity = put_text(lake, "gusts")
+def test_a_committed_row_and_its_object_are_found_by_a_fresh_handle(lake: Lake, put_text: Put) -> None:
+    identity = put_text(lake, "gusts").id
     again = Lake.open(lake.path)
     artifact = again.artifact(identity[:8])
     assert artifact.name == "gusts"
@@ -52,7 +39,7 @@ def test_an_exception_inside_the_block_publishes_nothing(lake: Lake) -> None:
     assert [p.name for p in lake.staging.iterdir() if p.is_dir()] == []
 
 
-def test_the_same_identity_is_published_once(lake: Lake) -> None:
+def test_the_same_identity_is_published_once(lake: Lake, put_text: Put) -> None:
     first = put_text(lake, "gusts")
     before = lake.resolve(None)
     assert put_text(lake, "gusts") == first
@@ -60,7 +47,7 @@ def test_the_same_identity_is_published_once(lake: Lake) -> None:
     assert lake.rows().num_rows == 1
 
 
-def test_a_tag_keeps_showing_what_it_named(lake: Lake) -> None:
+def test_a_tag_keeps_showing_what_it_named(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     lake.tag("v1")
     put_text(lake, "b")
@@ -70,7 +57,7 @@ def test_a_tag_keeps_showing_what_it_named(lake: Lake) -> None:
         lake.tag("v1")
 
 
-def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lake: Lake) -> None:
+def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     lake.branch("try")
     put_text(lake, "b")
@@ -79,7 +66,7 @@ def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lak
     assert [r["name"] for r in lake.rows().to_pylist()] == ["a", "b"]
 
 
-def test_a_filter_selects_by_sql_and_a_bad_one_is_a_usage_error(lake: Lake) -> None:
+def test_a_filter_selects_by_sql_and_a_bad_one_is_a_usage_error(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     assert lake.rows("name = 'b' and \"end\" is null")["name"].to_pylist() == ["b"]

@@ -1,0 +1,328 @@
+"""Mesh sequences in Zarr v3: write-once folders that xarray opens, and that come back as frozen typed sequences.
+
+A store of one topology holds `positions (time, vertex, xyz)`, `faces (face, corner)`, `rest (vertex, uv)`, `time`.
+A store whose topology changes from frame to frame ("ragged") holds the frames' vertices and faces one after another,
+`positions (vertex, xyz)`, `faces (face, corner)`, `rest (vertex, uv)`, and where each frame begins:
+`vertex_offset (edge)` and `face_offset (edge)`, one more than frames. Face indices count within their own frame.
+
+There is no settled convention for moving meshes in Zarr: the Zarr Vectors draft of the Allen Institute is chunked in
+space, PhysicsNeMo writes `mesh_pos (time, vertex, 3)`. Where conventions of xarray's world apply, attributes follow
+them: CF 1.11 for the time axis and units, UGRID 1.0 (`cf_role`, `start_index`) for the connectivity.
+
+The same arrays give the same bytes (with the same zarr and blosc), so equal sequences are stored once. Positions are
+chunked by whole frames, about 1 MiB a chunk, up to 64 chunks a shard file; bytes of equal weight are put together
+before zstd, which saves 12 % over zstd alone on simulated flags.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import ConflictError, CorruptError, InputError
+from flagdata.provenance import canonical
+from flagdata.schema import CHANNELS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    import zarr
+
+MESHES_FORMAT = 1
+_CHUNK = 1 << 20  # B
+_CHUNKS_A_SHARD = 64
+_HEAD = "flagdata_meshes"
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.int32]
+Instants = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """One frame: positions (vertex, 3) [m], faces (face, 3) vertex indices, rest (vertex, 2) [m], time [ns]."""
+
+    time: int
+    positions: Floats
+    faces: Indices
+    rest: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshSequence:
+    """A moving mesh of one topology.
+
+    Attributes:
+        time: (n,) UTC nanoseconds, or since the start of a simulation; strictly increasing.
+        positions: (n, vertex, 3) float32 [m], right-handed, z up; finite.
+        faces: (face, 3) int32, counter-clockwise seen from the front.
+        rest: (vertex, 2) float32 material coordinates [m].
+        attributes: what else is known, JSON values (parameters of the simulation, source).
+
+    Raises:
+        InputError: shapes that disagree, values that are not finite, indices out of range, time that does not increase.
+    """
+
+    time: Instants
+    positions: Floats
+    faces: Indices
+    rest: Floats
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check(self.time, self.positions, self.faces, self.rest, self.attributes)
+        if self.positions.ndim != 3 or self.positions.shape[::2] != (len(self.time), 3):
+            raise _wrong(f"positions have shape {self.positions.shape} for {len(self.time)} times", "(time, vertex, 3)")
+        if self.rest.shape != (self.positions.shape[1], 2):
+            raise _wrong(f"rest has shape {self.rest.shape} for {self.positions.shape[1]} vertices", "(vertex, 2)")
+        _check_faces(self.faces, self.positions.shape[1], "faces")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def frame(self, index: int) -> Mesh:
+        """The mesh at one time; negative indices count from the end."""
+        return Mesh(time=int(self.time[index]), positions=self.positions[index], faces=self.faces, rest=self.rest)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RaggedMeshSequence:
+    """A moving mesh whose topology changes, as remeshing simulators write it.
+
+    Attributes:
+        time: (n,) as in `MeshSequence`.
+        positions: (all vertices, 3) float32 [m], frame after frame.
+        faces: (all faces, 3) int32, indices within their own frame.
+        rest: (all vertices, 2) float32 [m].
+        vertex_offset, face_offset: (n + 1,) int64; frame i has rows offset[i] to offset[i + 1].
+        attributes: as in `MeshSequence`.
+
+    Raises:
+        InputError: as in `MeshSequence`, or offsets that do not fit.
+    """
+
+    time: Instants
+    positions: Floats
+    faces: Indices
+    rest: Floats
+    vertex_offset: Instants
+    face_offset: Instants
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check(self.time, self.positions, self.faces, self.rest, self.attributes)
+        if self.positions.ndim != 2 or self.positions.shape[1] != 3 or self.rest.shape != (len(self.positions), 2):
+            shapes = f"positions {self.positions.shape}, rest {self.rest.shape}"
+            raise _wrong(f"shapes that do not fit: {shapes}", "(all vertices, 3) and (all vertices, 2)")
+        _check_offsets(self.vertex_offset, len(self.time), len(self.positions), "vertex_offset")
+        _check_offsets(self.face_offset, len(self.time), len(self.faces), "face_offset")
+        for i in range(len(self.time)):
+            own = self.faces[self.face_offset[i] : self.face_offset[i + 1]]
+            _check_faces(own, int(self.vertex_offset[i + 1] - self.vertex_offset[i]), f"faces of frame {i}")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def frame(self, index: int) -> Mesh:
+        """The mesh at one time; negative indices count from the end."""
+        i = range(len(self.time))[index]
+        vertices = slice(self.vertex_offset[i], self.vertex_offset[i + 1])
+        faces = slice(self.face_offset[i], self.face_offset[i + 1])
+        return Mesh(
+            time=int(self.time[i]),
+            positions=self.positions[vertices],
+            faces=self.faces[faces],
+            rest=self.rest[vertices],
+        )
+
+
+def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> None:
+    """Write a sequence as a new Zarr folder; to be put into a lake by `Transaction.put`.
+
+    Raises:
+        ConflictError: something is at `path` already.
+    """
+    import zarr
+
+    if path.exists():
+        raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
+    ragged = isinstance(sequence, RaggedMeshSequence)
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    attributes = {
+        "Conventions": "CF-1.11 UGRID-1.0",
+        _HEAD: {"format": MESHES_FORMAT, "layout": "ragged" if ragged else "fixed"},
+        "attributes": dict(sequence.attributes),
+    }
+    group.update_attributes(json.loads(canonical(attributes)))
+    _write(group, "time", sequence.time, ("time",))
+    if ragged:
+        _write(group, "positions", sequence.positions, ("vertex", "xyz"))
+        _write(group, "vertex_offset", sequence.vertex_offset, ("edge",))
+        _write(group, "face_offset", sequence.face_offset, ("edge",))
+    else:
+        _write(group, "positions", sequence.positions, CHANNELS["positions"].dims)
+    _write(group, "faces", sequence.faces, CHANNELS["faces"].dims)
+    _write(group, "rest", sequence.rest, CHANNELS["rest"].dims)
+
+
+def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> MeshSequence | RaggedMeshSequence:
+    """Frames `first` to `first + count` of a stored sequence (to the end if `None`), reading no others.
+
+    Raises:
+        CorruptError: not such a store, damaged, or of a newer format.
+        InputError: frames that it does not have.
+    """
+    group = _open(path)
+    layout = _layout(group, path)
+    with _damage(path):
+        frames = group["time"].shape[0]  # type: ignore[union-attr]
+    last = frames if count is None else first + count
+    if not 0 <= first < last <= frames:
+        raise InputError(f"frames {first} to {last} of {frames}", where=str(path), fix="ask for frames it has")
+    with _damage(path):
+        time = _part(group, "time", first, last)
+        attributes: dict[str, Any] = dict(group.attrs["attributes"])  # type: ignore[arg-type]
+        if layout == "fixed":
+            return MeshSequence(
+                time=time,
+                positions=_part(group, "positions", first, last),
+                faces=_part(group, "faces", None, None),
+                rest=_part(group, "rest", None, None),
+                attributes=attributes,
+            )
+        vertices = _part(group, "vertex_offset", first, last + 1)
+        faces = _part(group, "face_offset", first, last + 1)
+        return RaggedMeshSequence(
+            time=time,
+            positions=_part(group, "positions", vertices[0], vertices[-1]),
+            faces=_part(group, "faces", faces[0], faces[-1]),
+            rest=_part(group, "rest", vertices[0], vertices[-1]),
+            vertex_offset=vertices - vertices[0],
+            face_offset=faces - faces[0],
+            attributes=attributes,
+        )
+
+
+def open_meshes(path: Path) -> xr.Dataset:
+    """The store as an xarray dataset; arrays are read when they are used. `time` is decoded to datetime64[ns].
+
+    Raises:
+        CorruptError: not such a store, or of a newer format.
+    """
+    import xarray as xr
+
+    _layout(_open(path), path)
+    return xr.open_zarr(path, consolidated=False, chunks=None)
+
+
+_RESTORE = "run flagdata verify; import the sequence again or restore it from a copy"
+
+
+def _open(path: Path) -> zarr.Group:
+    import zarr
+
+    try:
+        return zarr.open_group(path, mode="r", zarr_format=3)
+    except (FileNotFoundError, ValueError, KeyError) as error:
+        raise CorruptError(f"not a Zarr store: {error}", where=str(path), fix=_RESTORE) from None
+
+
+def _layout(group: zarr.Group, path: Path) -> str:
+    head: Any = group.attrs.get(_HEAD)
+    if not isinstance(head, dict) or head.get("layout") not in ("fixed", "ragged"):
+        raise CorruptError("a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray")
+    if head["format"] > MESHES_FORMAT:
+        raise CorruptError(
+            f"its format {head['format']} is newer than this flagdata's, {MESHES_FORMAT}",
+            where=str(path),
+            fix="install the newer flagdata",
+        )
+    return head["layout"]
+
+
+@contextmanager
+def _damage(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (InputError, KeyError, ValueError, OSError, RuntimeError) as error:
+        raise CorruptError(f"the mesh store is damaged: {error}", where=str(path), fix=_RESTORE) from error
+
+
+def _part(group: zarr.Group, name: str, first: int | None, last: int | None) -> NDArray[Any]:
+    return np.asarray(group[name][first:last])  # type: ignore[index]
+
+
+_ATTRIBUTES: dict[str, dict[str, Any]] = {
+    "time": {"standard_name": "time", "units": "nanoseconds since 1970-01-01", "calendar": "proleptic_gregorian"},
+    "faces": {"cf_role": "face_node_connectivity", "start_index": 0, "units": "1"},
+    "vertex_offset": {"units": "1"},
+    "face_offset": {"units": "1"},
+}
+
+
+def _write(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...]) -> None:
+    from zarr.codecs import BloscCodec
+
+    rows = max(1, len(values))
+    row_bytes = max(1, values.nbytes // rows)
+    chunk = min(rows, max(1, _CHUNK // row_bytes))
+    shard = min(_CHUNKS_A_SHARD, -(-rows // chunk)) * chunk
+    rest = tuple(max(1, size) for size in values.shape[1:])
+    attributes: dict[str, Any] = dict(_ATTRIBUTES.get(name, {}))
+    if not attributes:
+        channel = CHANNELS[name]
+        attributes = {"units": channel.unit, "long_name": channel.about, "comment": channel.frame}
+    array = group.create_array(
+        name,
+        shape=values.shape,
+        dtype=values.dtype,
+        chunks=(chunk, *rest),
+        shards=(shard, *rest),
+        compressors=BloscCodec(cname="zstd", clevel=5, shuffle="shuffle", typesize=values.dtype.itemsize),
+        fill_value=np.nan if values.dtype.kind == "f" else -1,  # so that a lost chunk cannot pass for data
+        dimension_names=dims,
+        attributes=attributes,
+    )
+    array[...] = values
+
+
+def _wrong(what: str, wanted: str) -> InputError:
+    return InputError(what, where="mesh sequence", fix=f"give {wanted}")
+
+
+def _check(time: Instants, positions: Floats, faces: Indices, rest: Floats, attributes: Mapping[str, Any]) -> None:
+    arrays = (("time", time, np.int64), ("positions", positions, np.float32), ("faces", faces, np.int32))
+    for name, values, dtype in (*arrays, ("rest", rest, np.float32)):
+        if values.dtype != dtype:
+            raise _wrong(f"{name} is of type {values.dtype}", f"{np.dtype(dtype)}")
+    if time.ndim != 1 or len(time) == 0 or not bool(np.all(np.diff(time) > 0)):
+        raise _wrong("time is empty or does not increase", "one increasing instant a frame")
+    if not bool(np.isfinite(positions).all()) or not bool(np.isfinite(rest).all()):
+        raise _wrong(
+            "positions or rest coordinates that are not finite", "finite ones; cut a sequence where it blew up"
+        )
+    try:
+        canonical(attributes)
+    except (TypeError, ValueError) as error:
+        raise _wrong(f"attributes that are not JSON: {error}", "text, finite numbers, lists and mappings") from None
+
+
+def _check_faces(faces: Indices, vertices: int, what: str) -> None:
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise _wrong(f"{what} have shape {faces.shape}", "(face, 3)")
+    if faces.size and not 0 <= int(faces.min()) <= int(faces.max()) < vertices:
+        raise _wrong(f"{what} name vertices outside 0 to {vertices - 1}", "indices into the frame's vertices, from 0")
+
+
+def _check_offsets(offset: Instants, frames: int, total: int, name: str) -> None:
+    fits = offset.dtype == np.int64 and offset.shape == (frames + 1,) and offset[0] == 0 and offset[-1] == total
+    if not fits or bool(np.any(np.diff(offset) < 0)):
+        raise _wrong(
+            f"{name} does not fit {frames} frames and {total} rows", "int64 from 0 to the number of rows, rising"
+        )
