@@ -1,0 +1,245 @@
+"""Doctor names every kind of damage; garbage collection takes what nothing needs and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import ConflictError, CorruptError, NotFoundError
+from flagdata.findings import Finding, Severity
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.collect import collect, garbage
+from flagdata.lake.difference import difference
+from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify
+from flagdata.schema import Kind
+
+NOW = timedelta(0)
+DAY = timedelta(hours=24)
+Put = Callable[..., Artifact]
+
+
+def kinds(findings: tuple[Finding, ...]) -> list[str]:
+    return [finding.kind for finding in findings]
+
+
+def object_of(lake: Lake, artifact: Artifact) -> Path:
+    assert artifact.object is not None
+    return lake.object_path(artifact.object)
+
+
+def abandon(lake: Lake, text: str) -> str:
+    """Put an object and let the transaction fail, as a crash after the put would."""
+    name = ""
+
+    def fail() -> None:
+        nonlocal name
+        with lake.transaction("abandon") as tx:
+            path = tx.staging(".mcap")
+            path.write_text(text)
+            name = tx.put(path)
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    return name
+
+
+def age(path: Path, by: timedelta) -> None:
+    then = time.time() - by.total_seconds()
+    os.utime(path, (then, then))
+
+
+def test_a_sound_lake_has_no_findings(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    lake.tag("v1")
+    lake.branch("try")
+    put_text(lake, "b", branch="try")
+    assert doctor(lake, grace=NOW) == ()
+    assert verify(lake, object_names(lake)) == ()
+
+
+def test_a_missing_object_is_a_dangling_row(lake: Lake, put_text: Put) -> None:
+    object_of(lake, put_text(lake, "a")).unlink()
+    findings = doctor(lake)
+    assert kinds(findings) == ["dangling-row"]
+    assert findings[0].severity is Severity.ERROR
+    assert findings[0].fix is not None
+    assert kinds(verify(lake, object_names(lake))) == ["object-missing"]
+
+
+def test_a_truncated_object_is_found_by_its_size_and_a_changed_one_by_its_hash(lake: Lake, put_text: Put) -> None:
+    short, changed = object_of(lake, put_text(lake, "long enough")), object_of(lake, put_text(lake, "same size"))
+    for path in (short, changed):
+        path.chmod(0o644)
+    short.write_text("long")
+    changed.write_text("some size")
+    assert kinds(doctor(lake)) == ["object-size"]
+    assert kinds(verify(lake, object_names(lake))) == ["object-changed", "object-changed"]
+
+
+def test_ingesting_again_heals_a_damaged_object(lake: Lake, put_text: Put) -> None:
+    path = object_of(lake, put_text(lake, "a"))
+    path.chmod(0o644)
+    path.write_text("b")
+    put_text(lake, "a")
+    assert path.read_text() == "a"
+    assert doctor(lake, grace=NOW) == ()
+
+
+def test_a_folder_with_one_file_more_is_not_the_object_any_more(lake: Lake) -> None:
+    with lake.transaction("folder") as tx:
+        path = tx.staging(".zarr")
+        path.mkdir()
+        (path / "zarr.json").write_text("{}")
+        tx.add(Artifact(kind=Kind.MESHES, name="m", object=(name := tx.put(path))))
+    (lake.object_path(name) / "extra").write_text("")
+    assert kinds(verify(lake, object_names(lake))) == ["object-changed"]
+
+
+def test_a_row_of_a_newer_format_is_named(lake: Lake) -> None:
+    with lake.transaction("future") as tx:
+        tx.add(Artifact(kind=Kind.MODEL, name="m", format_version=99))
+    findings = doctor(lake)
+    assert kinds(findings) == ["newer-format"]
+    assert "99" in findings[0].what
+
+
+def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    lake.tag("v1")
+    name = abandon(lake, "orphan")
+    (lake.path / "refs" / "tags" / "v1.json").write_text("{")
+    assert kinds(doctor(lake)) == ["ref-unreadable"]
+    with pytest.raises(CorruptError):
+        collect(lake, grace=NOW)
+    assert lake.object_path(name).exists()
+
+
+def test_files_that_are_no_objects_are_strays_and_are_not_deleted(lake: Lake) -> None:
+    stray = lake.path / "mcap" / "holiday.mcap"
+    stray.write_text("mine")
+    assert kinds(doctor(lake)) == ["stray-file"]
+    collect(lake, grace=NOW)
+    assert stray.exists()
+
+
+def test_an_orphan_is_left_alone_for_the_grace_period(lake: Lake) -> None:
+    name = abandon(lake, "orphan")
+    young = doctor(lake, grace=DAY)
+    assert [(f.kind, f.severity) for f in young] == [("orphan", Severity.NOTE)]
+    assert is_healthy(young)
+    assert collect(lake, grace=DAY).objects == ()
+    age(lake.object_path(name), timedelta(hours=25))
+    assert not is_healthy(doctor(lake, grace=DAY))
+    assert garbage(lake, grace=DAY).objects == (name,)
+    assert lake.object_path(name).exists()
+    assert collect(lake, grace=DAY).objects == (name,)
+    with pytest.raises(NotFoundError):
+        lake.object_path(name)
+    assert doctor(lake, grace=NOW) == ()
+
+
+def test_collection_spares_what_a_running_transaction_has_put(lake: Lake) -> None:
+    with lake.transaction("long running") as tx:
+        path = tx.staging(".mcap")
+        path.write_text("slow")
+        name = tx.put(path)
+        unfinished = tx.staging(".mcap")
+        unfinished.write_text("half")
+        assert collect(lake, grace=NOW).leftovers == ()
+        assert unfinished.exists()
+        artifact = Artifact(kind=Kind.WIND, name="slow", object=name)
+        tx.add(artifact)
+    assert lake.object_path(name).read_text() == "slow"
+    assert doctor(lake, grace=NOW) == ()
+
+
+def test_collection_spares_an_old_orphan_that_a_running_transaction_has_found_again(lake: Lake) -> None:
+    name = abandon(lake, "again")
+    age(lake.object_path(name), timedelta(days=30))
+    with lake.transaction("again") as tx:
+        path = tx.staging(".mcap")
+        path.write_text("again")
+        assert tx.put(path) == name
+        assert collect(lake, grace=NOW).objects == ()
+        tx.add(Artifact(kind=Kind.WIND, name="again", object=name))
+    assert lake.object_path(name).read_text() == "again"
+
+
+def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(
+    lake: Lake, put_text: Put
+) -> None:
+    tagged, untagged = put_text(lake, "tagged"), None
+    lake.tag("v1")
+    untagged = put_text(lake, "untagged")
+    lake.withdraw([tagged.id, untagged.id], "a person asked for it")
+    assert lake.rows().num_rows == 0
+    assert lake.rows(at="v1")["name"].to_pylist() == ["tagged"]
+    assert collect(lake, grace=DAY).objects == ()
+    time.sleep(0.01)  # so that the withdrawal is older than no time at all
+    assert collect(lake, grace=NOW).objects == (untagged.object,)
+    assert object_of(lake, tagged).read_text() == "tagged"
+    assert doctor(lake, grace=NOW) == ()
+    assert put_text(lake, "untagged").id == untagged.id
+    assert lake.rows()["name"].to_pylist() == ["untagged"]
+
+
+def test_withdrawal_spares_what_others_were_made_from_and_what_was_inherited(lake: Lake, put_text: Put) -> None:
+    parent = put_text(lake, "parent")
+    child = put_text(lake, "child", parents=(parent.id,))
+    lake.branch("try")
+    with pytest.raises(ConflictError, match="child"):
+        lake.withdraw([parent.id], "no")
+    with pytest.raises(NotFoundError, match="not committed on branch 'try'"):
+        lake.withdraw([child.id], "no", branch="try")
+    lake.withdraw([parent.id, child.id], "both")
+    assert lake.rows(at="try").num_rows == 2
+
+
+def test_a_difference_names_rows_and_objects_both_ways(lake: Lake, put_text: Put) -> None:
+    gone = put_text(lake, "gone")
+    lake.tag("before")
+    came = put_text(lake, "came")
+    lake.withdraw([gone.id], "wrong file")
+    found = difference(lake, "before", None)
+    assert found.added["artifact"].to_pylist() == [came.id]
+    assert found.removed["artifact"].to_pylist() == [gone.id]
+    assert found.objects_added == (came.object,)
+    assert found.objects_removed == (gone.object,)
+    back = difference(lake, "main", "before")
+    assert back.removed["artifact"].to_pylist() == [came.id]
+
+
+def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    left = [
+        lake.path / "catalog" / "0123.parquet",
+        lake.path / "catalog" / "_delta_log" / "00000000000000000009.json#1",
+        lake.path / "refs" / "tags" / ".0123",
+    ]
+    for path in left:
+        path.write_text("half")
+    dead = lake.staging / "0123"
+    dead.mkdir()
+    owner = {"pid": 1, "host": "here", "since": "then"}
+    (dead / "lease").write_text(json.dumps(owner) + "\n")
+    findings = doctor(lake, grace=NOW)
+    assert sorted(kinds(findings)) == ["staging-left", "write-left", "write-left", "write-left"]
+    assert "process 1 on here" in next(f.what for f in findings if f.kind == "staging-left")
+    assert set(collect(lake, grace=NOW).leftovers) == {*left, dead}
+    assert doctor(lake, grace=NOW) == ()
+    assert lake.rows().num_rows == 1
+
+
+def test_a_sample_is_of_the_size_asked_for_and_never_larger_than_all() -> None:
+    names = [f"mcap/{i}" for i in range(10)]
+    drawn = sampled(names, 4)
+    assert len(set(drawn)) == 4
+    assert set(drawn) <= set(names)
+    assert sampled(names, 99) == names
