@@ -32,6 +32,7 @@ BLOCKS = 60  # blocks along the shorter side of the picture
 LONGEST_GAP = 0.5  # s; frames further apart are not compared
 _LOW_QUANTILE = 0.2
 _LOW_QUANTILE_OF_HALF_NORMAL = 0.2533471031357997  # P(|z| < this) = 0.2 for a standard normal z
+_FEWEST_STILL = 0.1  # of the blocks, for a fit
 _SHAKE = 0.5  # pixels of the original picture, root mean square
 
 
@@ -127,23 +128,44 @@ def _change(before: NDArray[np.float32], after: NDArray[np.float32], block: int)
     grad_y, grad_x = np.gradient(before) if min(before.shape) > 1 else (np.zeros_like(before), np.zeros_like(before))
     centre = float(before.mean())
     columns = np.stack(
-        [np.ones(before.size), (before - centre).ravel(), grad_x.ravel(), grad_y.ravel()], axis=1
+        [np.ones(before.size), (before - centre).ravel(), grad_x.ravel(), grad_y.ravel()], axis=1, dtype=np.float64
     )  # (blocks, 4)
     target = after.ravel().astype(np.float64) - centre
-    keep = np.ones(before.size, dtype=bool)
-    parameters = np.zeros(4)
-    sigma = 0.0
     least = 0.3 / block  # the rounding of 8-bit pixels, averaged over a block
-    residual = target
-    for _ in range(3):
-        parameters = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-6)[0]
-        residual = np.abs(target - columns @ parameters)
-        sigma = max(float(np.quantile(residual, _LOW_QUANTILE)) / _LOW_QUANTILE_OF_HALF_NORMAL, least)
-        keep = residual < 3 * sigma
-        if np.count_nonzero(keep) < max(8, 0.1 * before.size):
-            break
+    still = target - columns[:, 1]
+    starts = (_quiet(np.abs(still - np.median(still)), least)[0], np.ones(before.size, dtype=bool))
+    residual, sigma, parameters = min(
+        (_fitted(columns, target, keep, least) for keep in starts), key=lambda fit: fit[1]
+    )
     change = float(np.mean(np.maximum(residual - 3 * sigma, 0.0)))
     return change, float(parameters[1]), float(math.hypot(parameters[2], parameters[3]))
+
+
+def _fitted(
+    columns: NDArray[np.float64], target: NDArray[np.float64], keep: NDArray[np.bool_], least: float
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    """|residual| and its σ after least squares on the blocks to keep, twice; and the four parameters.
+
+    Two starts are compared, since either can go astray: all blocks, where the flag fills little of the picture, and
+    those that hardly changed, where the camera stands still.
+    """
+    parameters = np.array([0.0, 1.0, 0.0, 0.0])
+    residual, sigma = np.abs(target - columns @ parameters), math.inf
+    for _ in range(2):
+        if np.count_nonzero(keep) < max(8, _FEWEST_STILL * len(target)):
+            break
+        kept = columns[keep]
+        # The pseudo-inverse leaves alone what a flat picture does not determine (gain, shift).
+        parameters = np.linalg.pinv(kept.T @ kept, rcond=1e-9, hermitian=True) @ (kept.T @ target[keep])
+        residual = np.abs(target - columns @ parameters)
+        keep, sigma = _quiet(residual, least)
+    return residual, sigma, parameters
+
+
+def _quiet(residual: NDArray[np.float64], least: float) -> tuple[NDArray[np.bool_], float]:
+    """Which blocks are within 3 σ, σ being that of a normal distribution with the residual's lowest fifth."""
+    sigma = max(float(np.quantile(residual, _LOW_QUANTILE)) / _LOW_QUANTILE_OF_HALF_NORMAL, least)
+    return residual < 3 * sigma, sigma
 
 
 def _findings(energies: list[float], shifts: list[float], gains: list[float]) -> tuple[Finding, ...]:

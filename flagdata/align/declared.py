@@ -1,0 +1,77 @@
+"""Clock models that someone vouches for: by time stamps, or by a given offset."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flagdata.align.clock import ClockModel, Segment
+from flagdata.errors import InputError, UsageError
+from flagdata.signals import Instants
+from flagdata.timebase import NANOSECONDS
+
+QUARTZ = 3e-5
+"""Standard uncertainty of the rate difference of two free-running quartz clocks [s/s]: ±50 ppm, rectangular."""
+
+_STEPS = (3600.0, 60.0, 10.0, 1.0, 0.1, 0.01, 0.001)  # s, that loggers cut their stamps to
+
+
+def by_stamps(device: str, reference: str, *, start: int, end: int, sigma: float) -> ClockModel:
+    """Both clocks taken as one, as their stamps say, to within `sigma` [s].
+
+    Args:
+        start, end: of what the device recorded, on its own clock [UTC ns].
+        sigma: standard uncertainty of the difference of the two clocks, resolution of the stamps included.
+
+    Raises:
+        UsageError: σ is zero, negative or not finite: nobody can vouch for that.
+    """
+    return _declared(device, reference, method="stamps", start=start, end=end, offset=0.0, sigma=sigma)
+
+
+def given(device: str, reference: str, *, start: int, end: int, offset: float, sigma: float) -> ClockModel:
+    """The device's clock plus `offset` [s], known to `sigma` [s], is the reference's.
+
+    Raises:
+        UsageError: an offset that is not finite, or a σ that is not positive and finite.
+    """
+    return _declared(device, reference, method="given", start=start, end=end, offset=offset, sigma=sigma)
+
+
+def _declared(
+    device: str, reference: str, *, method: str, start: int, end: int, offset: float, sigma: float
+) -> ClockModel:
+    if not math.isfinite(offset):
+        raise UsageError(f"an offset of {offset} s", where="offset", fix="give a finite number of seconds")
+    if not (math.isfinite(sigma) and sigma > 0):
+        raise UsageError(
+            f"an offset with the uncertainty {sigma} s",
+            where="offset sigma",
+            fix="state how well the two clocks were compared, e.g. 0.3 for whole seconds read off two displays",
+        )
+    segment = Segment(
+        start=start, end=end, origin=(start + end) // 2, offset=offset, sigma_offset=sigma, sigma_drift=QUARTZ
+    )
+    return ClockModel(device=device, reference=reference, method=method, confidence=1.0, segments=(segment,))
+
+
+def stamp_step(time: Instants) -> float:
+    """The step that stamps are cut or rounded to [s]: the coarsest of 1 h, 1 min, 10 s, … 1 ms that divides all.
+
+    0 where none does. A logger that writes exactly once a second cannot be told from one that cuts to whole seconds.
+
+    Raises:
+        InputError: no stamps.
+    """
+    if len(time) == 0:
+        raise InputError("no stamps to look at", fix="check the log's report")
+    for step in _STEPS:
+        if not np.any(time % round(step * NANOSECONDS)):
+            return step
+    return 0.0
+
+
+def stamp_sigma(time: Instants) -> float:
+    """Standard uncertainty of stamps from their step alone [s]: step / √12, rectangular (JCGM 100:2008, 4.3.7)."""
+    return stamp_step(time) / math.sqrt(12)

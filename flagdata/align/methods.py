@@ -1,0 +1,231 @@
+"""The three ways to a clock model, and what each needs: by stamps, given, estimated from the flag's motion."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from flagdata.align.clock import ClockModel, Segment
+from flagdata.align.declared import QUARTZ, by_stamps, given, stamp_sigma
+from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
+from flagdata.align.motion import MotionSeries
+from flagdata.align.recording import Alignment, Pair
+from flagdata.align.windbins import wind_bins
+from flagdata.errors import CorruptError, RefusedError, UsageError
+from flagdata.record.metadata import CAMERA
+from flagdata.rng import stream
+from flagdata.signals import WindAverage
+
+Progress = Callable[[int], object]
+
+
+class Method(StrEnum):
+    STAMPS = "stamps"
+    GIVEN = "given"
+    ESTIMATE = "estimate"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClockOptions:
+    """How to come by the clock model.
+
+    Attributes:
+        by: the method.
+        offset: added to the camera's clock to reach the wind's [s]; for `GIVEN` only.
+        offset_sigma: its standard uncertainty [s]; for `GIVEN`, and for `STAMPS`, where it is how well the two clocks
+            are known to agree.
+        search: for `ESTIMATE`.
+
+    Raises:
+        UsageError: what the method needs is missing, something it has no use for was given, or numbers make no sense.
+    """
+
+    by: Method = Method.ESTIMATE
+    offset: float | None = None
+    offset_sigma: float | None = None
+    search: LagSearch | None = None
+
+    def __post_init__(self) -> None:
+        if self.offset is not None and not math.isfinite(self.offset):
+            raise UsageError(f"an offset of {self.offset} s", where="--offset", fix="give a finite number of seconds")
+        if self.offset_sigma is not None and not (math.isfinite(self.offset_sigma) and self.offset_sigma > 0):
+            raise UsageError(
+                f"an offset with the uncertainty {self.offset_sigma} s", where="--offset-sigma", fix="give seconds > 0"
+            )
+        if (self.offset is not None) != (self.by is Method.GIVEN):
+            what = "without an offset" if self.by is Method.GIVEN else "together with an offset"
+            raise UsageError(f"alignment by {self.by} {what}", where="--offset", fix="use --by given --offset SECONDS")
+        if (self.offset_sigma is not None) == (self.by is Method.ESTIMATE):
+            if self.by is Method.ESTIMATE:
+                raise UsageError(
+                    "the σ of an estimate is estimated", where="--offset-sigma", fix="leave it out, or use --by given"
+                )
+            raise UsageError(
+                f"alignment by {self.by} without an uncertainty",
+                where="--offset-sigma",
+                fix="state how well the clocks are known to agree, in seconds (one standard deviation)",
+            )
+        if self.search is not None and self.by is not Method.ESTIMATE:
+            raise UsageError(
+                f"alignment by {self.by} searches nothing", where="--window", fix="leave the search's options out"
+            )
+
+    def recipe(self) -> dict[str, Any]:
+        """What the recording's identity depends on."""
+        if self.by is Method.ESTIMATE:
+            return {"align": {"by": self.by.value, "search": vars(self.search or LagSearch())}}
+        return {"align": {"by": self.by.value, "offset": self.offset, "offset_sigma": self.offset_sigma}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What an estimate was made from, for the plot.
+
+    Attributes:
+        motion: on the camera's clock.
+        wind: bins whose instants were corrected for the instrument's averaging, on the wind's clock.
+        estimate: accepted or not.
+        response: by how much motion was taken to follow the wind [s].
+    """
+
+    motion: MotionSeries
+    wind: WindAverage
+    estimate: LagEstimate
+    response: float
+
+    def as_json(self) -> bytes:
+        """The search, for the record: offsets [s], scores, and the score that accidents seldom exceed."""
+        curve = self.estimate.curve
+        score = [None if math.isnan(value) else round(value, 4) for value in curve.score.tolist()]
+        content = {
+            "schema": "flagdata.lag-curve/1",
+            "offset": np.round(curve.offset, 3).tolist(),
+            "score": score,
+            "chance_score": round(curve.chance_score, 4),
+        }
+        return json.dumps(content, allow_nan=False).encode()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """An alignment that may be used, with its evidence where it was estimated."""
+
+    alignment: Alignment
+    evidence: Evidence | None = None
+
+
+def declared(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) -> Outcome:
+    """A clock model by stamps or by a given offset. The stamps' own resolution is added to a σ by stamps.
+
+    Raises:
+        UsageError: `options.by` is neither, or a σ that is no uncertainty.
+    """
+    if options.offset_sigma is None or options.by is Method.ESTIMATE:
+        raise UsageError("an estimate is not declared", fix="call estimated")
+    start, end = pair.span
+    names = (pair.camera.name, pair.wind.name)
+    if options.by is Method.GIVEN:
+        clock = given(*names, start=start, end=end, offset=options.offset or 0.0, sigma=options.offset_sigma)
+    else:
+        resolution = math.hypot(_start_sigma(pair), stamp_sigma(pair.series().time))
+        clock = by_stamps(*names, start=start, end=end, sigma=math.hypot(options.offset_sigma, resolution))
+    segment = clock.segments[0]
+    details = {"method": clock.method, "offset": segment.offset, "sigma": segment.sigma_offset, "confidence": 1.0}
+    return Outcome(alignment=Alignment(clock=clock, recipe=recipe, details=details))
+
+
+def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = None) -> Evidence:
+    """Estimate the offset, whether it may be used or not.
+
+    Args:
+        progress: called with the number of frames read, now and then.
+
+    Raises:
+        InputError: the wind log holds no wind speed, or nothing to compare.
+    """
+    search = options.search or LagSearch()
+    bins = wind_bins(pair.series())
+    search = replace(search, stamp_sigma=math.hypot(search.stamp_sigma, bins.sigma))
+    motion = pair.motion(progress=progress)
+    generator = stream(0, "align", pair.camera.id, pair.wind.id)
+    estimate = estimate_offset(motion, bins.average, search=search, generator=generator)
+    return Evidence(motion=motion, wind=bins.average, estimate=estimate, response=search.response)
+
+
+def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:
+    """The clock model of an estimate that may be used.
+
+    Raises:
+        RefusedError: it may not, with the reasons.
+    """
+    estimate = found.estimate
+    if not estimate.accepted:
+        raise RefusedError(
+            f"no offset can be told: {'; '.join(estimate.reasons)}",
+            where=f"{pair.camera.name} and {pair.wind.name}",
+            fix="look at it with --plot FILE.png; then state the offset: --by given --offset S --offset-sigma S",
+        )
+    start, end = pair.span
+    segment = Segment(
+        start=start,
+        end=end,
+        origin=estimate.at,
+        offset=estimate.offset,
+        sigma_offset=estimate.sigma,
+        sigma_drift=QUARTZ,
+    )
+    clock = ClockModel(
+        device=pair.camera.name,
+        reference=pair.wind.name,
+        method="estimated",
+        confidence=estimate.confidence,
+        segments=(segment,),
+    )
+    alignment = Alignment(
+        clock=clock,
+        recipe=recipe,
+        findings=estimate.findings,
+        details={"method": "estimated", **summary(estimate)},
+        curve=found.as_json(),
+    )
+    return Outcome(alignment=alignment, evidence=found)
+
+
+def summary(estimate: LagEstimate) -> dict[str, Any]:
+    """An estimate's numbers for JSON; what is not finite is null."""
+
+    def known(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "offset": known(estimate.offset),
+        "sigma": known(estimate.sigma),
+        "sigma_statistical": known(estimate.sigma_statistical),
+        "interval": [known(bound) for bound in estimate.interval],
+        "level": 0.9,
+        "confidence": estimate.confidence,
+        "chance": estimate.chance,
+        "correlation": known(estimate.correlation),
+        "bins": estimate.bins,
+        "accepted": estimate.accepted,
+        "findings": [finding.as_dict() for finding in estimate.findings],
+    }
+
+
+def _start_sigma(pair: Pair) -> float:
+    """Standard uncertainty of reading the film's start off its file [s]; 0 where the user gave it."""
+    text = pair.camera_record.metadata.get(CAMERA, {}).get("start_sigma")
+    if text is None:
+        return 0.0
+    try:
+        return float(text)
+    except ValueError:
+        raise CorruptError(
+            f"the camera's start_sigma is {text!r}", where=pair.camera.id, fix="ingest the camera file anew"
+        ) from None

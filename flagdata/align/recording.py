@@ -1,0 +1,330 @@
+"""A camera and an anemometer made one recording: one record on the wind's clock, its clips, one commit.
+
+Frames are copied as the JPEG bytes they are. The instant of a frame in the record is its instant on the camera's clock
+taken to the wind's by the clock model, which goes into the record's metadata and into the catalog with its σ.
+"""
+
+from __future__ import annotations
+
+import json
+import mimetypes
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.align.clock import ClockModel
+from flagdata.align.motion import MotionSeries, motion_energy
+from flagdata.dataset.clips import clip_rows
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, quality_flags
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical, code_version, recipe_hash
+from flagdata.record import Record, RecordWriter
+from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
+from flagdata.schema import Kind
+from flagdata.signals import WindSeries
+from flagdata.timebase import NANOSECONDS, iso
+
+Progress = Callable[[int], object]
+REPORT_SCHEMA = "flagdata.align-report/1"
+CURVE = "alignment.json"
+MARGIN_BEFORE = 600.0  # s of wind kept before the first frame: ground truth looks back
+MARGIN_AFTER = 60.0  # s
+_FRAMES_AT_ONCE = 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alignment:
+    """A clock model and how it came about.
+
+    Attributes:
+        clock: of the camera on the wind's clock.
+        recipe: the options that led to it; with the parents, the recording's identity.
+        findings: what the catalog should know of it.
+        details: numbers for the report (offset, interval, confidence, …), JSON.
+        curve: the search that led to it, a JSON document attached to the record; `None` where nothing was searched.
+    """
+
+    clock: ClockModel
+    recipe: Mapping[str, Any]
+    findings: tuple[Finding, ...] = ()
+    details: Mapping[str, Any] = field(default_factory=dict)
+    curve: bytes | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """A camera and a wind artifact of one lake, with their records opened.
+
+    Raises:
+        UsageError: artifacts of other kinds.
+    """
+
+    camera: Artifact
+    wind: Artifact
+    camera_record: Record
+    wind_record: Record
+
+    @classmethod
+    def of(cls, lake: Lake, camera: str, wind: str, *, at: str | None = None) -> Pair:
+        """Look both up by id or unique prefix of it."""
+        artifacts = []
+        for identity, kind in ((camera, Kind.CAMERA), (wind, Kind.WIND)):
+            artifact = lake.artifact(identity, at=at)
+            if artifact.kind is not kind or artifact.object is None:
+                raise UsageError(
+                    f"{artifact.name!r} is a {artifact.kind}, not a {kind}",
+                    where=artifact.id,
+                    fix="flagdata align CAMERA WIND takes a camera artifact, then a wind artifact; see flagdata ls",
+                )
+            artifacts.append(artifact)
+        records = [Record.open(lake.object_path(str(artifact.object))) for artifact in artifacts]
+        return cls(camera=artifacts[0], wind=artifacts[1], camera_record=records[0], wind_record=records[1])
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First frame's instant and one past the last's, on the camera's clock [UTC ns]."""
+        times = self.camera_record.device_frame_times
+        return int(times[0]), int(times[-1]) + 1
+
+    def series(self) -> WindSeries:
+        """All samples of the anemometer, on its own clock.
+
+        Raises:
+            InputError: the record has none.
+        """
+        series = self.wind_record.wind()
+        if series is None or not len(series):
+            raise InputError("the wind artifact holds no samples", where=self.wind.id, fix="ingest the log anew")
+        return series
+
+    def motion(self, *, progress: Progress | None = None) -> MotionSeries:
+        """Motion energy of the film on the camera's clock.
+
+        Args:
+            progress: called with the number of frames read, now and then.
+        """
+        return motion_energy(self._frames(progress))
+
+    def _frames(self, progress: Progress | None) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+        record = self.camera_record
+        times = record.device_frame_times
+        for first in range(0, len(times), _FRAMES_AT_ONCE):
+            count = min(_FRAMES_AT_ONCE, len(times) - first)
+            yield from zip(times[first : first + count].tolist(), record.frames(first, count), strict=True)
+            if progress:
+                progress(count)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingResult:
+    """What making a recording did.
+
+    Attributes:
+        recording: as it is in the lake.
+        clips: identities of its clips.
+        created: false when it was there already, and nothing was written.
+    """
+
+    recording: Artifact
+    clips: tuple[str, ...]
+    created: bool
+
+
+def session_of(pair: Pair, *, named: str | None) -> str | None:
+    """The session of a recording: the one named, else the one its parents agree on; `None` where neither names one.
+
+    Raises:
+        UsageError: the parents name different ones.
+    """
+    if named is not None:
+        return named
+    sessions = {artifact.session for artifact in (pair.camera, pair.wind) if artifact.session}
+    if len(sessions) > 1:
+        raise UsageError(
+            f"camera and wind are of the sessions {pair.camera.session!r} and {pair.wind.session!r}",
+            where=pair.camera.id,
+            fix="say by --session which one the recording is of",
+        )
+    return sessions.pop() if sessions else None
+
+
+def find_recording(lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, branch: str) -> RecordingResult | None:
+    """The recording that these parents and options make, if it is on the branch."""
+    rows = lake.rows(f"kind = 'recording' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
+    for row in rows:
+        if list(row["parents"]) == [pair.camera.id, pair.wind.id]:
+            artifact = Artifact.from_row(row)
+            return RecordingResult(recording=artifact, clips=_clips_of(lake, artifact, branch), created=False)
+    return None
+
+
+def make_recording(
+    lake: Lake,
+    pair: Pair,
+    alignment: Alignment,
+    *,
+    name: str | None = None,
+    session: str | None = None,
+    branch: str = "main",
+    progress: Progress | None = None,
+) -> RecordingResult:
+    """Write the recording and its clips, and publish them in one commit.
+
+    Args:
+        name: what people call it; the camera's name if `None`.
+        session: one set-up at one place; the parents' if `None`.
+        progress: called with 1 for each frame copied.
+
+    Raises:
+        UsageError: the parents are of different sessions and `session` is `None`.
+        InputError: the clock model folds frames back over a jump, or the wind log has no sample near the film.
+    """
+    present = find_recording(lake, pair, alignment.recipe, branch=branch)
+    if present is not None:
+        return present
+    chosen = session_of(pair, named=session)
+    clock = alignment.clock
+    frames = clock.to_common(pair.camera_record.device_frame_times)
+    wind = _near(pair.series(), int(frames[0]), int(frames[-1]), where=pair.wind.id)
+    with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
+        staged = transaction.staging(".mcap")
+        _write(staged, pair, alignment, frames, wind, progress=progress)
+        recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=chosen)
+        transaction.add(replace(recording, branch=branch))
+        clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording)
+        for clip in clips:
+            transaction.add(clip)
+    committed = transaction.result
+    created = committed is not None and recording.id in committed.added
+    return RecordingResult(
+        recording=lake.artifact(recording.id, at=branch), clips=tuple(clip.id for clip in clips), created=created
+    )
+
+
+def _near(series: WindSeries, start: int, end: int, *, where: str) -> WindSeries:
+    """The samples from `MARGIN_BEFORE` before the film to `MARGIN_AFTER` after it."""
+    low, high = start - round(MARGIN_BEFORE * NANOSECONDS), end + round(MARGIN_AFTER * NANOSECONDS)
+    near = (series.time >= low) & (series.time <= high)
+    if not np.any(near):
+        raise InputError(
+            f"no wind sample from {iso(low)} to {iso(high)}, when the film was taken by this clock model:"
+            f" the log runs from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}",
+            where=where,
+            fix="check the start times and zones of both, or the offset",
+        )
+    return WindSeries(
+        time=series.time[near],
+        channels={channel: values[near] for channel, values in series.channels.items()},
+        flags=series.flags[near],
+        sensor=series.sensor,
+        host_time=None if series.host_time is None else series.host_time[near],
+    )
+
+
+def _write(
+    path: Path,
+    pair: Pair,
+    alignment: Alignment,
+    frames: NDArray[np.int64],
+    wind: WindSeries,
+    *,
+    progress: Progress | None,
+) -> None:
+    source, clock = pair.camera_record, alignment.clock
+    metadata: dict[str, Mapping[str, str]] = {
+        PROVENANCE: {
+            "camera": pair.camera.id,
+            "wind": pair.wind.id,
+            "recipe": canonical(alignment.recipe),
+            "recipe_hash": recipe_hash(alignment.recipe),
+            "code_version": code_version(),
+        },
+        f"{CLOCK}/{clock.device}": {"model": clock.to_json()},
+    }
+    if CAMERA in source.metadata:
+        metadata[CAMERA] = source.metadata[CAMERA]
+    device = source.device_frame_times
+    with RecordWriter(path, metadata=metadata) as record:
+        for first in range(0, len(device), _FRAMES_AT_ONCE):
+            count = min(_FRAMES_AT_ONCE, len(device) - first)
+            exposed = clock.to_common(source.timestamps(first, count))
+            for index in range(first, first + count):
+                record.frame(
+                    log_time=int(frames[index]),
+                    publish_time=int(device[index]),
+                    timestamp=int(exposed[index - first]),
+                    image=source.jpeg(index),
+                )
+                if progress:
+                    progress(1)
+        record.wind(wind)
+        if alignment.curve is not None:
+            record.attach(CURVE, alignment.curve, media_type="application/json", log_time=int(frames[0]))
+        for name in pair.wind_record.attachments:
+            media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
+            record.attach(name, pair.wind_record.attachment(name), media_type=media_type, log_time=int(wind.time[0]))
+
+
+def _artifact(
+    pair: Pair, alignment: Alignment, frames: NDArray[np.int64], *, stored: str, name: str | None, session: str | None
+) -> Artifact:
+    clock = alignment.clock
+    device = pair.camera_record.device_frame_times
+    middle = int(device[0] + (device[-1] - device[0]) // 2)
+    start, end = int(frames[0]), int(frames[-1])
+    own = quality_flags(alignment.findings)
+    report = {
+        "schema": REPORT_SCHEMA,
+        "kind": Kind.RECORDING.value,
+        "frames": len(frames),
+        "start": iso(start),
+        "end": iso(end),
+        **alignment.details,
+        "findings": [finding.as_dict() for finding in alignment.findings],
+    }
+    return Artifact(
+        kind=Kind.RECORDING,
+        name=name or pair.camera.name,
+        object=stored,
+        parents=(pair.camera.id, pair.wind.id),
+        recipe=alignment.recipe,
+        session=session,
+        day=iso(start)[:10],
+        start=start,
+        end=end,
+        frame_count=len(frames),
+        rate=(len(frames) - 1) * NANOSECONDS / (end - start) if len(frames) > 1 else None,
+        clock_method=clock.method,
+        clock_offset=float(clock.to_common(middle) - middle) / NANOSECONDS,
+        clock_drift=clock.segments[0].drift,
+        clock_sigma=float(clock.sigma(middle)),
+        clock_model=clock.to_json(),
+        quality=sorted({*pair.camera.quality, *pair.wind.quality, *own}),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )
+
+
+def _clips_of(lake: Lake, recording: Artifact, branch: str) -> tuple[str, ...]:
+    rows = lake.rows(f"kind = 'clip' and recording = '{recording.id}'", at=branch, columns=["artifact"])
+    return tuple(rows["artifact"].to_pylist())
+
+
+def parents_of(lake: Lake, recording: str, *, at: str | None = None) -> tuple[Artifact, Sequence[str]]:
+    """A recording by id or unique prefix, and its camera's and wind's ids.
+
+    Raises:
+        UsageError: it is no recording of a camera and an anemometer.
+    """
+    artifact = lake.artifact(recording, at=at)
+    if artifact.kind is not Kind.RECORDING or len(artifact.parents) < 2:
+        raise UsageError(
+            f"{artifact.name!r} is a {artifact.kind} with {len(artifact.parents)} parents, not an aligned recording",
+            where=artifact.id,
+            fix="name a recording that flagdata align made; see flagdata ls --kind recording",
+        )
+    return artifact, artifact.parents[:2]

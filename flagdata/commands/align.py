@@ -1,0 +1,211 @@
+"""`flagdata align` and `flagdata realign`: a camera and an anemometer on one clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from flagdata.console import document, json_option, lake_option, progress, say
+
+if TYPE_CHECKING:
+    from flagdata.align.methods import ClockOptions, Outcome
+    from flagdata.align.recording import Pair, RecordingResult
+    from flagdata.lake import Lake
+
+F = TypeVar("F", bound=Callable[..., Any])
+_SHORT = 12  # characters of an identity
+
+
+def _clock_options(command: F) -> F:
+    """The options that both commands share."""
+    for option in reversed(
+        (
+            click.option(
+                "--by", type=click.Choice(["stamps", "given", "estimate"]), default="estimate", show_default=True,
+                help="Trust the stamps, take --offset, or estimate it from the flag's motion.",
+            ),
+            click.option("--offset", type=float, metavar="S", help="Seconds added to the camera's clock (--by given)."),
+            click.option(
+                "--offset-sigma", type=float, metavar="S",
+                help="Its standard uncertainty; by stamps: how well the clocks are known to agree.",
+            ),
+            click.option(
+                "--centre", type=float, metavar="S", help="Offset around which to search; 0 if the stamps are near."
+            ),
+            click.option("--window", type=float, metavar="S", help="Search this far either side; 120 by default."),
+            click.option(
+                "--response", type=float, metavar="S",
+                help="By how much the flag's motion follows the wind at the anemometer; 0.4 by default.",
+            ),
+            click.option("--response-sigma", type=float, metavar="S", help="Its uncertainty; 0.15 by default."),
+            click.option(
+                "--max-sigma", type=float, metavar="S", help="Refuse an estimate less certain; 0.5 by default."
+            ),
+            click.option("--name", help="What to call the recording; the camera's name by default."),
+            click.option("--session", help="One set-up at one place, for splits; the parents' by default."),
+            click.option("--branch", default="main", show_default=True, help="Branch to commit on."),
+            click.option("--dry-run", is_flag=True, help="Find the clock model, commit nothing."),
+            click.option(
+                "--plot", metavar="FILE", type=click.Path(path_type=Path, dir_okay=False),
+                help="Picture of motion, wind and the search (--by estimate), drawn even when it is refused.",
+            ),
+            json_option,
+            lake_option,
+        )
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("camera")
+@click.argument("wind")
+@_clock_options
+def align(
+    camera: str, wind: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
+    window: float | None, response: float | None, response_sigma: float | None, max_sigma: float | None,
+    name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None, as_json: bool, lake_path: str,
+) -> None:  # fmt: skip
+    """Put the artifacts CAMERA and WIND on one clock: a recording and its clips, in one commit.
+
+    An estimate that is not certain is refused (exit 3) and nothing is committed.
+    """
+    from flagdata.align.recording import Pair
+    from flagdata.lake import Lake
+
+    options = _options(by, offset, offset_sigma, centre, window, response, response_sigma, max_sigma)
+    lake = Lake.open(lake_path)
+    pair = Pair.of(lake, camera, wind, at=branch)
+    _run(
+        lake, pair, options, recipe=options.recipe(), name=name, session=session, branch=branch, dry_run=dry_run,
+        plot=plot, as_json=as_json,
+    )  # fmt: skip
+
+
+@click.command()
+@click.argument("recording")
+@_clock_options
+def realign(
+    recording: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
+    window: float | None, response: float | None, response_sigma: float | None, max_sigma: float | None,
+    name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None, as_json: bool, lake_path: str,
+) -> None:  # fmt: skip
+    """Write RECORDING anew with another clock model, from the same camera and wind artifacts.
+
+    The old recording and its clips stay until `flagdata withdraw` takes them off the branch; tags keep them.
+    """
+    from flagdata.align.recording import Pair, parents_of
+    from flagdata.lake import Lake
+
+    options = _options(by, offset, offset_sigma, centre, window, response, response_sigma, max_sigma)
+    lake = Lake.open(lake_path)
+    old, parents = parents_of(lake, recording, at=branch)
+    pair = Pair.of(lake, *parents, at=branch)
+    recipe = {**options.recipe(), "supersedes": old.id}
+    _run(
+        lake, pair, options, recipe=recipe, name=name or old.name, session=session or old.session, branch=branch,
+        dry_run=dry_run, plot=plot, as_json=as_json,
+    )  # fmt: skip
+    if not dry_run:
+        say(f"the recording {old.id[:_SHORT]} it supersedes is still on {branch}; flagdata withdraw takes it off")
+
+
+def _options(
+    by: str, offset: float | None, offset_sigma: float | None, centre: float | None, window: float | None,
+    response: float | None, response_sigma: float | None, max_sigma: float | None,
+) -> ClockOptions:  # fmt: skip
+    from flagdata.align.lag import LagSearch
+    from flagdata.align.methods import ClockOptions, Method
+
+    usual = LagSearch()
+    search = LagSearch(
+        centre=usual.centre if centre is None else centre,
+        window=usual.window if window is None else window,
+        response=usual.response if response is None else response,
+        response_sigma=usual.response_sigma if response_sigma is None else response_sigma,
+        sigma=usual.sigma if max_sigma is None else max_sigma,
+    )
+    return ClockOptions(
+        by=Method(by), offset=offset, offset_sigma=offset_sigma, search=None if search == usual else search
+    )
+
+
+def _run(
+    lake: Lake, pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], name: str | None, session: str | None,
+    branch: str, dry_run: bool, plot: Path | None, as_json: bool,
+) -> None:  # fmt: skip
+    from flagdata.align.recording import find_recording, make_recording, session_of
+
+    session_of(pair, named=session)  # refused before the long part
+    present = None if dry_run or plot else find_recording(lake, pair, recipe, branch=branch)
+    if present is not None:
+        say("this recording is there already; nothing was written")
+        _report(present, None, as_json=as_json)
+        return
+    outcome = _outcome(pair, options, recipe=recipe, plot=plot)
+    if dry_run:
+        _report(None, outcome, as_json=as_json)
+        return
+    frames = pair.camera_record.frame_count
+    with progress(frames, label="copying", unit="frame") as advance:
+        made = make_recording(
+            lake, pair, outcome.alignment, name=name, session=session, branch=branch, progress=advance
+        )
+    _report(made, outcome, as_json=as_json)
+
+
+def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:
+    from flagdata.align.methods import Method, declared, estimated, evidence
+    from flagdata.errors import UsageError
+
+    if options.by is not Method.ESTIMATE:
+        if plot is not None:
+            raise UsageError(f"alignment by {options.by} has no search to draw", where="--plot", fix="leave it out")
+        return declared(pair, options, recipe=recipe)
+    with progress(pair.camera_record.frame_count, label="motion", unit="frame") as advance:
+        found = evidence(pair, options, progress=advance)
+    if plot is not None:
+        from flagdata.align.plot import draw
+
+        draw(found, plot, title=f"{pair.camera.name} and {pair.wind.name}")
+        say(f"plot: {plot}")
+    return estimated(pair, found, recipe=recipe)
+
+
+def _report(made: RecordingResult | None, outcome: Outcome | None, *, as_json: bool) -> None:
+    """The clock model, and the recording if one was made or found."""
+    if as_json:
+        content: dict[str, Any] = {"recording": None, "clips": [], "created": False}
+        if made is not None:
+            content = {"recording": made.recording.id, "clips": list(made.clips), "created": made.created}
+        if outcome is not None:
+            content["clock"] = dict(outcome.alignment.details)
+        document("align", content)
+        return
+    if outcome is not None:
+        click.echo(_sentence(outcome))
+    if made is not None:
+        click.echo(f"recording {made.recording.id}, {len(made.clips)} clips")
+
+
+def _sentence(outcome: Outcome) -> str:
+    """`offset +12.31 s [12.02, 12.60] 90 %, confidence 0.99, n = 596 bins of 1 s`."""
+    if outcome.evidence is not None:
+        found, period = outcome.evidence.estimate, outcome.evidence.wind.period
+        low, high = found.interval
+        return (
+            f"offset {found.offset:+.2f} s [{low:.2f}, {high:.2f}] 90 %, confidence {found.confidence:.2f},"
+            f" n = {found.bins} bins of {period:g} s"
+        )
+    segment = outcome.alignment.clock.segments[0]
+    half = 1.645 * segment.sigma_offset
+    digits = max(2, 1 - math.floor(math.log10(segment.sigma_offset)))
+    low, high = segment.offset - half, segment.offset + half
+    return (
+        f"offset {segment.offset:+.{digits}f} s [{low:.{digits}f}, {high:.{digits}f}] 90 %,"
+        f" {outcome.alignment.clock.method}"
+    )
