@@ -69,6 +69,8 @@ def export(
         return
     files = manifest["files"]
     size = sum(file["bytes"] for file in files)
+    if manifest["superseded"]:
+        say(f"left out: {len(manifest['superseded'])} recordings that a later alignment of the same files replaces")
     noun = "artifact" if manifest["artifacts"] == 1 else "artifacts"
     say(f"{manifest['artifacts']:,} {noun} of version {manifest['version']} in {len(files):,} files, {size:,} B")
     click.echo(target)

@@ -228,7 +228,9 @@ def _unit(field: pa.Field) -> str:
 
 
 def _cell(value: Any, *, short: bool) -> str | None:
-    """A cell for people: floats to 4 digits, lists by commas, identities cut in the default views only."""
+    """A cell for people: floats to 4 digits, times to milliseconds, lists by commas, identities cut if `short`."""
+    if isinstance(value, datetime):
+        return value.isoformat(timespec="milliseconds").replace("+00:00", "Z")
     value = plain(value)
     if isinstance(value, float):
         return f"{value:.4g}"

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.dataset.lineage import superseded
 from flagdata.dataset.resolve import clips_on_side
 from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
@@ -112,6 +113,7 @@ def export(
     rows = Selection(catalog, Request(where=request.where)).table()
     if request.split is not None:
         rows = _on_side(catalog, rows, request.split, salt=request.salt)
+    rows, replaced = _current(catalog, rows)
     _check_kinds(rows, request.format, exporter.kinds)
     if not rows.num_rows:
         given = {"where": request.where, "split": request.split, "version": str(version)}
@@ -132,6 +134,7 @@ def export(
                 "code_version": code_version(),
                 "format_version": FORMAT_VERSION,
                 "artifacts": rows.num_rows,
+                "superseded": replaced,
                 "artifacts_hash": digest("\n".join(sorted(rows["artifact"].to_pylist()))),
                 "kinds": dict(sorted(Counter(rows["kind"].to_pylist()).items())),
                 **content,
@@ -149,8 +152,20 @@ def _on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.
     return rows.filter(_is_one_of({*clips, *of_clips}))
 
 
-def _is_one_of(artifacts: set[str]) -> pc.Expression:
-    return pc.field("artifact").isin(pa.array(sorted(artifacts), pa.string()))
+def _current(catalog: pa.Table, rows: pa.Table) -> tuple[pa.Table, dict[str, str]]:
+    """The rows without recordings that another among them replaces, and without the clips of those: two alignments of
+    one camera and wind log would hold every picture twice. Also: recording left out → the later one."""
+    recordings = rows.filter(pc.field("kind") == Kind.RECORDING.value)["artifact"].to_pylist()
+    replaced = superseded(catalog, {*recordings, *rows["recording"].drop_null().to_pylist()})
+    if not replaced:
+        return rows, {}
+    old = set(replaced)
+    kept = ~_is_one_of(old) & (pc.field("recording").is_null() | ~_is_one_of(old, column="recording"))
+    return rows.filter(kept), dict(sorted(replaced.items()))
+
+
+def _is_one_of(artifacts: set[str], *, column: str = "artifact") -> pc.Expression:
+    return pc.field(column).isin(pa.array(sorted(artifacts), pa.string()))
 
 
 def _check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:

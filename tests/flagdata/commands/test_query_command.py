@@ -65,7 +65,7 @@ def test_people_see_a_table_with_units_and_the_columns_of_that_kind(run: Run) ->
     assert "duration" not in header  # a clip's length is its frames
     assert len(rows) == 2
     assert "4.25" in rows[0]
-    assert "2026-05-01T12:00:00Z" in rows[0]
+    assert "2026-05-01T12:00:00.000Z" in rows[0]
 
 
 def test_a_cut_table_says_how_much_there_is(run: Run) -> None:

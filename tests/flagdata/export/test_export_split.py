@@ -106,3 +106,27 @@ def test_an_empty_side_is_an_error_that_names_it(tmp_path: Path) -> None:
     for side in set(SIDES) - set(filled):
         with pytest.raises(NotFoundError, match=side):
             export(lake, Export(format="parquet", where="kind = 'clip'", split=side), tmp_path / "out")
+
+
+def test_of_two_alignments_of_one_camera_and_wind_log_the_later_is_exported(tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    aligned: list[Artifact] = []
+    for offset in (0.0, 1.5):
+        with lake.transaction(f"aligned with {offset} s") as tx:
+            camera = Artifact(kind=Kind.CAMERA, name="camera", source_hash="c" * 64)
+            wind = Artifact(kind=Kind.WIND, name="wind", source_hash="d" * 64)
+            tx.add(camera)
+            tx.add(wind)
+            recording = Artifact(
+                kind=Kind.RECORDING, name="pier", parents=(camera.id, wind.id), recipe={"offset": offset}
+            )
+            clip = Artifact(kind=Kind.CLIP, name="pier 0", parents=(recording.id,), recording=recording.id)
+            tx.add(recording)
+            tx.add(clip)
+            aligned.append(clip)
+    both = export(lake, Export(format="parquet", where="kind = 'clip'"), tmp_path / "both")
+    assert pl.read_parquet(tmp_path / "both" / "rows" / "*.parquet")["artifact"].to_list() == [aligned[1].id]
+    assert both.manifest["superseded"] == {aligned[0].recording: aligned[1].recording}
+    named = Export(format="parquet", where=f"kind = 'clip' and recording = '{aligned[0].recording}'")
+    export(lake, named, tmp_path / "old")
+    assert pl.read_parquet(tmp_path / "old" / "rows" / "*.parquet")["artifact"].to_list() == [aligned[0].id]
