@@ -35,10 +35,9 @@ class Orientation:
     @property
     def clockwise(self) -> int:
         """Degrees clockwise that turn the stored picture upright; of a mirrored one, after mirroring left-right."""
-        flip_x = self.flip_x != self.mirrored
         if self.transpose:
-            return 90 if flip_x else 270
-        return 180 if flip_x else 0
+            return 90 if self.flip_x else 270
+        return 180 if self.flip_y else 0
 
     def apply(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The upright picture of a stored one, (height, width) → (height, width) or (width, height)."""

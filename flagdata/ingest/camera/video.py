@@ -164,14 +164,15 @@ class VideoSource:
         """(stamp, frame) in order of presentation."""
         ordered = _DecodeOrderStamps(self._timing) if self._container.format.name in BY_DECODE_ORDER else None
         damaged = False
+        flagged: set[int | None] = set()
         count = 0
         for packet in packets(self._container, self._stream):
             count += 1
             stamp = packet.pts if packet.pts is not None else packet.dts
             if packet.is_corrupt:
-                self._bad(count)
+                # It is decoded all the same, since others refer to it; the frame it makes is left out.
+                flagged.add(stamp)
                 damaged = True
-                continue
             try:
                 if ordered is not None:
                     ordered.sent(stamp)
@@ -186,7 +187,7 @@ class VideoSource:
                 own = frame.pts if frame.pts is not None else frame.dts
                 shown = ordered.shown(own) if ordered is not None else own
                 damaged = damaged and not frame.key_frame
-                if frame.is_corrupt:
+                if frame.is_corrupt or (flagged and own in flagged):
                     self._corrupt_frames += 1
                     continue
                 self._suspect_frames += damaged
