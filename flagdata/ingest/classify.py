@@ -17,7 +17,9 @@ def guesses(path: Path) -> tuple[Guess, ...]:
 
     Raises:
         NotFoundError: there is no such source.
+        InputError: it is empty, or a pipe or device, which has no content to go by.
     """
+    _check_plain(path)
     found = sniff(path)
     if found[0].kind != "other":
         return found
@@ -40,6 +42,7 @@ def classify(path: Path, *, format_name: str | None = None, recipe: str | None =
         UnknownNameError: no such format.
         NotFoundError: there is no such source.
     """
+    _check_plain(path)
     if format_name == CAMERA:
         return Guess(format="video", score=1.0, reasons=("it was said to be a camera's",), kind="camera")
     if format_name is not None:
@@ -56,6 +59,11 @@ def classify(path: Path, *, format_name: str | None = None, recipe: str | None =
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )
+
+
+def _check_plain(path: Path) -> None:
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError("a pipe or device, not a file", where=str(path), fix="write what it gives to a file first")
 
 
 def _probe(path: Path) -> CameraProbe | None:

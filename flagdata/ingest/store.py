@@ -135,7 +135,7 @@ def ingest_camera(
     present = _find(lake, Kind.CAMERA, source, recipe, branch=branch)
     if present is not None:
         return present
-    with lake.transaction(f"ingest camera {path.name}", branch=branch) as transaction:
+    with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         times = _Times()
         with open_camera(path, options.camera) as stream:
@@ -186,12 +186,12 @@ def ingest_wind(
     log = read_log(path, options.wind)
     time = log.series.time
     findings = log.findings
-    with lake.transaction(f"ingest wind {path.name}", branch=branch) as transaction:
+    with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
             record.wind(log.series)
             if path.stat().st_size <= ATTACHMENT_LIMIT:
-                record.attach(path.name, path.read_bytes(), media_type="text/plain", log_time=int(time[0]))
+                record.attach(source.name, path.read_bytes(), media_type="text/plain", log_time=int(time[0]))
             else:
                 findings = (*findings, _not_attached(path))
             if options.wind.recipe is not None:
@@ -233,11 +233,20 @@ class _Source:
     hash: str
     state: tuple[tuple[str, int, int], ...]
 
+    @property
+    def name(self) -> str:
+        """The file's name as text; bytes that are no UTF-8 are shown as \\xNN."""
+        return os.fsencode(self.path.name).decode("utf-8", "backslashreplace")
+
+    @property
+    def stem(self) -> str:
+        return Path(self.name).stem
+
     @classmethod
     def of(cls, path: Path) -> _Source:
         before = _state(path)
         if path.is_dir():
-            parts = [f"{name}\0{file_hash(path / name)}" for name, _, _ in before]
+            parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
             return cls(path=path, hash=digest("\n".join(parts)), state=before)
         try:
             return cls(path=path, hash=file_hash(path), state=before)
@@ -252,7 +261,7 @@ class _Source:
 
     def provenance(self, recipe: Mapping[str, Any]) -> dict[str, str]:
         return {
-            "source_name": self.path.name,
+            "source_name": self.name,
             "source_hash": self.hash,
             "recipe": canonical(recipe),
             "recipe_hash": recipe_hash(recipe),
@@ -321,10 +330,10 @@ def _artifact(
 ) -> Artifact:
     return Artifact(
         kind=kind,
-        name=labels.name or source.path.stem or source.path.name,
+        name=labels.name or source.stem,
         object=stored,
         source_hash=source.hash,
-        source_name=source.path.name,
+        source_name=source.name,
         recipe=recipe,
         session=labels.session,
         day=iso(start)[:10],

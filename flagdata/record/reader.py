@@ -23,6 +23,8 @@ from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX, Coding, encode
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindAverage, WindSeries
 
+FRAME_PIXELS = 1 << 26
+"""No frame of a record is larger [px]; a header that says so is damaged."""
 SPAN_SLACK = 256 << 10
 """Bytes of other topics that one read of neighbouring frames may take along."""
 _CODINGS: dict[Coding, Any] = {Coding.JPEG: messages.CompressedImage, Coding.H264: messages.CompressedVideo}
@@ -125,6 +127,8 @@ class Record:
         where = str(self.path)
         try:
             height, width, _, _ = simplejpeg.decode_jpeg_header(pictures[0])
+            if int(height) * int(width) > FRAME_PIXELS:
+                raise CorruptError(f"frame {first} claims {width}×{height} pixels", where=where, fix=_VERIFY)
             out = np.empty((count, int(height), int(width), 1), dtype=np.uint8)
             for i, picture in enumerate(pictures):
                 decoded = simplejpeg.decode_jpeg(picture, colorspace="GRAY", buffer=out[i])
