@@ -256,6 +256,8 @@ class Catalog:
         except CommitFailedError:
             path.unlink()
             raise Moved from None
+        except DeltaError as error:
+            raise OSError(str(error)) from error
         self._flush_log(version)
 
     def _checkpoint(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -55,16 +56,22 @@ def disk_errors(doing: str, where: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        fixes = {
-            errno.ENOSPC: "free some space, or move the lake to a larger disk",
-            errno.EDQUOT: "free some space, or ask for a larger quota",
-            errno.EFBIG: "raise the file size limit (ulimit -f)",
-            errno.EACCES: "give yourself write permission on the lake's folder",
-            errno.EPERM: "give yourself write permission on the lake's folder",
-            errno.EROFS: "mount the disk writable",
-        }
+        text = " ".join(_COLOUR.sub("", error.strerror or str(error)).split())
+        number = error.errno or (int(found[1]) if (found := _NUMBER.search(text)) else 0)
         raise FlagdataError(
-            f"{doing} failed: {error.strerror or error}",
+            f"{doing} failed: {text}",
             where=str(error.filename or where),
-            fix=fixes.get(error.errno or 0, "check the disk that holds the lake") + "; the lake is unchanged",
+            fix=f"{_FIXES.get(number, 'check the disk that holds the lake')}, then do it again",
         ) from error
+
+
+_COLOUR = re.compile(r"\x1b\[\d+m")
+_NUMBER = re.compile(r"\(os error (\d+)\)")  # as the Delta library writes it
+_FIXES = {
+    errno.ENOSPC: "free some space, or move the lake to a larger disk",
+    errno.EDQUOT: "free some space, or ask for a larger quota",
+    errno.EFBIG: "raise the file size limit (ulimit -f)",
+    errno.EACCES: "give yourself write permission on the lake's folder",
+    errno.EPERM: "give yourself write permission on the lake's folder",
+    errno.EROFS: "mount the disk writable",
+}

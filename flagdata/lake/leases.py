@@ -114,6 +114,7 @@ def _try_lock(descriptor: int) -> bool:
 @contextmanager
 def _locked(path: Path, mode: int) -> Iterator[None]:
     if not path.exists():
+        path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
         path.touch()
     with path.open() as file:
         fcntl.flock(file, mode)

@@ -1,0 +1,256 @@
+"""Full disks, forbidden folders and bad names: a clear error, and a lake that is whole."""
+
+from __future__ import annotations
+
+import errno
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
+from flagdata.findings import Severity
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.collect import collect
+from flagdata.lake.health import doctor
+from flagdata.schema import Kind
+
+NOW = timedelta(0)
+Put = Callable[..., Artifact]
+
+# A process that may not write more than so many bytes to one file: the kernel refuses, as a full disk does.
+_LIMITED = """
+import resource, sys
+from flagdata.errors import FlagdataError
+from flagdata.lake import Artifact, Lake
+lake = Lake.open(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
+source = open(sys.argv[3], "rb")
+try:
+    with lake.transaction("too large") as tx:
+        import pathlib
+        tx.add(Artifact(kind="wind", name="x", object=tx.put(pathlib.Path(sys.argv[3]))))
+except FlagdataError as error:
+    print(error.as_dict()["what"], "|", error.fix)
+"""
+
+
+@pytest.mark.parametrize(("limit", "doing"), [(50_000, "storing an object"), (1_000, "committing")])
+def test_a_write_that_the_kernel_refuses_is_a_clear_error_and_publishes_nothing(
+    lake: Lake, put_text: Put, tmp_path: Path, limit: int, doing: str
+) -> None:
+    put_text(lake, "before")
+    source = tmp_path / "large.mcap"
+    source.write_bytes(b"x" * (100_000 if doing == "storing an object" else 500))
+    command = [sys.executable, "-c", _LIMITED, str(lake.path), str(limit), str(source)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert ended.stdout.startswith(f"{doing} failed: ")
+    assert "ulimit" in ended.stdout
+    assert lake.rows()["name"].to_pylist() == ["before"]
+    collect(lake, grace=NOW)
+    assert doctor(lake, grace=NOW) == ()
+
+
+def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_succeeds(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_text(lake, "before")
+    flush = os.fsync
+    for step in range(100):
+        calls = 0
+
+        def full(descriptor: int, step: int = step) -> None:
+            nonlocal calls
+            calls += 1
+            if calls > step:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            flush(descriptor)
+
+        monkeypatch.setattr(os, "fsync", full)
+        fix = ""
+        try:
+            put_text(lake, f"step {step}")
+        except FlagdataError as error:
+            fix = error.fix
+        finally:
+            monkeypatch.setattr(os, "fsync", flush)
+        if not fix:
+            break
+        assert "free some space" in fix
+        assert [f for f in doctor(lake, grace=NOW) if f.severity is Severity.ERROR] == []
+        put_text(lake, f"step {step}")
+    assert step >= 5  # object, its folder, rows, their folder, log entry, its folder
+    collect(lake, grace=NOW)
+    assert doctor(lake, grace=NOW) == ()
+    assert lake.rows()["name"].to_pylist() == ["before", *(f"step {i}" for i in range(step + 1))]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_may_not_be_written_is_a_clear_error(lake: Lake, put_text: Put) -> None:
+    store = lake.path / "mcap"
+    store.chmod(0o555)
+    try:
+        with pytest.raises(FlagdataError, match="write permission"):
+            put_text(lake, "a")
+    finally:
+        store.chmod(0o755)
+    assert lake.rows().num_rows == 0
+    assert doctor(lake, grace=NOW) == ()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../lake.json",
+        "mcap/../lake.json",
+        "/etc/passwd",
+        "mcap/" + "0" * 63,
+        "mcap/" + "G" * 64,
+        "mcap/" + "0" * 64 + "\n",
+        "blob/" + "0" * 64,
+        "",
+    ],
+)
+def test_object_names_cannot_reach_out_of_the_stores(lake: Lake, name: str) -> None:
+    with pytest.raises(InputError):
+        lake.object_path(name)
+    with pytest.raises(InputError):
+        Artifact(kind=Kind.WIND, name="x", object=name)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", ".", "..", "../v1", "a/b", "a\\b", "-v", ".v", "v 1", "v1\n", "é", "a" * 101, "17", "v1.json", "c" + "0" * 16],
+)
+def test_names_that_are_paths_versions_or_commits_are_refused_for_tags_and_branches(lake: Lake, name: str) -> None:
+    before = sorted((lake.path / "refs").rglob("*"))
+    with pytest.raises(UsageError):
+        lake.tag(name)
+    with pytest.raises(UsageError):
+        lake.branch(name)
+    assert sorted((lake.path / "refs").rglob("*")) == before
+
+
+def test_a_name_is_a_tag_or_a_branch_but_not_both_and_main_is_taken(lake: Lake) -> None:
+    lake.tag("one")
+    lake.branch("two")
+    for name in ("one", "two", "main"):
+        with pytest.raises(ConflictError):
+            lake.tag(name)
+        with pytest.raises(ConflictError):
+            lake.branch(name)
+
+
+def test_links_and_foreign_files_are_no_objects(lake: Lake, tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("secret")
+    folder = tmp_path / "with-link.zarr"
+    folder.mkdir()
+    (folder / "zarr.json").write_text("{}")
+    (folder / "link").symlink_to(tmp_path / "secret")
+    empty = tmp_path / "empty.mcap"
+    empty.touch()
+    with lake.transaction("none of these") as tx:
+        for path in (folder, empty, tmp_path / "secret"):
+            with pytest.raises(InputError):
+                tx.put(path)
+        with pytest.raises(NotFoundError):
+            tx.put(tmp_path / "absent.mcap")
+    assert list(lake.objects) == []
+
+
+def test_a_file_from_elsewhere_is_copied_and_stays(lake: Lake, tmp_path: Path) -> None:
+    source = tmp_path / "mine.mcap"
+    source.write_text("mine")
+    with lake.transaction("copy") as tx:
+        name = tx.put(source)
+        tx.add(Artifact(kind=Kind.WIND, name="mine", object=name))
+    assert source.read_text() == "mine"
+    assert lake.object_path(name).read_text() == "mine"
+
+
+def test_a_child_without_its_parent_is_refused(lake: Lake) -> None:
+    with lake.transaction("orphan") as tx, pytest.raises(NotFoundError, match="parent"):
+        tx.add(Artifact(kind=Kind.CLIP, name="clip", parents=("0" * 32,)))
+    assert lake.rows().num_rows == 0
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("kind", "flag"),
+        ("name", " "),
+        ("parents", ("abc",)),
+        ("source_hash", "abc"),
+        ("frame_count", -1),
+        ("wind", float("nan")),
+        ("parameters", "{"),
+        ("report", "not json"),
+    ],
+)
+def test_a_malformed_value_is_refused_by_its_column(column: str, value: object) -> None:
+    arguments: dict[str, object] = {"kind": Kind.WIND, "name": "x", column: value}
+    with pytest.raises(InputError, match=column):
+        Artifact(**arguments)
+
+
+def test_a_lake_is_not_made_where_something_is(lake: Lake, tmp_path: Path) -> None:
+    with pytest.raises(ConflictError, match="a lake"):
+        Lake.create(lake.path)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "file").touch()
+    with pytest.raises(ConflictError, match="something else"):
+        Lake.create(tmp_path / "other")
+    with pytest.raises(ConflictError):
+        Lake.create(tmp_path / "other" / "file")
+
+
+def test_a_folder_without_a_lake_is_told_with_the_fix(tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match="flagdata init"):
+        Lake.open(tmp_path)
+
+
+def test_a_damaged_checkpoint_is_told_and_the_fix_that_is_named_works(lake: Lake, put_text: Put) -> None:
+    for i in range(40):
+        put_text(lake, str(i))
+    log = lake.path / "catalog" / "_delta_log"
+    checkpoints = list(log.glob("*.checkpoint.parquet"))
+    assert checkpoints
+    for path in checkpoints:
+        path.write_bytes(b"")
+    fresh = Lake.open(lake.path)
+    with pytest.raises(CorruptError, match="delete _last_checkpoint"):
+        fresh.rows()
+    assert "ref-unreadable" in {f.kind for f in doctor(fresh)}
+    for path in (*checkpoints, log / "_last_checkpoint"):
+        path.unlink()
+    assert Lake.open(lake.path).rows().num_rows == 40
+
+
+def test_a_lake_travels_by_pickle(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    lake.rows()
+    assert pickle.loads(pickle.dumps(lake)).rows()["name"].to_pylist() == ["a"]
+
+
+def _rows_in_child(lake: Lake, queue: multiprocessing.SimpleQueue) -> None:
+    try:
+        lake.rows()
+    except FlagdataError as error:
+        queue.put(error.what)
+
+
+def test_the_catalog_refuses_to_work_in_a_forked_child(lake: Lake) -> None:
+    lake.rows()
+    context = multiprocessing.get_context("fork")
+    queue = context.SimpleQueue()
+    child = context.Process(target=_rows_in_child, args=(lake, queue))
+    child.start()
+    child.join(timeout=60)
+    assert child.exitcode == 0
+    assert "before this process was forked" in queue.get()
