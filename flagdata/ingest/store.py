@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.compute as pc
 
 from flagdata.errors import ConflictError, InputError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
@@ -306,8 +307,12 @@ class _Times:
 
 def _find(lake: Lake, kind: Kind, source: _Source, recipe: Mapping[str, Any], *, branch: str) -> IngestResult | None:
     """The artifact that this ingest would make, if it is on the branch."""
-    where = f"kind = '{kind.value}' and source_hash = '{source.hash}' and recipe_hash = '{recipe_hash(recipe)}'"
-    rows = lake.rows(where, at=branch).to_pylist()
+    same = (
+        (pc.field("kind") == kind.value)
+        & (pc.field("source_hash") == source.hash)
+        & (pc.field("recipe_hash") == recipe_hash(recipe))
+    )
+    rows = lake.rows(at=branch).filter(same).to_pylist()
     if not rows:
         return None
     artifact = Artifact.from_row(rows[0])
