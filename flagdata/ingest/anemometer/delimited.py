@@ -201,7 +201,8 @@ def read_table(
     for name, column in columns.items():
         layout = recipe.channels[name]
         state = column.state()
-        refuse_if_most(int((state == Cell.UNREADABLE).sum()), len(line), f"unreadable values of {name}", where)
+        unreadable = int((state == Cell.UNREADABLE).sum())
+        refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         channels[name] = calibrated(column.value(), name, layout)
         channel_flags, found = cell_flags(name, layout, channels[name], state, line)
         findings.extend(found)

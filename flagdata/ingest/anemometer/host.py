@@ -20,6 +20,7 @@ from flagdata.ingest.anemometer.source import TextFile
 
 _FIELD = r"[ \t]*(?:[+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?[nN][aA][nN]|[+-]?[iI][nN][fF]|-{2,}|)[ \t]*"
 _STAMP = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}|^\d{10}(?:\.\d+)?(?=[,;\t])")
+_RAW = re.compile(r"raw|line|message|payload|sentence|serial", re.IGNORECASE)
 LEAST = 0.05
 """Share of lines that must be data: devices print menus and counters, but a log of nothing else is no log."""
 
@@ -32,22 +33,33 @@ class HostStamped:
     uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """The recipe whose fields most lines after the stamp have, within its ranges."""
+        """The recipe whose fields most lines after the stamp have, within its ranges.
+
+        Sure only below a header that speaks of raw lines: any table may have two columns, and its unit is not known.
+        """
         lines = [line for line in head.lines if _STAMP.match(line)]
         if len(lines) < max(1, len(head.lines) // 2):
             return None
+        headed = not _STAMP.match(head.lines[0])
+        if headed and not _RAW.search(head.lines[0].partition(",")[2]):
+            return None
         best: Guess | None = None
+        most = 0.0
         for name in recipes.names():
             recipe = recipes.load(name)
             if not recipe.file.host:
                 continue
             share = sum(_in_range(recipe, line) for line in lines) / len(lines)
-            if share > LEAST and (best is None or share > best.score):
+            if share > max(LEAST, most):
+                most = share
                 best = Guess(
                     format="host-stamped",
                     recipe=name,
-                    score=max(0.55, min(0.9, share)),
+                    score=max(0.55, min(0.9, share)) if headed else 0.4,
                     reasons=(
+                        f"line 1 names a raw line: {head.lines[0]!r}"
+                        if headed
+                        else "no header says what the lines are",
                         f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
                         f"{share:.0%} of them go on with the fields of recipe {name}",
                     ),

@@ -168,9 +168,13 @@ def _settle(path: Path, codec: str | None) -> tuple[str, tuple[Finding, ...]]:
     """The codec that decodes the whole file."""
     where = str(path)
     try:
-        decoder = codecs.getincrementaldecoder(codec or "utf-8")()
+        info = codecs.lookup(codec or "utf-8")
+        text = getattr(info, "_is_text_encoding", True)  # what open() itself looks at
     except LookupError:
         raise InputError(f"no encoding {codec!r}", where=where, fix="give a Python codec name such as cp1252") from None
+    if not text or info.incrementaldecoder is None:
+        raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252")
+    decoder = info.incrementaldecoder()
     done = 0
     with path.open("rb") as stream:
         try:
@@ -179,19 +183,19 @@ def _settle(path: Path, codec: str | None) -> tuple[str, tuple[Finding, ...]]:
                 done += chunk.count(b"\n")
             decoder.decode(b"", final=True)
         except UnicodeError as error:
+            if isinstance(error, UnicodeDecodeError):
+                done += error.object[: error.start].count(b"\n")
             if codec is not None:
                 raise InputError(
                     f"not valid {codec}: {error.__class__.__name__}",
-                    where=f"{where}, after line {done}", fix="name the encoding it is in, e.g. cp1252",
+                    where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. cp1252",
                 ) from None  # fmt: skip
             return "latin-1", (
                 Finding(
-                    kind="encoding-assumed", severity=Severity.WARNING, where=f"after line {done}",
+                    kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
                     what="not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
                 ),
             )  # fmt: skip
-        except (TypeError, AttributeError):
-            raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252") from None
     return codec or "utf-8", ()
 
 
@@ -201,7 +205,7 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
     In `wide` encodings (2 or 4 bytes a character) the limits hold all the same, but bytes say nothing on line ends.
     """
     where = str(path)
-    unix = windows = mac = nul = lines = tail = 0
+    unix = windows = mac = nul = lines = tail = before = 0
     last = b""
     with path.open("rb") as stream:
         while chunk := stream.read(_CHUNK):
@@ -219,10 +223,13 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
                     f"more than {limits.rows} lines", where=where, fix="split the file, or raise the rows limit"
                 )
             if int(spans.max()) > limits.line:
+                at = int(np.append(ends, len(data))[int(np.argmax(spans))])
+                number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
                 raise LimitError(
-                    f"a line longer than {limits.line} bytes", where=f"{where}, near line {lines}",
+                    f"a line longer than {limits.line} bytes", where=f"{where}, line {number}",
                     fix="check that this is the log, or raise the line limit",
                 )  # fmt: skip
+            before = lines
             last = chunk[-1:]
     found: list[Finding] = []
     kinds = {"LF": unix, "CR LF": windows, "CR": mac}

@@ -1,0 +1,85 @@
+"""Small logs of every format, written by the tests themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.schema import SampleFlag
+from flagdata.signals import WindLog
+
+Reader = Callable[..., WindLog]
+
+
+@pytest.fixture
+def log_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
+    """Writes text or bytes to a file and returns its path."""
+
+    def write(content: str | bytes, name: str = "wind.log") -> Path:
+        path = tmp_path / name
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def read(log_file: Callable[[str | bytes], Path]) -> Reader:
+    """Reads text or bytes as a log."""
+
+    def run(content: str | bytes, **options: object) -> WindLog:
+        return read_log(log_file(content), WindOptions(**options))  # type: ignore[arg-type]
+
+    return run
+
+
+@pytest.fixture
+def check_refused(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
+    """Checks that a log is refused: by which error, with what in its place and in its sentence or fix."""
+
+    def check(
+        content: bytes,
+        error: type[FlagdataError],
+        where: str = "",
+        says: str = "",
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        path = log_file(content)
+        with pytest.raises(FlagdataError) as caught:
+            read_log(path, WindOptions(**(options or {})))
+        assert isinstance(caught.value, error), caught.value
+        assert caught.value.fix
+        assert where in (caught.value.where or "")
+        assert says in str(caught.value)
+
+    return check
+
+
+@pytest.fixture
+def check_reported(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
+    """Checks that a log is read with a finding of this kind, count and place, and so many samples flagged."""
+
+    def check(
+        content: bytes,
+        finding: str,
+        count: int | None = None,
+        where: str | None = None,
+        flag: SampleFlag = SampleFlag.OK,
+        flagged: int = 0,
+        samples: int | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        log = read_log(log_file(content), WindOptions(**(options or {})))
+        found = [f for f in log.findings if f.kind == finding]
+        assert found, [f.kind for f in log.findings]
+        assert count in (None, found[0].count)
+        assert where in (None, found[0].where)
+        assert samples in (None, len(log.series))
+        assert int(((log.series.flags & flag) != 0).sum()) == flagged
+
+    return check

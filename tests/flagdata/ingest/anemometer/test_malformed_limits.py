@@ -1,0 +1,63 @@
+"""Files beyond the limits: an error with place and fix, or samples flagged and findings with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flagdata.errors import LimitError
+from flagdata.ingest.anemometer import Limits, read_log
+
+Check = Callable[..., None]
+
+
+def csv(*rows: str, header: str = "time,wind_speed") -> bytes:
+    return "\n".join([header, *rows, ""]).encode()
+
+
+def stamped(*values: str, start: int = 0, step: int = 1) -> bytes:
+    """Rows a second apart with these speeds."""
+    return csv(
+        *(
+            f"2026-05-01T12:{(start + step * i) // 60:02d}:{(start + step * i) % 60:02d}Z,{v}"
+            for i, v in enumerate(values)
+        )
+    )
+
+
+GOOD = [f"{3 + 0.1 * (i % 7):.1f}" for i in range(20)]
+
+ROW = "2026-05-01T12:00:00Z,3.1"
+
+REFUSED = [
+    pytest.param(
+        {"content": stamped(*GOOD), "error": LimitError, "says": "10 lines", "options": {"limits": Limits(rows=10)}},
+        id="rows",
+    ),
+    pytest.param(
+        {"content": stamped(*GOOD), "error": LimitError, "says": "100", "options": {"limits": Limits(size=100)}},
+        id="bytes",
+    ),
+    pytest.param(
+        {"content": csv(ROW + "0" * 70000), "error": LimitError, "where": "line 2", "says": "65536"}, id="line"
+    ),
+    pytest.param({"content": csv(ROW) + b"9" * 3000000, "error": LimitError, "where": "line 3"}, id="line-without-end"),
+    pytest.param({"content": b"," * 100000, "error": LimitError}, id="one-line-of-commas"),
+]
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+    check_refused(**case)
+
+
+def test_a_file_beyond_the_size_limit_is_refused_without_being_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.csv"
+    with path.open("wb") as stream:
+        stream.write(csv(ROW))
+        stream.truncate(3 * 1024**3)  # sparse: takes no space
+    with pytest.raises(LimitError, match="more than 2147483648"):
+        read_log(path)
