@@ -39,6 +39,20 @@ def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: 
     assert verify(lake, object_names(lake)) == ()
 
 
+def test_collection_beside_ingests_deletes_nothing_that_they_publish(lake: Lake, start_worker: Start) -> None:
+    workers = [start_worker(f"w{i}", count=20, shared=3) for i in range(2)]
+    collections = 0
+    while any(worker.poll() is None for worker in workers):
+        collect(lake, grace=NOW)
+        collections += 1
+    acknowledged = {identity for worker in workers for identity in finish(worker)}
+    assert collections >= 10  # the test has tested something
+    assert acknowledged == set(lake.rows()["artifact"].to_pylist())
+    assert len(acknowledged) == 2 * 20 + 3
+    assert doctor(lake, grace=NOW) == ()
+    assert verify(lake, object_names(lake)) == ()
+
+
 def test_fifty_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker: Start) -> None:
     moments = random.Random(2020)
     acknowledged: set[str] = set()

@@ -1,0 +1,183 @@
+"""The verbs on a lake: what they print, one JSON document each, and their exit codes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flagdata.cli import main
+from flagdata.lake import Artifact, Lake
+from flagdata.record import RecordWriter
+
+Put = Callable[..., Artifact]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ended:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> dict[str, Any]:
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
+    """Runs `flagdata ...` on the lake, named by its environment variable."""
+    monkeypatch.setenv("FLAGDATA_LAKE", str(lake.path))
+
+    def call(*arguments: object) -> Ended:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        code = end.value.code
+        return Ended(code=code if isinstance(code, int) else 0, out=captured.out, err=captured.err)
+
+    return call
+
+
+Run = Callable[..., Ended]
+
+
+def test_init_makes_a_lake_that_the_others_open(run: Run, tmp_path: Path) -> None:
+    made = run("init", tmp_path / "new")
+    assert (made.code, made.out) == (0, f"{tmp_path / 'new'}\n")
+    assert run("ls", "--lake", tmp_path / "new", "--json").document["artifacts"] == []
+    assert run("init", tmp_path / "new").code == 1
+    assert run("init", "--lake", tmp_path / "flagged").code == 0
+    assert run("init", tmp_path / "a", "--lake", tmp_path / "b").code == 2
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_missing_lake_is_told_in_three_lines_with_the_fix(run: Run, tmp_path: Path) -> None:
+    ended = run("ls", "--lake", tmp_path)
+    assert ended.code == 1
+    assert ended.out == ""
+    assert ended.err.splitlines() == [
+        "flagdata: there is no lake here",
+        f"  where: {tmp_path}",
+        "  fix:   make one with flagdata init, or name one by --lake",
+    ]
+    assert run("ls", "--lake", tmp_path, "--json").document["kind"] == "not-found"
+
+
+def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake: Lake, put_text: Put) -> None:
+    parent = put_text(lake, "parent")
+    child = put_text(lake, "child", parents=(parent.id,))
+    listed = run("ls")
+    assert listed.code == 0
+    assert [line.split()[:3] for line in listed.out.splitlines()[1:]] == [
+        [parent.id[:12], "wind", "parent"],
+        [child.id[:12], "wind", "child"],
+    ]
+    shown = run("show", child.id[:8], "--json").document
+    assert shown["artifact"]["artifact"] == child.id
+    assert [relative["name"] for relative in shown["parents"]] == ["parent"]
+    assert Path(shown["path"]).read_text() == "child"
+    assert f"made into       {child.id[:12]} wind child" in run("show", parent.id).out.splitlines()
+    assert run("show", "nothing").code == 1
+    assert run("ls", "--kind", "clip", "--json").document["artifacts"] == []
+    misspelt = run("ls", "--kind", "widn")
+    assert misspelt.code == 2
+    assert "did you mean 'wind'?" in misspelt.err
+
+
+def test_log_tells_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    put_text(lake, "b")
+    commits = run("log", "--json").document["commits"]
+    assert [(c["version"], c["added"], c["message"]) for c in commits] == [
+        (2, 1, "ingest b"),
+        (1, 1, "ingest a"),
+        (0, 0, "create the lake"),
+    ]
+    at_first = run("ls", "--at", commits[1]["commit"], "--json").document["artifacts"]
+    assert [artifact["name"] for artifact in at_first] == ["a"]
+    assert len(run("log", "--limit", 1).out.splitlines()) == 2
+
+
+def test_tags_and_branches_are_made_and_listed(run: Run, lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    assert run("tag", "v1").code == 0
+    put_text(lake, "b")
+    assert run("branch", "try", "--at", "v1").code == 0
+    assert run("tag", "--json").document["tags"][0]["view"] == [{"branch": "main", "version": 1}]
+    assert run("branch", "--json").document["branches"][0]["name"] == "try"
+    assert [a["name"] for a in run("ls", "--at", "try", "--json").document["artifacts"]] == ["a"]
+    assert run("tag", "v1").code == 1
+    assert run("tag", "../v2").code == 2
+    assert run("tag", "--at", "v1").code == 2
+
+
+def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put) -> None:
+    gone = put_text(lake, "gone")
+    run("tag", "v1")
+    came = put_text(lake, "came")
+    assert run("withdraw", gone.id[:10], "-m", "wrong camera").code == 0
+    assert run("diff", "v1").out.splitlines() == [
+        f"+ wind        {came.id[:12]} came",
+        f"+ object      {came.object}",
+        f"- wind        {gone.id[:12]} gone",
+        f"- object      {gone.object}",
+    ]
+    document = run("diff", "v1", "main", "--json").document
+    assert document["schema"] == "flagdata.diff/1"
+    assert [row["artifact"] for row in document["removed"]] == [gone.id]
+    assert run("diff", "v2").code == 2
+
+
+def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: Lake, put_text: Put) -> None:
+    artifact = put_text(lake, "a")
+    assert [run(verb).code for verb in ("verify", "doctor")] == [0, 0]
+    assert run("verify", "--sample", 1, "--json").document["healthy"] is True
+    assert artifact.object is not None
+    path = lake.object_path(artifact.object)
+    path.chmod(0o644)
+    path.write_text("b")
+    assert [run(*verb).code for verb in (("verify",), ("doctor",), ("doctor", "--deep"))] == [3, 0, 3]
+    document = run("verify", "--json").document
+    assert (document["schema"], document["healthy"]) == ("flagdata.verify/1", False)
+    assert document["findings"][0]["kind"] == "object-changed"
+    assert document["findings"][0]["fix"]
+    path.unlink()
+    assert "error: dangling-row" in run("doctor").out
+
+
+def test_gc_says_what_it_deletes_and_a_dry_run_deletes_nothing(run: Run, lake: Lake) -> None:
+    with lake.transaction("no row") as tx:
+        path = tx.staging(".mcap")
+        path.write_text("orphan")
+        name = tx.put(path)
+    assert run("gc").out == ""
+    assert run("gc", "--older-than", "0s", "--dry-run").out == f"{name}\n"
+    assert lake.object_path(name).exists()
+    document = run("gc", "--older-than", "0s", "--json").document
+    assert (document["deleted"], document["objects"], document["bytes"]) == (True, [name], 6)
+    assert not lake.objects.path(name).exists()
+    assert run("gc", "--older-than", "soon").code == 2
+
+
+def test_recover_salvages_a_record_that_was_cut_off(run: Run, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.mcap"
+    with RecordWriter(whole, metadata={}) as writer:
+        for i in range(200):
+            image = np.full((300, 300), i, dtype=np.uint8)
+            writer.frame(log_time=i * 40_000_000, publish_time=i, timestamp=i * 40_000_000, image=image)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    ended = run("recover", cut, tmp_path / "saved.mcap", "--json")
+    assert ended.code == 0
+    assert {"cut-off", "recovered"} <= {finding["kind"] for finding in ended.document["findings"]}
+    assert (tmp_path / "saved.mcap").stat().st_size > 0
+    assert run("recover", cut, tmp_path / "saved.mcap").code == 1
+    assert run("recover", tmp_path / "absent.mcap", tmp_path / "new.mcap").code == 1
+    assert run("recover", "mcap/" + "0" * 64, tmp_path / "new.mcap").code == 1
