@@ -46,8 +46,7 @@ def export(
       flagdata export webdataset --where "kind = 'clip'" --at v1 --split train --to shards/train
       flagdata export parquet --to catalog
     """
-    from flagdata.export import Export
-    from flagdata.export import export as run
+    from flagdata.export import Export, prepare
     from flagdata.lake import Lake
 
     if salt and split is None:
@@ -61,16 +60,23 @@ def export(
         salt=salt,
         options={name: value for name, value in given.items() if value is not None},
     )
-    with progress(None, label=f"export {format_name}", unit="artifact") as advance:
-        result = run(Lake.open(lake_path), request, target, advance=advance)
-    manifest = result.manifest
+    prepared = prepare(Lake.open(lake_path), request)
+    with progress(len(prepared), label=f"export {format_name}", unit="artifact") as advance:
+        manifest = prepared.write(target, advance=advance).manifest
     if as_json:
         document("export-result", {"folder": str(target), "manifest": manifest})
         return
     files = manifest["files"]
     size = sum(file["bytes"] for file in files)
-    if manifest["superseded"]:
-        say(f"left out: {len(manifest['superseded'])} recordings that a later alignment of the same files replaces")
-    noun = "artifact" if manifest["artifacts"] == 1 else "artifacts"
-    say(f"{manifest['artifacts']:,} {noun} of version {manifest['version']} in {len(files):,} files, {size:,} B")
+    left_out = len(manifest["superseded"])
+    if left_out:
+        say(f"left out: {_count(left_out, 'recording')} that a later alignment of the same files replaces")
+    files = manifest["files"]
+    size = sum(file["bytes"] for file in files)
+    artifacts = _count(manifest["artifacts"], "artifact")
+    say(f"{artifacts} of version {manifest['version']} in {_count(len(files), 'file')}, {size:,} B")
     click.echo(target)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 import sys
+import uuid
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 from decimal import Decimal
@@ -111,24 +111,28 @@ def write_arrow(selection: Selection, path: Path) -> int:
     Raises:
         ConflictError: the file is there already.
         InputError: its folder is not.
+        FlagdataError: no space, no permission.
     """
     import pyarrow as pa
+
+    from flagdata.lake.durable import disk_errors
 
     if path.exists():
         raise ConflictError(f"{path} exists", fix="choose another name or remove it")
     if not path.absolute().parent.is_dir():
         raise InputError("no such folder", where=str(path.parent), fix="create it first")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}.partial")
     count = 0
-    try:
-        batches = selection.batches()
-        with pa.OSFile(str(partial), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
-            for batch in batches:
-                writer.write_batch(batch)
-                count += batch.num_rows
-        partial.rename(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with disk_errors("writing an Arrow file", path):
+        try:
+            batches = selection.batches()
+            with pa.OSFile(str(partial), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
+                for batch in batches:
+                    writer.write_batch(batch)
+                    count += batch.num_rows
+            partial.rename(path)
+        finally:
+            partial.unlink(missing_ok=True)
     return count
 
 

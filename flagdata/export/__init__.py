@@ -1,5 +1,5 @@
 """Copies of a selection for other ecosystems. A format is a module here and one line in `FORMATS`."""
 
-from flagdata.export.plan import FORMATS, Export, ExportResult, export
+from flagdata.export.plan import FORMATS, Export, ExportResult, Prepared, export, prepare
 
-__all__ = ["FORMATS", "Export", "ExportResult", "export"]
+__all__ = ["FORMATS", "Export", "ExportResult", "Prepared", "export", "prepare"]

@@ -1,7 +1,8 @@
 """MCAP subsets: each artifact as a record of its own, message by message as it was recorded.
 
 A clip keeps its frames and the wind from a truth window before its first frame, so that its ground truth can be worked
-out again from the subset alone. Messages, schemas and metadata are copied byte for byte; whole records as files.
+out again from the subset alone. Messages, schemas and metadata are copied byte for byte; whole records as files. H.264
+can be decoded from a key frame only: a clip of it begins with the frames since that one, and says how many they are.
 """
 
 from __future__ import annotations
@@ -19,15 +20,17 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from flagdata.errors import UsageError
+from flagdata.errors import CorruptError
 from flagdata.export.source import FILMED, Entry, Source, label_units
-from flagdata.record import Coding
+from flagdata.record import Coding, messages
 from flagdata.record.container import Messages, open_file, read_exact, read_messages, read_summary
+from flagdata.record.video import is_key
 from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 
 SAMPLE = "sample"
-"""Metadata record of a subset: the artifact it is, the object it was cut from, and its label as JSON."""
+"""Metadata record of a subset: the artifact it is, the object it was cut from, the frames before the clip's own that
+H.264 needs, and its label as JSON."""
 CHUNK_BYTES = 1 << 20  # uncompressed, as in committed records: readers reach a frame directly
 
 
@@ -76,6 +79,18 @@ class _Original:
     ) -> None:
         os.close(self._file)
 
+    def decodable_from(self, frame: int) -> int:
+        """Index of the last key frame up to `frame`, of a record in H.264.
+
+        Raises:
+            CorruptError: there is none.
+        """
+        field = messages.data_field(messages.CompressedVideo)
+        for index in range(frame, -1, -1):
+            if is_key(messages.payload(memoryview(self.data(TOPIC_IMAGE, index)), field=field)):
+                return index
+        raise CorruptError(f"no key frame up to frame {frame}", where=self._where, fix="run flagdata verify")
+
     def data(self, topic: str, index: int) -> bytes:
         """The payload of one message."""
         table = self.messages[topic]
@@ -83,20 +98,15 @@ class _Original:
 
 
 def _cut(entry: Entry, original: _Original, target: Path) -> None:
-    if entry.record.coding is Coding.H264:
-        raise UsageError(
-            "a clip cut out of H.264 cannot be decoded without the frames before it",
-            where=entry.key,
-            fix="export it as mp4 or webdataset, or the whole recording as mcap",
-        )
+    first = original.decodable_from(entry.first) if entry.record.coding is Coding.H264 else entry.first
     with target.open("xb") as sink:
         writer = Writer(sink, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_data_crcs=True)
         writer.start(profile=PROFILE, library=f"flagdata format {entry.row['format_version']}")
         for name, values in entry.record.metadata.items():
             writer.add_metadata(name, dict(values))
-        writer.add_metadata(SAMPLE, _sample(entry))
+        writer.add_metadata(SAMPLE, _sample(entry, lead_in=entry.first - first))
         channels: dict[str, int] = {}
-        for topic, index in _order(entry, original):
+        for topic, index in _order(entry, original, first):
             if topic not in channels:
                 channels[topic] = _register(writer, original, topic)
             table = original.messages[topic]
@@ -110,7 +120,7 @@ def _cut(entry: Entry, original: _Original, target: Path) -> None:
         writer.finish()
 
 
-def _order(entry: Entry, original: _Original) -> Iterator[tuple[str, int]]:
+def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tuple[str, int]]:
     """Topic and index of the messages of a clip: the parameters, then all others in order of log time."""
     begin, end = entry.wind_span
     topics, indices, times = [], [], []
@@ -120,7 +130,7 @@ def _order(entry: Entry, original: _Original) -> Iterator[tuple[str, int]]:
             continue
         first, last = np.searchsorted(table.log_time, [begin, end + 1]).tolist()
         if topic == TOPIC_IMAGE:
-            first, last = entry.first, entry.first + entry.count
+            first, last = first_frame, entry.first + entry.count
         topics.append(np.full(last - first, number))
         indices.append(np.arange(first, last))
         times.append(table.log_time[first:last])
@@ -137,8 +147,9 @@ def _register(writer: Writer, original: _Original, topic: str) -> int:
     return writer.register_channel(topic, channel.message_encoding, known, dict(channel.metadata))
 
 
-def _sample(entry: Entry) -> dict[str, str]:
+def _sample(entry: Entry, *, lead_in: int) -> dict[str, str]:
     return {
+        "lead_in_frames": str(lead_in),
         "artifact": entry.key,
         "object": entry.row["object"],
         "parents": ",".join(entry.row["parents"]),

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, Source
-from flagdata.schema import CATALOG, FRAME_RATE, Kind
+from flagdata.schema import CATALOG, CHANNELS, FRAME_RATE, Kind
 from flagdata.timebase import iso
 
 MICROSECOND = Fraction(1, 1_000_000)
-WIND_HEADER = ("time", "wind_speed [m/s]", "wind_sigma [m/s]", "wind_direction [rad from, cw from north]", "samples")
+WIND_HEADER = ("time", "wind_speed [m/s]", "wind_sigma [m/s]", "wind_direction [rad]", "samples")
 FRAMES_HEADER = ("frame", "pts [us]", "time", "device_time")
 INDEX_COLUMNS = (*(name for name in IDENTITY if name != "parents"), "start", "end", *TRUTH)
 
@@ -66,7 +66,12 @@ class Mp4:
             advance(1)
         header = ["file", *(f"{c} [{CATALOG[c].unit}]" if CATALOG[c].unit else c for c in INDEX_COLUMNS)]
         _write_csv(folder / "index.csv", header, index)
-        return {"videos": len(source), "frames": frames, "time_base": "1/1000000 s from the first frame"}
+        return {
+            "videos": len(source),
+            "frames": frames,
+            "time_base": "1/1000000 s from the first frame",
+            "wind_direction": CHANNELS["wind_direction"].frame,
+        }
 
 
 def presentation_times(times: NDArray[np.int64]) -> NDArray[np.int64]:

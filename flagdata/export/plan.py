@@ -9,13 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-import pyarrow as pa
-import pyarrow.compute as pc
-
-from flagdata.dataset.lineage import superseded
-from flagdata.dataset.resolve import clips_on_side
-from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
+from flagdata.export.choice import check_kinds, current, on_side
 from flagdata.export.source import Source
 from flagdata.export.target import fresh_folder, write_manifest
 from flagdata.lake import Lake
@@ -96,15 +91,67 @@ class ExportResult:
     manifest: Mapping[str, Any]
 
 
-def export(
-    lake: Lake, request: Export, target: Path, *, advance: Callable[[int], None] = lambda count: None
-) -> ExportResult:
-    """Write a selection of a lake into the new folder `target`.
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """An export whose rows are settled; nothing is written yet.
+
+    Attributes:
+        request: what was asked for.
+        exporter: the format with its options.
+        version: of the catalog.
+        source: the rows.
+        superseded: recording left out → the later alignment that replaces it.
+    """
+
+    request: Export
+    exporter: Exporter
+    version: int
+    source: Source
+    superseded: Mapping[str, str]
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    def write(self, target: Path, *, advance: Callable[[int], None] = lambda count: None) -> ExportResult:
+        """Write it into the new folder `target`; `advance` is told of rows done.
+
+        Raises:
+            ConflictError: `target` exists.
+            CorruptError: an object has changed since it was committed.
+        """
+        request, rows = self.request, self.source.rows
+        recipe = {
+            "format": request.format, "options": dataclasses.asdict(self.exporter),  # pyright: ignore[reportArgumentType]
+            "version": self.version, "where": request.where,
+            "split": request.split, "salt": request.salt if request.split else None,
+        }  # fmt: skip
+        with fresh_folder(target) as folder:
+            content = self.exporter.write(self.source, folder, advance)
+            manifest = write_manifest(
+                folder,
+                {
+                    **recipe,
+                    "at": request.at,
+                    "recipe_hash": recipe_hash(recipe),
+                    "code_version": code_version(),
+                    "format_version": FORMAT_VERSION,
+                    "artifacts": rows.num_rows,
+                    "artifacts_hash": digest("\n".join(sorted(rows["artifact"].to_pylist()))),
+                    "superseded": dict(self.superseded),
+                    "kinds": dict(sorted(Counter(rows["kind"].to_pylist()).items())),
+                    **content,
+                },
+            )
+        return ExportResult(folder=target, manifest=manifest)
+
+
+def prepare(lake: Lake, request: Export) -> Prepared:
+    """Choose the rows of an export, at one version.
 
     Raises:
-        ConflictError: `target` exists.
         NotFoundError: no rows.
-        UsageError: rows of a kind that the format cannot write; options it does not take.
+        UnknownNameError: no such format, ref or side.
+        UsageError: rows of a kind that the format cannot write; options it does not take; SQL that cannot be run.
     """
     exporter = request.exporter()
     view = lake.view(request.at)
@@ -112,67 +159,19 @@ def export(
     catalog = lake.table(view)
     rows = Selection(catalog, Request(where=request.where)).table()
     if request.split is not None:
-        rows = _on_side(catalog, rows, request.split, salt=request.salt)
-    rows, replaced = _current(catalog, rows)
-    _check_kinds(rows, request.format, exporter.kinds)
+        rows = on_side(catalog, rows, request.split, salt=request.salt)
+    rows, replaced = current(catalog, rows)
+    check_kinds(rows, request.format, exporter.kinds)
     if not rows.num_rows:
-        given = {"where": request.where, "split": request.split, "version": str(version)}
+        given = {"filter": request.where, "split": request.split, "version": str(version)}
         where = ", ".join(f"{name} {value}" for name, value in given.items() if value is not None)
         raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
-    recipe = {
-        "format": request.format, "options": dataclasses.asdict(exporter), "version": version,  # pyright: ignore[reportArgumentType]
-        "where": request.where, "split": request.split, "salt": request.salt if request.split else None,
-    }  # fmt: skip
-    with fresh_folder(target) as folder:
-        content = exporter.write(Source(lake=lake, rows=rows), folder, advance)
-        manifest = write_manifest(
-            folder,
-            {
-                **recipe,
-                "at": request.at,
-                "recipe_hash": recipe_hash(recipe),
-                "code_version": code_version(),
-                "format_version": FORMAT_VERSION,
-                "artifacts": rows.num_rows,
-                "superseded": replaced,
-                "artifacts_hash": digest("\n".join(sorted(rows["artifact"].to_pylist()))),
-                "kinds": dict(sorted(Counter(rows["kind"].to_pylist()).items())),
-                **content,
-            },
-        )
-    return ExportResult(folder=target, manifest=manifest)
+    source = Source(lake=lake, rows=rows)
+    return Prepared(request=request, exporter=exporter, version=version, source=source, superseded=replaced)
 
 
-def _on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.Table:
-    """The rows on one side: clips, and recordings by their clips. Sides are decided over all clips of the version, so
-    that two exports of one version never put a session, day, seed or camera file on two sides."""
-    _check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
-    clips = clips_on_side(catalog, split, HashedSplit(salt=salt))
-    of_clips = catalog.filter(_is_one_of(clips))["recording"].drop_null().to_pylist()
-    return rows.filter(_is_one_of({*clips, *of_clips}))
-
-
-def _current(catalog: pa.Table, rows: pa.Table) -> tuple[pa.Table, dict[str, str]]:
-    """The rows without recordings that another among them replaces, and without the clips of those: two alignments of
-    one camera and wind log would hold every picture twice. Also: recording left out → the later one."""
-    recordings = rows.filter(pc.field("kind") == Kind.RECORDING.value)["artifact"].to_pylist()
-    replaced = superseded(catalog, {*recordings, *rows["recording"].drop_null().to_pylist()})
-    if not replaced:
-        return rows, {}
-    old = set(replaced)
-    kept = ~_is_one_of(old) & (pc.field("recording").is_null() | ~_is_one_of(old, column="recording"))
-    return rows.filter(kept), dict(sorted(replaced.items()))
-
-
-def _is_one_of(artifacts: set[str], *, column: str = "artifact") -> pc.Expression:
-    return pc.field(column).isin(pa.array(sorted(artifacts), pa.string()))
-
-
-def _check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:
-    others = Counter(kind for kind in rows["kind"].to_pylist() if kind not in kinds)
-    if others:
-        found = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(others.items()))
-        first = next(kind for kind in Kind if kind in kinds)
-        raise UsageError(
-            f"{name} cannot hold {found}", where="--where", fix=f"restrict the filter, e.g. kind = '{first}'"
-        )
+def export(
+    lake: Lake, request: Export, target: Path, *, advance: Callable[[int], None] = lambda count: None
+) -> ExportResult:
+    """Write a selection of a lake into the new folder `target`; raises as `prepare` and `Prepared.write` do."""
+    return prepare(lake, request).write(target, advance=advance)

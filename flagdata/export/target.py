@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError
+from flagdata.lake.durable import disk_errors
 from flagdata.provenance import file_hash
 
 MANIFEST = "manifest.json"
@@ -25,20 +27,23 @@ def fresh_folder(target: Path) -> Iterator[Path]:
 
     Raises:
         ConflictError: `target` is there, before or after the block.
+        FlagdataError: no space, no permission, no folder.
     """
     _refuse_existing(target)
-    target.absolute().parent.mkdir(parents=True, exist_ok=True)
-    partial = target.absolute().with_name(f".{target.name}.{os.getpid()}.partial")
-    partial.mkdir()
-    try:
-        yield partial
-        for path in [*partial.rglob("*"), partial]:
-            _sync(path)
-        _refuse_existing(target)
-        partial.rename(target)
-        _sync(target.absolute().parent)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    parent = target.absolute().parent
+    partial = parent / f".{target.name}.{uuid.uuid4().hex}.partial"
+    with disk_errors("writing an export", target):
+        parent.mkdir(parents=True, exist_ok=True)
+        partial.mkdir()
+        try:
+            yield partial
+            for path in [*partial.rglob("*"), partial]:
+                _sync(path)
+            _refuse_existing(target)
+            partial.rename(target)
+            _sync(parent)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 def _refuse_existing(target: Path) -> None:

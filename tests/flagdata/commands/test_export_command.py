@@ -56,6 +56,8 @@ def test_json_gives_the_manifest(lake: Lake, tmp_path: Path, capsys: pytest.Capt
         (["parquet", "--to", "{lake}"], 1, "exists"),
         (["parquet", "--to", "{out}", "--at", "nowhere"], 2, "nowhere"),
         (["parquet"], 2, "--to"),
+        (["parquet", "--to", "{lake}/lake.json/out"], 1, "writing an export"),
+        (["parquet", "--to", "{out}", "--salt", "x"], 2, "--salt without --split"),
     ],
 )
 def test_mistakes_end_in_a_sentence_and_write_nothing(

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -13,7 +14,9 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from flagdata.dataset.truth import TruthSeries
 from flagdata.export import Export, export
-from flagdata.record import Record
+from flagdata.lake import Artifact, Lake
+from flagdata.record import Coding, Record, RecordWriter
+from flagdata.schema import Kind
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +82,33 @@ def test_the_project_s_own_reader_takes_a_subset_for_a_record(known: Any, folder
 
 def test_a_subset_is_smaller_than_the_record_it_was_cut_from(known: Any, folder: Path) -> None:
     assert (folder / f"{known.clips[0]}.mcap").stat().st_size < (folder / f"{known.recording}.mcap").stat().st_size
+
+
+def test_a_clip_of_h264_starts_at_a_key_frame_and_says_how_many_frames_lead_in(known: Any, tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    with lake.transaction("an archived recording") as tx:
+        path = tx.staging(".mcap")
+        with RecordWriter(path, metadata={}, coding=Coding.H264) as writer:
+            for time, image in zip(known.times.tolist(), known.images, strict=True):
+                writer.frame(log_time=time, publish_time=time, timestamp=time, image=image)
+        name = tx.put(path)
+        recording = Artifact(kind=Kind.RECORDING, name="archive", object=name)
+        clip = Artifact(
+            kind=Kind.CLIP, name="clip", object=name, recording=recording.id, frame_first=40, frame_count=30
+        )
+        tx.add(recording)
+        tx.add(clip)
+    export(lake, Export(format="mcap", where="kind = 'clip'"), tmp_path / "out")
+    subset = tmp_path / "out" / f"{clip.id}.mcap"
+    messages = decoded(subset, "/camera/image")
+    with subset.open("rb") as stream:
+        metadata = {item.name: item.metadata for item in make_reader(stream).iter_metadata()}
+    lead_in = int(metadata["sample"]["lead_in_frames"])
+    assert len(messages) == lead_in + 30
+    assert messages[lead_in][0].log_time == known.times[40]
+    codec: Any = av.CodecContext.create("h264", "r")
+    packets = [av.Packet(data.data) for _, data in messages]
+    frames = [frame for packet in [*packets, None] for frame in codec.decode(packet)]
+    pictures = np.stack([frame.to_ndarray(format="gray") for frame in frames])[lead_in:]
+    # The codec's own loss on a smooth slope; a slip by one frame would be a mean difference of 1.
+    assert abs((pictures.astype(int) - known.images[40:70]).mean()) < 0.5
