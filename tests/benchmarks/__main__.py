@@ -6,6 +6,7 @@ from tests.evidence import run_all
 
 BENCHMARKS = {
     "pairs": "tests.benchmarks.bench_pairs",
+    "records": "tests.benchmarks.bench_records",
 }
 
 if __name__ == "__main__":
