@@ -121,9 +121,9 @@ def _offset(place: tzinfo, instant: int) -> int:
 
 
 def _changes(place: tzinfo, low: int, high: int) -> Sequence[_Change]:
-    """Offset jumps of the zone between two instants, each found to the second by bisection of 6 h steps."""
+    """Offset jumps of the zone between two instants, each found to the second by bisection of steps of a day."""
     found: list[_Change] = []
-    step = 6 * _HOUR
+    step = 24 * _HOUR
     edge, known = low, _offset(place, low)
     while edge < high:
         upper = min(edge + step, high)
