@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Self, TypeAlias
 
 import torch
+from torch.utils.data import default_collate
 
 from flagdata.errors import InputError
 
@@ -139,7 +140,8 @@ def collate(samples: Sequence[Sample]) -> Batch:
         )
     names = sorted({name for sample in samples for name in sample.parameters})
     return Batch(
-        clip=torch.stack([sample.clip for sample in samples]),
+        # In a worker this stacks straight into the memory it shares with the parent.
+        clip=default_collate([sample.clip for sample in samples]),
         wind=_column([sample.wind for sample in samples]),
         wind_sigma=_column([sample.wind_sigma for sample in samples]),
         staleness=_column([sample.staleness for sample in samples]),
