@@ -1,7 +1,7 @@
 """Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, sealed off from everything else.
 
 SQL sees one table, `catalog`: the columns of `schema.CATALOG` and the derived ones of `DERIVED`. It cannot read or
-write files, load extensions, change settings or run more than one statement: a stranger's query is safe to run.
+write files (nor spill to them), load extensions, change settings or run more than one statement.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ _SEALED: dict[str, str | bool | int | float | list[str]] = {
     "autoinstall_known_extensions": "false",
     "autoload_known_extensions": "false",
     "python_enable_replacements": "false",
+    "temp_directory": "",
 }
 _MISSING_COLUMN = re.compile(r'Referenced column "([^"]+)" (?:was )?not found|does not have a column named "([^"]+)"')
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
@@ -241,6 +242,8 @@ def explain(error: duckdb.Error, *, where: str | None) -> UsageError:
         return UsageError(
             "SQL on a lake reads its catalog and nothing else", where=where, fix="select from catalog; leave out files"
         )
+    if isinstance(error, duckdb.OutOfMemoryException):
+        return UsageError("it needs more memory than there is", where=where, fix="narrow it down, or aggregate in SQL")
     if _RESERVED_END.search(text):
         return UsageError(
             "END is a word of SQL", where=where, fix='write the column in double quotes, "end", or use end_time'

@@ -95,6 +95,20 @@ def test_numbers_that_json_cannot_hold_are_null_and_counted(run: Run) -> None:
     assert found["not_finite"] == {"a": 1, "b": 1}
 
 
+def test_every_kind_of_value_has_its_form_in_json(run: Run) -> None:
+    sql = (
+        "select date '2026-05-01' as d, time '12:30:00' as t, 1.5::decimal(4,2) as x, sum(n) as big,"
+        " {'a': 1, 'b': [true, null]} as s from (values (9223372036854775807), (1)) as v(n)"
+    )
+    _, out, _ = run("--sql", sql, "--json")
+    assert json.loads(out)["rows"] == [
+        {"d": "2026-05-01", "t": "12:30:00", "x": 1.5, "big": 2**63, "s": {"a": 1, "b": [True, None]}}
+    ]
+    code, _, err = run("--sql", "select 'ab'::blob as b", "--json")
+    assert code == 2
+    assert "cast it in the SQL" in err
+
+
 def test_two_columns_of_one_name_are_not_merged_in_json(run: Run) -> None:
     code, out, _ = run("--sql", "select 1 as a, 2 as a", "--json")
     assert code == 2

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from pathlib import Path
 
 import pyarrow as pa
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from flagdata import query
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake.refs import Slice, View
 from flagdata.query import COLUMNS, Request, Selection, select
@@ -53,6 +57,30 @@ def test_a_filter_keeps_exactly_the_rows_it_holds_for() -> None:
     assert numbers(select(HandWritten(), "kind = 'clip' and wind between 3 and 6")) == [3, 4]
     assert numbers(select(HandWritten(), "list_contains(quality, 'stale')")) == [3]
     assert numbers(select(HandWritten(), "(parameters->>'density')::double < 0.3")) == [4]
+
+
+@given(
+    winds=st.lists(st.one_of(st.none(), st.floats(allow_infinity=False, width=32)), max_size=8),
+    low=st.floats(-20, 20),
+    width=st.floats(0, 20),
+)
+@settings(max_examples=40, deadline=None)
+def test_a_range_holds_for_exactly_the_known_numbers_in_it(winds: list[float | None], low: float, width: float) -> None:
+    catalog = pa.Table.from_pylist([row(n, wind=wind) for n, wind in enumerate(winds)], schema=catalog_schema())
+    high = low + width
+    found = Selection(catalog, Request(where=f"wind between {low!r}::double and {high!r}::double", order="artifact"))
+    wanted = [n for n, wind in enumerate(winds) if wind is not None and low <= wind <= high]
+    assert numbers(found.table()) == wanted
+
+
+def test_a_query_too_large_for_memory_is_told_so_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(query._SEALED, "memory_limit", "50MB")
+    with pytest.raises(UsageError, match="more memory"):
+        select(HandWritten(), sql="select count(distinct hash(range)) from range(20_000_000)")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_number_is_not_above_any_threshold() -> None:

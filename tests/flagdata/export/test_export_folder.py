@@ -5,6 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +77,28 @@ def test_a_failed_export_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_export_leaves_no_target_and_does_not_hinder_the_next(known: Any, tmp_path: Path) -> None:
+    code = """
+import os, signal, sys
+from pathlib import Path
+from flagdata.export import Export, export
+from flagdata.lake import Lake
+
+done = []
+def advance(count):
+    done.append(count)
+    if len(done) == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+export(Lake.open(sys.argv[1]), Export(format="mcap", where="kind = 'clip'"), Path(sys.argv[2]), advance=advance)
+"""
+    killed = subprocess.run([sys.executable, "-c", code, str(known.lake.path), str(tmp_path / "out")], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert not (tmp_path / "out").exists()
+    export(known.lake, Export(format="mcap", where=CLIPS), tmp_path / "out")
+    assert len(list((tmp_path / "out").glob("*.mcap"))) == 3
 
 
 def test_a_target_made_meanwhile_is_not_replaced(tmp_path: Path) -> None:
