@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -38,12 +42,46 @@ def put_text() -> Callable[..., Artifact]:
     return put
 
 
+@dataclass(frozen=True, kw_only=True)
+class Worker:
+    """A process that ingests; `said` is the file it reports to, see ingest_worker.py."""
+
+    said: Path
+
+    def lines(self) -> list[str]:
+        """Whole lines it has written."""
+        return self.said.read_text().split("\n")[:-1] if self.said.exists() else []
+
+    def await_line(self, line: str) -> None:
+        deadline = time.monotonic() + 120
+        while line not in self.lines():
+            assert "failed" not in self.lines()
+            assert time.monotonic() < deadline
+            time.sleep(0.005)
+
+    def kill(self) -> None:
+        os.kill(int(self.lines()[0]), signal.SIGKILL)
+
+    def is_running(self) -> bool:
+        return "done" not in self.lines()
+
+    def acknowledged(self) -> set[str]:
+        """Ids of the artifacts whose with-block it had left."""
+        return {line for line in self.lines()[2:] if line not in ("done", "failed")}
+
+
 @pytest.fixture
-def start_worker(lake: Lake) -> Callable[..., subprocess.Popen[str]]:
-    """Starts a process that ingests into the lake; see ingest_worker.py for what it prints."""
+def start_worker(lake: Lake, tmp_path: Path) -> Iterator[Callable[..., Worker]]:
+    """Starts a process that ingests, given its name and how many sources of its own and shared ones."""
+    command = [sys.executable, str(_WORKER), str(lake.path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as server:
+        assert server.stdin is not None
 
-    def start(prefix: str, *, count: int, shared: int = 0) -> subprocess.Popen[str]:
-        command = [sys.executable, str(_WORKER), str(lake.path), prefix, str(count), str(shared)]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        def start(prefix: str, *, count: int, shared: int = 0) -> Worker:
+            worker = Worker(said=tmp_path / f"said-{prefix}")
+            server.stdin.write(f"{prefix} {count} {shared} {worker.said}\n")
+            server.stdin.flush()
+            return worker
 
-    return start
+        yield start
+        server.stdin.close()

@@ -1,12 +1,15 @@
-"""A process that ingests tiny objects, for tests that run several at once and kill some.
+"""Processes that ingest tiny objects, for tests that run several at once and kill some.
 
-    python ingest_worker.py LAKE PREFIX COUNT SHARED
+    python ingest_worker.py LAKE
 
-It prints "ready", then an artifact's id after each with-block it has left: what is printed was acknowledged. The first
-SHARED sources are the same for all workers, the next COUNT are its own. Records and folders take turns.
+It imports what is needed once, then forks a worker for each line "PREFIX COUNT SHARED FILE" it is given; nothing of the
+lake has been used before the fork. A worker writes to FILE its process id and "ready", then an artifact's id after each
+with-block it has left: what is there was acknowledged. The first SHARED sources are the same for all workers, the next
+COUNT are its own. Records and folders take turns.
 """
 
 import os
+import signal
 import sys
 from hashlib import sha256
 from pathlib import Path
@@ -30,11 +33,10 @@ def put(tx: Transaction, source: str, *, folder: bool) -> str:
     return tx.put(path)
 
 
-def main(lake_path: str, prefix: str, count: int, shared: int) -> None:
-    lake = Lake.open(Path(lake_path))
+def ingest(lake: Lake, prefix: str, count: int, shared: int, said: int) -> None:
     with lake.transaction("warm up: libraries load on first use"):
-        code_version()
-    os.write(1, b"ready\n")
+        pass
+    os.write(said, f"{os.getpid()}\nready\n".encode())
     sources = [f"shared-{i}" for i in range(shared)] + [f"{prefix}-{i}" for i in range(count)]
     for i, source in enumerate(sources):
         with lake.transaction(f"ingest {source}") as tx:
@@ -43,8 +45,25 @@ def main(lake_path: str, prefix: str, count: int, shared: int) -> None:
                 kind=Kind.WIND, name=source, object=name, source_hash=sha256(source.encode()).hexdigest()
             )
             tx.add(artifact)
-        os.write(1, f"{artifact.id}\n".encode())
+        os.write(said, f"{artifact.id}\n".encode())
+
+
+def serve(lake: Lake) -> None:
+    code_version()  # asks git, once for all
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel buries the dead
+    for line in sys.stdin:
+        prefix, count, shared, file = line.split()
+        if os.fork() == 0:
+            said = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+            status = 1
+            try:
+                signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+                ingest(lake, prefix, int(count), int(shared), said)
+                status = 0
+            finally:
+                os.write(said, b"done\n" if status == 0 else b"failed\n")
+                os._exit(status)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
+    serve(Lake.open(Path(sys.argv[1])))
