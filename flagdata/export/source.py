@@ -106,7 +106,7 @@ class Entry:
             "start_time": None if row["start"] is None else iso(row["start"]),
             "end_time": None if row["end"] is None else iso(row["end"]),
             "frame_times": times.tolist(),
-            "parameters": None if row["parameters"] is None else json.loads(row["parameters"]),
+            "parameters": json.loads(row["parameters"] or "null", parse_constant=lambda name: None),
         }
 
 

@@ -117,5 +117,5 @@ def clip(recording: Artifact, name: str, number: int, times: NDArray[np.int64]) 
         session="pier", day="2026-05-01", start=int(times[first]), end=int(times[first + CLIP - 1]),
         frame_first=first, frame_count=CLIP, rate=27.3, wind=3.5 + number, wind_sigma=0.125, wind_coverage=1.0,
         wind_staleness=0.25, clock_method="given", clock_offset=7.0, clock_drift=0.0, clock_sigma=0.02,
-        parameters='{"density":0.2}' if number == 0 else None, quality=("wind-stale",) if number == 1 else (),
+        parameters=('{"density":0.2}', None, '{"damping":NaN}')[number], quality=("wind-stale",) if number == 1 else (),
     )  # fmt: skip
