@@ -279,6 +279,9 @@ class Catalog:
                 fix="delete _last_checkpoint and *.checkpoint.parquet there: they save time, the .json files hold all;"
                 " if that does not help, restore the folder from a copy",
             ) from None
+        unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
+        if unknown:
+            raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
         return self._table
 
     def _names(self, version: int) -> list[str]:
@@ -305,9 +308,6 @@ class Catalog:
             ) from None
 
     def _conform(self, table: pa.Table) -> pa.Table:
-        unknown = [name for name in table.column_names if name not in CATALOG]
-        if unknown:
-            raise newer(f"it has the columns {', '.join(unknown)}", self.path)
         schema = catalog_schema()
         columns = [
             table[f.name].cast(f.type) if f.name in table.column_names else pa.nulls(table.num_rows, f.type)
