@@ -42,13 +42,17 @@ class Lease:
     """The staging folder of one running transaction."""
 
     def __init__(self, staging: Path) -> None:
+        owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat()}
         with keeping_collectors_out(staging):
             self.folder = staging / uuid.uuid4().hex
             self.folder.mkdir()
-            self._file = (self.folder / _LEASE).open("w", encoding="utf-8")
-            fcntl.flock(self._file, fcntl.LOCK_EX)
-            owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat()}
-            self._line(json.dumps(owner))
+            self._file = (self.folder / _LEASE).open("wb", buffering=0)
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX)
+                self._line(json.dumps(owner))
+            except OSError:
+                self.close()
+                raise
 
     def hold(self, object_name: str) -> None:
         """Note that the transaction relies on the object; called while collectors are kept out."""
@@ -66,8 +70,7 @@ class Lease:
         self._file.close()
 
     def _line(self, text: str) -> None:
-        self._file.write(text + "\n")
-        self._file.flush()
+        self._file.write(f"{text}\n".encode())
 
 
 @contextmanager

@@ -68,9 +68,9 @@ class Transaction:
         self._row = row
         self._pending: dict[str, Artifact] = {}
         self._existing: list[str] = []
+        self._known = self._identities()[1]
         with disk_errors("starting a transaction", staging):
             self._lease = Lease(staging)
-        self._known = self._identities()[1]
 
     def staging(self, suffix: str) -> Path:
         """A fresh path with `suffix` (".mcap", ".zarr"), nothing at it yet; removed with the transaction."""
