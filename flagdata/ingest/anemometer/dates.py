@@ -52,8 +52,9 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
         TimeError: no date, contradictory dates, or no evidence.
     """
     dated = [text for text in texts if text.strip()]
-    if dated and sum(1 for text in dated if _ISO.match(text)) * 2 > len(dated):
-        first = dated[0].strip()
+    year_first = [text.strip() for text in dated if _ISO.match(text)]
+    if len(year_first) * 2 > len(dated):
+        first = year_first[0]
         return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
     parts = [match for text in dated if (match := _PARTS.match(text))]
     if len(parts) * 2 <= len(dated) or not parts:

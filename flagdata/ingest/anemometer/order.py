@@ -145,7 +145,7 @@ def _spread(reading: Reading, again: NDArray[np.bool_]) -> Reading:
     room = np.full(len(stamps), reading.step, dtype=np.int64)
     room[:-1] = np.minimum(room[:-1], np.diff(stamps))
     # The log may begin and end within a step: those rows keep the usual spacing, the first ones before the next stamp.
-    usual = max(1, int(np.median(counts)))
+    usual = max(1, int(np.median(counts[1:-1]) if len(counts) > 2 else counts.max()))
     slots = counts.copy()
     slots[[0, -1]] = np.maximum(slots[[0, -1]], usual)
     place = np.arange(len(again)) - np.repeat(starts, counts)

@@ -23,6 +23,7 @@ from typing import Any, Literal, TypeVar
 
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
+from flagdata.ingest.anemometer.stamps import EPOCH, pattern
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import zone
@@ -67,6 +68,8 @@ class FileLayout:
                 where="[file] host",
                 fix="leave those keys out",
             )
+        if self.host and self.host not in EPOCH:
+            pattern(self.host)
         if self.delimiter not in DELIMITERS.values():
             raise UnknownNameError.of("delimiter", self.delimiter, DELIMITERS, where="[file] delimiter")
         if self.decimal not in (".", ","):
@@ -93,6 +96,8 @@ class TimeLayout:
     zone: str | None = None
 
     def __post_init__(self) -> None:
+        if self.columns and self.format not in EPOCH:
+            pattern(self.format)
         if self.zone is not None:
             zone(self.zone, where="[time] zone")
 

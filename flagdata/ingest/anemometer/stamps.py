@@ -34,7 +34,7 @@ _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
     r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
 )
-_EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000}
+EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,8 +96,8 @@ def parse(texts: Sequence[str], form: str) -> Stamps:
         UsageError: see `pattern`.
     """
     text = pc.utf8_trim_whitespace(pa.array(texts, pa.string()))
-    if form in _EPOCH:
-        return _epoch(text, _EPOCH[form])
+    if form in EPOCH:
+        return _epoch(text, EPOCH[form])
     found = pc.extract_regex(text, pattern(form))
     valid = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
     part = functools.partial(_part, found)

@@ -1,0 +1,188 @@
+"""Order and quality: what is wrong with samples is found where it is, and only there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from flagdata.ingest.anemometer import quality, zero
+from flagdata.ingest.anemometer.order import in_order
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import QualityRules
+from flagdata.rng import stream
+from flagdata.schema import SampleFlag
+from flagdata.signals import Sensor, WindLog
+
+S = 1_000_000_000
+T0 = 1_777_636_800 * S
+Read = Callable[..., WindLog]
+
+
+def reading(
+    time: object, *, step: int = 1, rules: QualityRules | None = None, sensor: Sensor | None = None, **channels: object
+) -> Reading:
+    at = np.asarray(time, dtype=np.int64)
+    return Reading(
+        time=at,
+        channels={name: np.asarray(v, dtype=np.float64) for name, v in channels.items()},
+        flags=np.zeros(len(at), dtype=np.uint16),
+        line=np.arange(2, len(at) + 2),
+        sensor=sensor or Sensor(name="test"),
+        step=step,
+        rules=rules or QualityRules(),
+    )
+
+
+def kinds(found: Sequence[object]) -> list[str]:
+    return [f.kind for f in found]  # type: ignore[attr-defined]
+
+
+def gusts(n: int, *, rate: float = 10, decimals: int = 2) -> np.ndarray:
+    """Positive, autocorrelated and rounded, as an instrument shows wind."""
+    noise = stream(5, "gusts").normal(0, 1, n)
+    smooth = np.convolve(noise, np.ones(round(rate)) / np.sqrt(rate), mode="same")
+    return np.round(6 + smooth, decimals)
+
+
+@pytest.mark.parametrize("decimals", [0, 1, 2])
+def test_wind_that_is_only_coarsely_shown_is_not_stale(decimals: int) -> None:
+    n = 20_000
+    flags, found = quality.stale(reading(T0 + np.arange(n) * (S // 10), wind_speed=gusts(n, decimals=decimals)))
+    # repeats by chance are flagged with a probability of about 1e-3 a log: none in this one
+    assert not flags.any()
+    assert found == ()
+
+
+@pytest.mark.parametrize("length", [60, 600])
+def test_a_frozen_reading_is_stale_from_its_second_row(length: int) -> None:
+    speed = gusts(5000)
+    speed[1000 : 1000 + length] = 7.77
+    flags, found = quality.stale(reading(T0 + np.arange(5000) * (S // 10), wind_speed=speed))
+    assert np.flatnonzero(flags).tolist() == list(range(1001, 1000 + length))
+    assert found[0].value == pytest.approx((length - 1) / 10)
+    assert found[0].count == length - 1
+
+
+def test_a_moving_direction_shows_that_a_steady_speed_is_not_stale() -> None:
+    n = 2000
+    direction = stream(6, "direction").uniform(0, 6, n)
+    log = reading(T0 + np.arange(n) * S, wind_speed=np.full(n, 3.0), wind_direction=direction)
+    assert not quality.stale(log)[0].any()
+
+
+def test_calm_is_not_stale() -> None:
+    log = reading(T0 + np.arange(300) * S, wind_speed=np.zeros(300))
+    flags, found = quality.dead_zone(log)
+    assert kinds(found) == ["dead-zone"]
+    assert not quality.stale(log.with_findings((), flags=flags))[0].any()
+
+
+def test_a_recipe_may_say_how_long_a_reading_may_stand() -> None:
+    speed = [3.0] * 30 + [4.0, 5.0] * 10
+    log = reading(T0 + np.arange(50) * S, wind_speed=speed, rules=QualityRules(stale_after=60))
+    assert not quality.stale(log)[0].any()
+    log = reading(T0 + np.arange(50) * S, wind_speed=speed, rules=QualityRules(stale_after=10))
+    assert int((quality.stale(log)[0] != 0).sum()) == 29
+
+
+def test_jitter_of_stamps_is_no_gap_and_a_dropout_is() -> None:
+    step = stream(7, "jitter").uniform(4e6, 6e6, 2000)
+    time = T0 + np.cumsum(step).astype(np.int64)
+    assert quality.gaps(reading(time, wind_speed=np.ones(2000))) == ()
+    time[1000:] += 433_000_000
+    found = quality.gaps(reading(time, wind_speed=np.ones(2000)))
+    assert (found[0].count, found[0].where) == (1, "line 1002")
+    assert found[0].value == pytest.approx(0.438, abs=0.0011)
+
+
+def test_one_sample_lost_of_a_steady_log_is_a_gap() -> None:
+    time = np.delete(T0 + np.arange(100) * S, 50)
+    assert quality.gaps(reading(time, wind_speed=np.ones(99)))[0].value == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("offset", [-0.35, 0.2])
+def test_the_zero_offset_of_an_idle_stretch_is_found_within_its_resolution(offset: float) -> None:
+    idle = np.round(offset + stream(8, "idle").normal(0, 0.005, 3000), 2)
+    speed = np.concatenate([idle, offset + gusts(3000)])
+    found = zero.estimate(T0 + np.arange(6000) * (S // 100), speed)
+    assert found is not None
+    assert found.offset == pytest.approx(offset, abs=0.01)
+    # the gusts may pass through the idle band for moments, no more
+    assert int(found.idle.sum()) == pytest.approx(3000, abs=10)
+    assert found.seconds == pytest.approx(30, abs=2)
+
+
+def test_steady_wind_is_no_zero_offset() -> None:
+    speed = np.round(8 + stream(9, "steady").normal(0, 0.005, 3000), 2)
+    assert zero.estimate(T0 + np.arange(3000) * (S // 100), speed) is None
+
+
+def test_a_log_that_is_never_idle_shows_no_zero_offset() -> None:
+    assert zero.estimate(T0 + np.arange(6000) * (S // 100), gusts(6000) - 5.5) is None
+
+
+def test_a_zero_offset_is_reported_but_not_applied_unless_asked() -> None:
+    speed = np.concatenate([np.full(2000, 0.3), gusts(2000)])
+    log = reading(T0 + np.arange(4000) * (S // 100), wind_speed=speed)
+    told = zero.settle(log, "report")
+    assert told.channels["wind_speed"].tolist() == speed.tolist()
+    assert [f.value for f in told.findings if f.kind == "zero-offset"] == [pytest.approx(0.3)]
+    done = zero.settle(log, "estimate")
+    assert done.channels["wind_speed"] == pytest.approx(speed - 0.3)
+    assert bool(np.all(done.flags[:2000] == SampleFlag.DEAD_ZONE))
+
+
+def test_a_flutter_well_below_the_nyquist_limit_is_not_flagged() -> None:
+    rules = QualityRules(frame_rate_of=("flutter_frequency",))
+    frequency = np.tile([4.0, 4.333, 4.667, 5.0], 50)
+    log = reading(T0 + np.arange(200) * (S // 30), flutter_frequency=frequency, rules=rules)
+    assert not quality.at_nyquist(log)[0].any()
+
+
+def test_a_flutter_beside_the_nyquist_limit_is_flagged_with_its_alias() -> None:
+    # at 60 frames a second: 29.5 Hz cannot be told from 60 - 29.5 = 30.5 Hz or 89.5 Hz
+    rules = QualityRules(frame_rate_of=("flutter_frequency",))
+    frequency = np.where(np.arange(300) < 200, 6.0, 29.5)
+    log = reading(T0 + np.arange(300) * (S // 60), flutter_frequency=frequency, rules=rules)
+    flags, found = quality.at_nyquist(log)
+    assert np.flatnonzero(flags).tolist() == list(range(200, 300))
+    assert "30.5 or 89.5 Hz" in found[0].what
+
+
+def test_rows_of_one_stamp_are_spread_over_its_step() -> None:
+    # four a second, the log begins with the last two of a second and ends with the first of another
+    stamps = T0 + S * np.array([0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3])
+    log = in_order(reading(stamps, step=S, wind_speed=np.arange(11.0)), where="x")
+    quarter = S // 4
+    assert (log.time - T0).tolist() == [quarter * k for k in (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12)]
+    assert bool(np.all(log.flags == SampleFlag.TIME_UNSURE))
+
+
+def test_order_is_kept_and_nothing_lost_when_rows_come_a_little_late() -> None:
+    time = T0 + S * np.array([0, 1, 3, 2, 4])
+    log = in_order(reading(time, wind_speed=[0.0, 1.0, 3.0, 2.0, 4.0]), where="x")
+    assert log.channels["wind_speed"].tolist() == [0, 1, 2, 3, 4]
+    assert log.flags.tolist() == [0, 0, SampleFlag.TIME_UNSURE, 0, 0]
+
+
+def test_the_fewest_possible_rows_are_left_out_for_wild_stamps() -> None:
+    time = T0 + S * np.arange(100)
+    time[[20, 50, 51]] += np.array([10**6, -(10**6), -(10**6)]) * S
+    log = in_order(reading(time, wind_speed=np.arange(100.0)), where="x")
+    assert sorted(set(range(100)) - set(log.channels["wind_speed"].astype(int))) == [20, 50, 51]
+    assert [f.count for f in log.findings if f.kind == "time-backwards"] == [3]
+
+
+def test_sonic_components_give_speed_and_direction(read: Read) -> None:
+    head = (
+        '"TOA5","a","b","c","d","e","f","g"\r\n"TIMESTAMP","RECORD","Ux","Uy","Uz"\r\n'
+        '"TS","RN","m/s","m/s","m/s"\r\n"","","","",""\r\n'
+    )
+    rows = '"2026-05-01 12:00:00",0,3,4,0\r\n"2026-05-01 12:00:00.1",1,5,0,0\r\n'
+    # the array points east (90°): wind along +x comes from east; y is to the left of x, so wind along +y comes from
+    # 90° less
+    log = read(head + rows, zone="UTC", azimuth=np.pi / 2)
+    assert log.series.channels["wind_speed"] == pytest.approx([5.0, 5.0])
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90 - 53.130102, 90.0])
