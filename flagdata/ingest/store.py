@@ -153,7 +153,7 @@ def ingest_camera(
                         progress(1)
             info, findings = stream.info, stream.findings
         if not times.count:
-            raise InputError("no frame could be read", where=str(path), fix="check the file, or its --tolerance")
+            raise InputError("no frame could be read", where=str(path), fix="check the file")
         source.check_unchanged()
         report = _camera_report(info, times, findings, reasons)
         artifact = _artifact(
