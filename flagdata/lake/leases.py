@@ -100,10 +100,17 @@ def leases(staging: Path) -> list[LeaseState]:
             alive, lines = False, []
             if not folder.exists():
                 continue
-        owner = json.loads(lines[0]) if lines else {}
-        described = f"process {owner['pid']} on {owner['host']} since {owner['since']}" if owner else "unknown"
-        states.append(LeaseState(folder=folder, alive=alive, owner=described, objects=frozenset(lines[1:])))
+        owner = _owner(lines[0]) if lines else "owner unknown"
+        states.append(LeaseState(folder=folder, alive=alive, owner=owner, objects=frozenset(lines[1:])))
     return states
+
+
+def _owner(line: str) -> str:
+    try:
+        owner = json.loads(line)
+        return f"process {owner['pid']} on {owner['host']} since {owner['since']}"
+    except (ValueError, KeyError, TypeError):  # it died, or the disk was full, before the line was whole
+        return "owner unknown"
 
 
 def _try_lock(descriptor: int) -> bool:

@@ -18,7 +18,7 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog, Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease
-from flagdata.lake.objects import Objects, size_of
+from flagdata.lake.objects import Objects
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -67,7 +67,8 @@ class Transaction:
         self._identities = identities
         self._row = row
         self._pending: dict[str, Artifact] = {}
-        self._existing: list[str] = []
+        self._existing: dict[str, None] = {}
+        self._sizes: dict[str, int] = {}  # of the objects that the lease holds
         self._known = self._identities()[1]
         with disk_errors("starting a transaction", staging):
             self._lease = Lease(staging)
@@ -94,27 +95,27 @@ class Transaction:
             with self._lease.keeping_collectors_out():
                 self._lease.hold(name)
                 self._objects.publish(path, name)
+            self._sizes[name] = self._objects.size(name)
         return name
 
     def add(self, artifact: Artifact) -> bool:
         """Publish a row with this transaction; False when its identity is on the branch, or in this transaction.
+
+        `branch`, `created` and `object_bytes` are filled in.
 
         Raises:
             NotFoundError: its object was not put, or a parent is neither on the branch nor in this transaction.
         """
         self._open_only()
         identity = artifact.id
-        if identity in self._known or identity in self._pending:
-            if identity not in self._existing:
-                self._existing.append(identity)
+        if identity in self._pending:
             return False
-        size = artifact.object_bytes
+        if identity in self._known:
+            self._existing.setdefault(identity)
+            return False
+        size = None
         if artifact.object is not None:
-            with self._lease.keeping_collectors_out():
-                self._lease.hold(artifact.object)
-                stored = self._objects.existing(artifact.object)
-            if size is None:
-                size = size_of(stored)
+            size = self._sizes[artifact.object] if artifact.object in self._sizes else self._hold(artifact.object)
         self._check_parents([artifact], self._known)
         self._pending[identity] = replace(artifact, branch=self.branch, object_bytes=size)
         return True
@@ -141,12 +142,12 @@ class Transaction:
 
         def attempt() -> CommitResult:
             version, known = self._identities()
-            fresh = [replace(a, created=created) for identity, a in self._pending.items() if identity not in known]
+            fresh = [a for identity, a in self._pending.items() if identity not in known]
             existing = (*self._existing, *(identity for identity in self._pending if identity in known))
             if not fresh:
                 return CommitResult(version=version, commit=None, added=(), existing=existing)
             self._check_parents(fresh, known)
-            rows = pa.Table.from_pylist([a.row() for a in fresh], schema=catalog_schema())
+            rows = pa.Table.from_pylist([{**a.row(), "created": created} for a in fresh], schema=catalog_schema())
             info = {
                 "commit": commit,
                 "message": self.message,
@@ -159,6 +160,12 @@ class Transaction:
             return CommitResult(version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing)
 
         return persist(attempt, where=self._catalog.path)
+
+    def _hold(self, name: str) -> int:
+        with self._lease.keeping_collectors_out():
+            self._lease.hold(name)
+            self._sizes[name] = self._objects.size(name)
+        return self._sizes[name]
 
     def _check_parents(self, artifacts: Iterable[Artifact], known: frozenset[str]) -> None:
         for artifact in artifacts:
