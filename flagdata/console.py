@@ -61,7 +61,8 @@ def progress(total: int | None, *, label: str, unit: str) -> Iterator[Callable[[
     """A bar on stderr for anything that takes longer than two seconds; yields a function that advances it."""
     from tqdm import tqdm
 
-    with tqdm(total=total, desc=label, unit=unit, delay=2, file=sys.stderr, dynamic_ncols=True) as bar:
+    interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
+    with tqdm(total=total, desc=label, unit=unit, delay=2, mininterval=interval, file=sys.stderr, ncols=100) as bar:
 
         def advance(count: int = 1) -> None:
             bar.update(count)

@@ -127,7 +127,7 @@ def film(recipe: FieldRecipe) -> tuple[NDArray[np.float64], NDArray[np.float64],
     """What happens in front of the camera, and what nobody is told.
 
     Returns:
-        The true wind [m/s] at `WIND_RATE` from `BEFORE` seconds before the first frame on; the wind [m/s] at each frame;
+        The true wind [m/s] at `WIND_RATE` from `BEFORE` seconds before the first frame on; that at each frame [m/s];
         and the offset [s] to add to the camera's clock to reach the anemometer's.
     """
     offset = float(stream(recipe.seed, "clock").uniform(-recipe.largest_offset, recipe.largest_offset))
