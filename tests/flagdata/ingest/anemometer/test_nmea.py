@@ -1,0 +1,176 @@
+"""NMEA 0183: published sentences, and the laws of streams."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable
+from functools import reduce
+from operator import xor
+
+import numpy as np
+import pytest
+
+from flagdata.ingest.anemometer.sentences import ChecksumError, checksum, clock, split, tag_time
+from flagdata.schema import SampleFlag
+from flagdata.signals import WindLog
+from flagdata.timebase import iso
+
+Read = Callable[..., WindLog]
+DATE = dt.date(2026, 5, 1)
+
+
+def line(body: str) -> str:
+    return f"${body}*{reduce(xor, body.encode()):02X}"
+
+
+def stream(*bodies: str) -> str:
+    return "\r\n".join([*(line(b) for b in bodies), ""])
+
+
+# Sentences as gpsd's "NMEA Revealed" and vendors' manuals print them, checksums included.
+PUBLISHED = [
+    "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47",
+    "$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A",
+    "$GPGLL,4916.45,N,12311.12,W,225444,A,*1D",
+    "$GPVTG,054.7,T,034.4,M,005.5,N,010.2,K*48",
+    "$WIMWV,214.8,R,0.1,K,A*28",
+    "$GPZDA,201530.00,04,07,2002,00,00*60",
+]
+
+
+@pytest.mark.parametrize("text", PUBLISHED)
+def test_published_checksums_are_right(text: str) -> None:
+    sentence = split(text)
+    assert sentence is not None
+    assert sentence.checked
+
+
+@pytest.mark.parametrize("text", PUBLISHED)
+def test_a_changed_digit_breaks_the_checksum(text: str) -> None:
+    at = next(i for i, c in enumerate(text) if c.isdigit())
+    with pytest.raises(ChecksumError):
+        split(text[:at] + str((int(text[at]) + 1) % 10) + text[at + 1 :])
+
+
+def test_a_published_wind_sentence_says_what_its_manual_says() -> None:
+    # 214.8° relative, 0.1 km/h, valid
+    sentence = split(PUBLISHED[4])
+    assert sentence is not None
+    assert (sentence.talker, sentence.kind, sentence.fields) == ("WI", "MWV", ("214.8", "R", "0.1", "K", "A"))
+
+
+@pytest.mark.parametrize(
+    ("text", "nanoseconds"),
+    [("000000", 0), ("123519", 45_319 * 10**9), ("235959.99", 86_399_990_000_000), ("235960", 86_399_999_999_999)],
+)
+def test_times_of_day(text: str, nanoseconds: int) -> None:
+    assert clock(text) == nanoseconds
+
+
+@pytest.mark.parametrize("text", ["", "240000", "126000", "12351", "1235199", "x", "12:35:19"])
+def test_what_is_no_time_of_day(text: str) -> None:
+    assert clock(text) is None
+
+
+def test_wind_takes_its_time_from_the_sentences_around_it(read: Read) -> None:
+    # one wind sentence in the middle of two lines between seconds 0 and 3, one third on
+    log = read(stream("GPZDA,120000,01,05,2026,,", "WIMWV,010,R,5.0,M,A", "GPHDT,1,T", "GPZDA,120003,01,05,2026,,"))
+    assert iso(int(log.series.time[0])) == "2026-05-01T12:00:01Z"
+    assert log.series.flags.tolist() == [SampleFlag.TIME_UNSURE]
+
+
+def test_the_stream_may_begin_and_end_with_wind(read: Read) -> None:
+    wind = "WIMWV,010,R,5.0,M,A"
+    log = read(stream(wind, "GPZDA,120000,01,05,2026,,", wind, "GPZDA,120002,01,05,2026,,", wind))
+    assert [iso(t)[11:] for t in log.series.time.tolist()] == ["11:59:59Z", "12:00:01Z", "12:00:03Z"]
+
+
+def test_midnight_adds_a_day(read: Read) -> None:
+    times = [
+        "GPGGA,235958,,,,,,,,,,,,,",
+        "GPGGA,235959,,,,,,,,,,,,,",
+        "GPGGA,000000,,,,,,,,,,,,,",
+        "GPGGA,000001,,,,,,,,,,,,,",
+    ]
+    log = read(stream(*(s for t in times for s in (t, "WIMWV,010,R,5.0,M,A"))), date=dt.date(2026, 12, 31))
+    assert [iso(t)[:10] for t in log.series.time.tolist()] == ["2026-12-31", "2026-12-31", "2027-01-01", "2027-01-01"]
+
+
+def test_a_date_from_rmc_serves_times_from_gga(read: Read) -> None:
+    rmc = "GPRMC,120001,A,,,,,0.1,,010526,,"
+    body = [s for i in range(6) for s in (f"GPGGA,12000{i},,,,,,,,,,,,,", "WIMWV,010,R,5.0,M,A")]
+    log = read(stream(*body[:4], rmc, *body[4:]))
+    assert iso(int(log.series.time[0])).startswith("2026-05-01T12:00:00")
+
+
+def test_the_most_trusted_time_sentence_is_used(read: Read) -> None:
+    # GLL lags by 7 s here; ZDA is there as often and goes before it
+    wind = "WIMWV,1,R,5.0,M,A"
+    body = [
+        sentence
+        for i in range(10)
+        for sentence in (f"GPGLL,1,N,2,E,1200{i:02d},A", f"GPZDA,1200{i + 7:02d},01,05,2026,,", wind)
+    ]
+    log = read(stream(*body))
+    assert next(f for f in log.findings if f.kind == "time-interpolated").what.split("between ")[1].startswith("10 ZDA")
+    assert iso(int(log.series.time[0])).startswith("2026-05-01T12:00:07")
+
+
+def test_tag_blocks_carry_whole_instants(read: Read) -> None:
+    def tagged(second: int) -> str:
+        tag = f"s:x,c:{1_777_636_800 + second}"
+        return f"\\{tag}*{reduce(xor, tag.encode()):02X}\\" + line("WIMWV,010,R,5.0,M,A")
+
+    log = read("\r\n".join(tagged(i) for i in range(5)))
+    assert [iso(t) for t in log.series.time.tolist()] == [f"2026-05-01T12:00:0{i}Z" for i in range(5)]
+
+
+def test_a_tag_block_with_a_wrong_checksum_says_nothing() -> None:
+    assert tag_time("\\c:1777636800*00\\") is None
+
+
+def times(*bodies: str) -> str:
+    """One wind sentence a second."""
+    return stream(*(s for i, b in enumerate(bodies) for s in (f"GPZDA,1200{i:02d},01,05,2026,,", b)))
+
+
+def test_knots_kilometres_and_miles_become_metres_a_second(read: Read) -> None:
+    log = read(times("WIMWV,1,R,10,N,A", "WIMWV,1,R,36,K,A", "WIMWV,1,R,10,M,A", "WIMWV,1,R,10,S,A"))
+    assert log.series.channels["apparent_wind_speed"] == pytest.approx([10 * 1852 / 3600, 10, 10, 4.4704])
+
+
+def test_mwd_is_wind_over_ground(read: Read) -> None:
+    log = read(
+        times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWD,100.0,T,097.0,M,10.0,N,,M", "WIMWD,110.0,T,,M,10.0,N,5.3,M")
+    )
+    assert log.series.channels["wind_speed"] == pytest.approx([5.1, 10 * 1852 / 3600, 5.3])
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90, 100, 110])
+    assert np.degrees(log.series.channels["wind_direction_magnetic"][:2]) == pytest.approx([87, 97])
+    assert np.isnan(log.series.channels["wind_direction_magnetic"][2])
+
+
+def test_a_fixed_mast_measures_wind_over_ground(read: Read) -> None:
+    log = read(times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed", azimuth=np.radians(30))
+    assert log.series.channels["wind_speed"] == pytest.approx([5, 6])
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([20, 50])
+
+
+def test_a_fixed_mast_of_unknown_azimuth_keeps_its_own_direction(read: Read) -> None:
+    log = read(times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed")
+    assert sorted(log.series.channels) == ["apparent_wind_direction", "wind_speed"]
+
+
+def test_one_talker_of_several_can_be_chosen(read: Read) -> None:
+    text = times("WIMWV,1,R,5,M,A", "IIMWV,1,R,6,M,A", "WIMWV,1,R,7,M,A")
+    assert read(text, talker="WI").series.channels["apparent_wind_speed"].tolist() == [5, 7]
+
+
+def test_relative_and_theoretical_never_share_a_channel(read: Read) -> None:
+    log = read(times("WIMWV,010,R,5,M,A", "WIMWV,020,T,3,M,A"))
+    assert log.series.channels["apparent_wind_speed"][0] == 5
+    assert np.isnan(log.series.channels["apparent_wind_speed"][1])
+    assert log.series.channels["theoretical_wind_speed"][1] == 3
+
+
+def test_our_checksum_is_the_standards() -> None:
+    assert checksum("GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,") == 0x47
