@@ -51,7 +51,7 @@ class ClockModel:
     Attributes:
         device: name of the device whose clock this is.
         reference: name of the clock it is expressed on.
-        method: "stamps", "given" or "estimated".
+        method: "stamps", "given", "estimated" (from motion) or "paired" (from two stamps of each sample).
         confidence: probability that the true offset lies within 2 σ of the stated one, 0 to 1; 1 for given offsets.
     """
 

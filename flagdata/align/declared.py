@@ -14,6 +14,9 @@ from flagdata.timebase import NANOSECONDS
 QUARTZ = 3e-5
 """Standard uncertainty of the rate difference of two free-running quartz clocks [s/s]: ±50 ppm, rectangular."""
 
+PRIOR_DRIFT = 1e-4
+"""Standard uncertainty of that rate before it is measured [s/s]: wide enough for poor oscillators in the cold."""
+
 _STEPS = (3600.0, 60.0, 10.0, 1.0, 0.1, 0.01, 0.001)  # s, that loggers cut their stamps to
 
 

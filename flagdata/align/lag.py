@@ -20,7 +20,8 @@ known, so the estimator uses only that it rises:
    of the stamps is added in quadrature.
 6. Chance is measured, not assumed: winds with the same spectrum and random phases (Theiler et al., 1992) go through
    step 4, and a Gumbel distribution fitted to their greatest scores gives the probability of a score as high by
-   accident. A periodic wind stays periodic under this, and so fails by itself.
+   accident. A periodic wind stays periodic under this, and so fails by itself. Here both are filtered by the motion's
+   own autoregression (Box and Jenkins, 1970), behind which accidents are rarest.
 
 Everything here is a function of its arguments: no files, no clocks, no random generator of its own.
 """
@@ -96,11 +97,14 @@ class LagCurve:
         offset: (m,) offsets tried [s].
         score: (m,) z; NaN where the overlap is too short.
         overlap: (m,) time covered by both [s].
-        chance_score: the score that `LagSearch.chance` of the accidental greatest ones exceed; NaN when not reached.
+        evidence: (m,) the score of step 6, of white motion; NaN likewise.
+        chance_score: the evidence that accidents exceed with the probability `LagSearch.chance`; NaN where nothing was
+            searched.
     """
 
     offset: Series
     score: Series
+    evidence: Series
     overlap: Series
     chance_score: float
 
@@ -161,16 +165,20 @@ def estimate_offset(
     bins = LagBins.of(motion, wind, centre=search.centre - search.response, window=search.window)
     if bins.gustiness < search.gustiness:
         return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
-    pair = fit(bins, overlap=search.overlap)
-    if pair is None:
+    model = fit(bins, overlap=search.overlap)
+    if model is None:
         return _nothing(bins, search, (*motion.findings, _short_overlap(bins.longest_overlap(), search)))
+    pair = model.best
     score, counts, best = pair.search(overlap=search.overlap)
     peak = pair.peak(score, best)
 
-    location, scale = _accidents(pair, search, generator)
-    chance = -math.expm1(-math.exp(-(float(score[best]) - location) / scale))
     rival, mass, spread = _lobe(bins.offsets, score, best)
     statistical = max(peak.sigma, spread)
+    reach = max(STEPS, round(2 * min(statistical, search.window) / bins.period * STEPS))
+    seen, _, _ = model.whitest.search(overlap=search.overlap)
+    near = seen[max(best - reach, 0) : best + reach + 1]
+    accidents = _Accidents.of(model.whitest, search, generator)
+    chance = accidents.chance(float(np.nanmax(near)))
     sigma = math.sqrt(statistical**2 + search.response_sigma**2 + search.stamp_sigma**2)
     offset = peak.offset + search.response
     estimate = LagEstimate(
@@ -187,24 +195,40 @@ def estimate_offset(
         curve=LagCurve(
             offset=bins.offsets + search.response,
             score=score,
+            evidence=seen,
             overlap=counts * bins.period,
-            chance_score=float(location - scale * math.log(-math.log1p(-search.chance))),
+            chance_score=accidents.score(search.chance),
         ),
     )
     return replace(estimate, findings=(*motion.findings, *_judge(estimate, search, best=best, rival=rival)))
 
 
-def _accidents(pair: Whitened, search: LagSearch, generator: np.random.Generator) -> tuple[float, float]:
-    """Location and scale of the Gumbel distribution of the greatest score that winds of random phase reach."""
-    present = np.isfinite(pair.wind)
-    centred = np.where(present, pair.wind - np.mean(pair.wind[present]), 0.0)
-    spectrum = np.abs(np.fft.rfft(centred))[:, None]
-    phase = generator.uniform(0.0, 2 * math.pi, (len(spectrum), search.surrogates))
-    winds = np.fft.irfft(spectrum * np.exp(1j * phase), n=len(centred), axis=0)
-    scores, _ = pair.scores(winds, overlap=search.overlap)
-    greatest = np.max(scores[np.all(np.isfinite(scores), axis=1)], axis=0)
-    scale = float(np.std(greatest, ddof=1)) * math.sqrt(6) / math.pi
-    return float(np.mean(greatest)) - _EULER * scale, scale
+@dataclass(frozen=True, kw_only=True)
+class _Accidents:
+    """Gumbel distribution of the greatest score that winds of the same spectrum and random phases reach."""
+
+    location: float
+    scale: float
+
+    @classmethod
+    def of(cls, pair: Whitened, search: LagSearch, generator: np.random.Generator) -> _Accidents:
+        present = np.isfinite(pair.wind)
+        centred = np.where(present, pair.wind - np.mean(pair.wind[present]), 0.0)
+        spectrum = np.abs(np.fft.rfft(centred))[:, None]
+        phase = generator.uniform(0.0, 2 * math.pi, (len(spectrum), search.surrogates))
+        winds = np.fft.irfft(spectrum * np.exp(1j * phase), n=len(centred), axis=0)
+        scores, _ = pair.scores(winds, overlap=search.overlap)
+        greatest = np.max(scores[np.all(np.isfinite(scores), axis=1)], axis=0)
+        scale = float(np.std(greatest, ddof=1)) * math.sqrt(6) / math.pi
+        return cls(location=float(np.mean(greatest)) - _EULER * scale, scale=scale)
+
+    def chance(self, score: float) -> float:
+        """Probability of a greatest score above `score`."""
+        return -math.expm1(-math.exp(-(score - self.location) / self.scale))
+
+    def score(self, chance: float) -> float:
+        """The score that is exceeded with probability `chance`."""
+        return self.location - self.scale * math.log(-math.log1p(-chance))
 
 
 def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float, float]:
@@ -310,6 +334,10 @@ def _nothing(bins: LagBins, search: LagSearch, findings: tuple[Finding, ...]) ->
         bins=0,
         findings=findings,
         curve=LagCurve(
-            offset=bins.offsets + search.response, score=empty, overlap=np.zeros(len(empty)), chance_score=math.nan
+            offset=bins.offsets + search.response,
+            score=empty,
+            evidence=empty,
+            overlap=np.zeros(len(empty)),
+            chance_score=math.nan,
         ),
     )

@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 
 from flagdata.align.clock import ClockModel, Segment
-from flagdata.align.declared import QUARTZ, by_stamps, given, stamp_sigma
+from flagdata.align.declared import by_stamps, given, stamp_sigma
+from flagdata.align.drift import ClockLine, clock_line
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
 from flagdata.align.recording import Alignment, Pair
 from flagdata.align.windbins import wind_bins
 from flagdata.errors import CorruptError, RefusedError, UsageError
+from flagdata.findings import Severity
 from flagdata.record.metadata import CAMERA
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
@@ -91,22 +93,34 @@ class Evidence:
         motion: on the camera's clock.
         wind: bins whose instants were corrected for the instrument's averaging, on the wind's clock.
         estimate: accepted or not.
+        line: offset and drift over the whole recording; `None` where the estimate was refused.
         response: by how much motion was taken to follow the wind [s].
     """
 
     motion: MotionSeries
     wind: WindAverage
     estimate: LagEstimate
+    line: ClockLine | None
     response: float
 
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why there is no clock model; empty when there is."""
+        crooked = self.line.findings if self.line is not None else ()
+        return (*self.estimate.reasons, *(f.what for f in crooked if f.severity is Severity.ERROR))
+
     def as_json(self) -> bytes:
-        """The search, for the record: offsets [s], scores, and the score that accidents seldom exceed."""
+        """The search, for the record: offsets [s], scores, evidence, and the evidence that accidents seldom reach."""
         curve = self.estimate.curve
-        score = [None if math.isnan(value) else round(value, 4) for value in curve.score.tolist()]
+        score, seen = (
+            [None if math.isnan(value) else round(value, 4) for value in values.tolist()]
+            for values in (curve.score, curve.evidence)
+        )
         content = {
             "schema": "flagdata.lag-curve/1",
             "offset": np.round(curve.offset, 3).tolist(),
             "score": score,
+            "evidence": seen,
             "chance_score": round(curve.chance_score, 4),
         }
         return json.dumps(content, allow_nan=False).encode()
@@ -155,7 +169,10 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
     motion = pair.motion(progress=progress)
     generator = stream(0, "align", pair.camera.id, pair.wind.id)
     estimate = estimate_offset(motion, bins.average, search=search, generator=generator)
-    return Evidence(motion=motion, wind=bins.average, estimate=estimate, response=search.response)
+    line = None
+    if estimate.accepted:
+        line = clock_line(motion, bins.average, estimate, search=search, generator=generator)
+    return Evidence(motion=motion, wind=bins.average, estimate=estimate, line=line, response=search.response)
 
 
 def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:
@@ -164,10 +181,10 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
     Raises:
         RefusedError: it may not, with the reasons.
     """
-    estimate = found.estimate
-    if not estimate.accepted:
+    estimate, line = found.estimate, found.line
+    if line is None or found.reasons:
         raise RefusedError(
-            f"no offset can be told: {'; '.join(estimate.reasons)}",
+            f"no offset can be told: {'; '.join(found.reasons)}",
             where=f"{pair.camera.name} and {pair.wind.name}",
             fix="look at it with --plot FILE.png; then state the offset: --by given --offset S --offset-sigma S",
         )
@@ -175,10 +192,11 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
     segment = Segment(
         start=start,
         end=end,
-        origin=estimate.at,
-        offset=estimate.offset,
-        sigma_offset=estimate.sigma,
-        sigma_drift=QUARTZ,
+        origin=line.origin,
+        offset=line.offset,
+        drift=line.drift,
+        sigma_offset=line.sigma_offset,
+        sigma_drift=line.sigma_drift,
     )
     clock = ClockModel(
         device=pair.camera.name,
@@ -191,7 +209,7 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
         clock=clock,
         recipe=recipe,
         findings=estimate.findings,
-        details={"method": "estimated", **summary(estimate)},
+        details={"method": "estimated", **summary(estimate), "drift": drift_summary(line)},
         curve=found.as_json(),
     )
     return Outcome(alignment=alignment, evidence=found)
@@ -216,6 +234,11 @@ def summary(estimate: LagEstimate) -> dict[str, Any]:
         "accepted": estimate.accepted,
         "findings": [finding.as_dict() for finding in estimate.findings],
     }
+
+
+def drift_summary(line: ClockLine) -> dict[str, Any]:
+    """A recording's drift for JSON; `parts` is 0 where it is a prior's."""
+    return {"value": line.drift, "sigma": line.sigma_drift, "parts": len(line.parts)}
 
 
 def _start_sigma(pair: Pair) -> float:

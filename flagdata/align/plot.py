@@ -18,8 +18,8 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
     """Write the picture; its format is that of the file's suffix (.png, .svg, .pdf).
 
     Above: motion energy, in bins like the wind's and shifted by the estimate, and the wind, both as normal scores.
-    Below: the score at every offset tried with the 90 % interval, and the score that unrelated winds seldom exceed; all
-    of the search, and the surroundings of the peak.
+    Below left: the evidence at every offset tried, and the band that unrelated winds seldom leave. Below right: the
+    score around the peak, and the 90 % interval.
 
     Raises:
         InputError: a suffix that cannot be drawn, or a folder that cannot be written.
@@ -47,22 +47,27 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
                 color=_WIND, lw=1.1, label="wind speed")  # fmt: skip
     series.plot(middles, normal_scores(energy), color=_MOTION, lw=1.1, label="motion of the flag")
     series.set(xlabel=f"time on the wind's clock [s since {iso(origin)}]", ylabel="normal score")
-    series.legend(loc="upper right", frameon=False, ncols=2)
-    verdict = "accepted" if estimate.accepted else "refused: " + "; ".join(estimate.reasons)
+    series.legend(loc="upper right", framealpha=0.85, edgecolor="none", ncols=2)
+    verdict = "refused: " + "; ".join(evidence.reasons) if evidence.reasons else "accepted"
     series.set_title(f"{title}: {verdict}", loc="left", fontsize=10, wrap=True)
 
     curve = estimate.curve
     for axes in (search, near):
-        axes.plot(curve.offset, curve.score, color=_MARK, lw=1)
-        if np.isfinite(curve.chance_score):
-            axes.axhline(curve.chance_score, color=_MARK, ls=":", lw=1)
-            axes.axhspan(-curve.chance_score, curve.chance_score, color=_MARK, alpha=0.07, lw=0)
+        axes.plot(curve.offset, curve.evidence if axes is search else curve.score, color=_MARK, lw=1)
         if np.isfinite(estimate.offset):
             axes.axvspan(*estimate.interval, color=_MOTION, alpha=0.25, lw=0)
             axes.axvline(estimate.offset, color=_MOTION, lw=1)
         axes.set_xlabel("offset added to the camera's clock [s]")
-    search.set_ylabel("score z of motion with wind")
-    search.set_title("all offsets tried; gray: unrelated winds stay below it", loc="left", fontsize=9)
+    if not np.any(np.isfinite(curve.score)):
+        for axes in (search, near):
+            axes.set(xticks=[], yticks=[])
+            axes.text(0.5, 0.5, "nothing was searched", ha="center", va="center", transform=axes.transAxes)
+    if np.isfinite(curve.chance_score):
+        search.axhline(curve.chance_score, color=_MARK, ls=":", lw=1)
+        search.axhspan(-curve.chance_score, curve.chance_score, color=_MARK, alpha=0.07, lw=0)
+    search.set_ylabel("evidence z")
+    near.set_ylabel("score z")
+    search.set_title("all offsets tried; unrelated winds stay within the gray", loc="left", fontsize=9)
     if np.isfinite(estimate.offset):
         half = max(10.0, 6 * min(estimate.sigma, 5.0))
         near.set_xlim(estimate.offset - half, estimate.offset + half)

@@ -116,7 +116,21 @@ class Peak:
     bins: int
 
 
-def fit(bins: LagBins, *, overlap: float) -> Whitened | None:
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """Two views of one model: `best` for the offset, `whitest` for telling whether there is any relation.
+
+    Attributes:
+        best: filtered by what the wind leaves unexplained of the motion; most certain if the two are related.
+        whitest: filtered by the motion's own autoregression (Box and Jenkins, 1970); least chance for accidents, since
+            the motion is then white whether or not it follows the wind.
+    """
+
+    best: Whitened
+    whitest: Whitened
+
+
+def fit(bins: LagBins, *, overlap: float) -> Fit | None:
     """The filter φ(B) and the smooth, symmetric response to the wind that suit a pair best, found in turn.
 
     The response is a sum of Gaussians of several widths with coefficients ≥ 0, by non-negative least squares on the
@@ -128,7 +142,7 @@ def fit(bins: LagBins, *, overlap: float) -> Whitened | None:
         `None` where no trial offset covers `overlap` [s].
     """
     smooth = np.stack([_smoothed(bins.wind, width) for width in _WIDTHS], axis=1)  # (n, widths)
-    filters = autoregression(bins.motion, stride=STEPS)
+    own = filters = autoregression(bins.motion, stride=STEPS)
     best, highest = -1, -math.inf
     for column in smooth.T:
         score, _, trial = Whitened.by(filters, column, bins).search(overlap=overlap)
@@ -136,7 +150,7 @@ def fit(bins: LagBins, *, overlap: float) -> Whitened | None:
             best, highest = trial, float(score[trial])
     if best < 0:
         return None
-    pair = None
+    pair, wind = None, smooth[:, 0]
     for _ in range(_ROUNDS):
         motion = bins.motion[bins.index(best)]
         wind = _response(smooth, motion, filters)
@@ -145,7 +159,7 @@ def fit(bins: LagBins, *, overlap: float) -> Whitened | None:
         _, _, best = pair.search(overlap=overlap)
         if best < 0:
             return None
-    return pair
+    return Fit(best=pair, whitest=Whitened.by(own, wind, bins)) if pair is not None else None
 
 
 def _response(smooth: NDArray[np.float64], motion: Series, filters: Series) -> Series:
