@@ -6,8 +6,8 @@ looks again. The log is never expired: a tag must be readable for as long as the
 
 Every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row, and a checkpoint is
 written, which bounds the log that must be replayed. The old files stay, since old versions are made of them. (Each file
-costs a fresh reader about 1 ms; tidying takes about 50 ms.) The library's own checkpoints are off: it does not flush
-them to the disk, so a power cut could leave one that is empty and a table that cannot be opened.
+costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a commit.) The library's own checkpoints are
+off: it does not flush them to the disk, so a power cut could leave one that is empty and a table that does not open.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Catalog:
     def create(self, info: Mapping[str, str]) -> None:
         """Make the empty table."""
         DeltaTable.create(
-            str(self.path),
+            self.path.as_uri(),
             catalog_schema(),
             mode="error",
             configuration=_CONFIGURATION,
@@ -199,13 +199,18 @@ class Catalog:
             self._commit(table, rows, removed=small, rows_change=False, info=info)
 
     def unpublished_files(self) -> list[Path]:
-        """What is left by processes that died before, or while, they put their log entry: no version refers to it."""
+        """What is left by processes that died before, or while, they put their log entry: no version refers to it.
+
+        Raises:
+            CorruptError: a log entry that cannot be read.
+        """
         tracked = set()
         for entry in self._log.glob("*.json"):
-            for line in entry.read_text().splitlines():
-                added = json.loads(line).get("add")
-                if added is not None:
-                    tracked.add(added["path"])
+            try:
+                actions = [json.loads(line) for line in entry.read_text().splitlines()]
+            except ValueError:
+                raise CorruptError("the log entry is damaged", where=str(entry), fix="restore it from a copy") from None
+            tracked.update(action["add"]["path"] for action in actions if "add" in action)
         rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked]
         entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
         return sorted([*rows, *entries])
@@ -271,7 +276,7 @@ class Catalog:
             if self._table is not None and self._table.version() < version:
                 self._table.update_incremental()
             if self._table is None or self._table.version() != version:
-                self._table = DeltaTable(str(self.path), version=version)
+                self._table = DeltaTable(self.path.as_uri(), version=version)
         except DeltaError as error:
             raise CorruptError(
                 f"the catalog's log cannot be read: {error}",

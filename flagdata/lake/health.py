@@ -41,7 +41,12 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         findings += [_orphan(found, grace) for found in stored if found.name not in needed]
     findings += _strays(lake)
     findings += [_abandoned(state) for state in states if not state.alive]
-    findings += [_unpublished(path, grace) for path in lake.unpublished_files()]
+    try:
+        findings += [_unpublished(path, grace) for path in lake.unpublished_files()]
+    except FlagdataError as error:
+        findings.append(
+            Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+        )
     return tuple(findings)
 
 

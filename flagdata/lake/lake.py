@@ -8,12 +8,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from urllib.parse import unquote
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata import provenance
-from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
@@ -47,8 +48,9 @@ class Lake:
 
         Raises:
             ConflictError: a lake, or anything else, is there.
+            UsageError: a path that the Delta library cannot work in.
         """
-        lake = cls(Path(path).absolute())
+        lake = cls(_usable(path))
         with disk_errors("creating a lake", lake.path):
             if lake.path.exists() and (not lake.path.is_dir() or any(lake.path.iterdir())):
                 what = "a lake" if (lake.path / _MARKER).exists() else "something else"
@@ -79,8 +81,9 @@ class Lake:
             NotFoundError: no lake there.
             ConflictError: written by a newer format.
             CorruptError: its marker cannot be read.
+            UsageError: a path that the Delta library cannot work in.
         """
-        lake = cls(Path(path).absolute())
+        lake = cls(_usable(path))
         marker = lake.path / _MARKER
         try:
             content = json.loads(marker.read_text())
@@ -241,7 +244,7 @@ class Lake:
         return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits)
 
     def table(self, view: View) -> pa.Table:
-        """All rows of a view; an identity on several branches is taken from the first."""
+        """All rows of a view, its base first. An identity is on one branch of a view only."""
         parts = []
         for part in view:
             rows = self.catalog.rows(part.version)
@@ -257,6 +260,17 @@ class Lake:
 
     def _commits(self) -> dict[str, tuple[int, str]]:
         return {e["commit"]: (e["version"], e["branch"]) for e in self.catalog.history() if "commit" in e}
+
+
+def _usable(path: Path | str) -> Path:
+    whole = Path(path).absolute()
+    if unquote(str(whole)) != str(whole):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
+        raise UsageError(
+            "the path of a lake cannot have a percent sign before two hexadecimal digits",
+            where=str(whole),
+            fix="rename the folder",
+        )
+    return whole
 
 
 def _filter(table: pa.Table, where: str) -> pa.Table:

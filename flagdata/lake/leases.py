@@ -24,6 +24,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from flagdata.lake.durable import disk_errors
+
 _LEASE = "lease"
 _COLLECT = ".collect"
 
@@ -82,8 +84,7 @@ def keeping_collectors_out(staging: Path) -> Iterator[None]:
 
 @contextmanager
 def collecting(staging: Path) -> Iterator[None]:
-    """No transaction starts, puts an object or commits, and no ref is made, during the block; it works on a lake one
-    may only read."""
+    """No transaction starts, puts an object or commits, and no ref is made, during the block."""
     with _locked(staging / _COLLECT, fcntl.LOCK_EX):
         yield
 
@@ -123,9 +124,11 @@ def _try_lock(descriptor: int) -> bool:
 
 @contextmanager
 def _locked(path: Path, mode: int) -> Iterator[None]:
-    if not path.exists():
-        path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
-        path.touch()
-    with path.open() as file:
+    with disk_errors("locking the lake", path):
+        if not path.exists():
+            path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
+            path.touch()
+        file = path.open()
+    with file:
         fcntl.flock(file, mode)
         yield

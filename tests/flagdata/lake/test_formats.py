@@ -1,0 +1,121 @@
+"""What others see of a lake: its catalog is plain Delta, its hashes are sha256sum's, its folder may be anywhere."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from flagdata.errors import CorruptError, UsageError
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.catalog import Moved
+from flagdata.lake.health import doctor
+from flagdata.lake.objects import content_hash
+from flagdata.schema import CATALOG, Kind
+
+Put = Callable[..., Artifact]
+
+
+def test_polars_reads_the_catalog_as_a_delta_table(lake: Lake, put_text: Put) -> None:
+    for i in range(40):  # beyond the merge of small files
+        put_text(lake, f"{i:02d}")
+    frame = pl.read_delta(str(lake.path / "catalog"))
+    assert frame.columns == list(CATALOG)
+    assert sorted(frame["name"].to_list()) == [f"{i:02d}" for i in range(40)]
+
+
+def test_a_file_has_the_hash_that_sha256_publishes_for_it(tmp_path: Path) -> None:
+    # FIPS 180-2, appendix B.1
+    path = tmp_path / "abc"
+    path.write_bytes(b"abc")
+    assert content_hash(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+
+
+@pytest.mark.skipif(shutil.which("sha256sum") is None, reason="sha256sum is not installed")
+def test_a_folder_has_the_hash_of_the_lines_that_sha256sum_prints(tmp_path: Path) -> None:
+    folder = tmp_path / "object.zarr"
+    for name in ("b/c/0", "b.json", "a", "é"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(name)
+    (folder / "empty").mkdir()
+    command = "find . -type f -printf '%P\\n' | LC_ALL=C sort | xargs -d '\\n' sha256sum"
+    lines = subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, check=True).stdout
+    assert content_hash(folder) == hashlib.sha256(lines).hexdigest()
+
+
+@pytest.mark.parametrize("name", ["with blank", "50%", "a#b", "q?x=1", "ünïcode", "[set]", "file:"])
+def test_a_lake_works_in_a_folder_of_any_name(tmp_path: Path, put_text: Put, name: str) -> None:
+    lake = Lake.create(tmp_path / name / "lake")
+    put_text(lake, "a")
+    lake.tag("v1")
+    assert Lake.open(tmp_path / name / "lake").rows(at="v1")["name"].to_pylist() == ["a"]
+    assert doctor(lake) == ()
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_folder_name_that_the_delta_library_would_decode_is_refused(tmp_path: Path) -> None:
+    for make in (Lake.create, Lake.open):
+        with pytest.raises(UsageError, match="percent"):
+            make(tmp_path / "50%20" / "lake")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lake_that_is_moved_stays_whole(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+    put_text(lake, "a")
+    lake.path.rename(tmp_path / "elsewhere")
+    moved = Lake.open(tmp_path / "elsewhere")
+    put_text(moved, "b")
+    assert moved.rows()["name"].to_pylist() == ["a", "b"]
+    assert doctor(moved) == ()
+
+
+def test_of_two_appends_at_one_version_the_second_is_told_and_publishes_nothing(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    base = lake.catalog.head()
+    rows = lake.rows()
+    first, second = Lake.open(lake.path).catalog, Lake.open(lake.path).catalog
+    assert [second.head(), second.rows(base).num_rows] == [base, 1]
+    assert first.append(rows, base=base, info={}) == base + 1
+    with pytest.raises(Moved):
+        second.append(rows, base=base, info={})
+    assert second.head() == base + 1
+    assert lake.catalog.unpublished_files() == []
+
+
+def test_a_batch_of_rows_is_one_version_and_one_file(lake: Lake) -> None:
+    before = lake.catalog.head()
+    with lake.transaction("a batch") as tx:
+        for i in range(1000):
+            tx.add(Artifact(kind=Kind.MEASUREMENT, name=f"{i}", recipe={"i": i}))
+    assert lake.catalog.head() == before + 1
+    assert len(list((lake.path / "catalog").glob("*.parquet"))) == 1
+    assert lake.rows().num_rows == 1000
+
+
+def test_rows_come_in_the_order_of_commit_then_start_then_frame(lake: Lake) -> None:
+    with lake.transaction("first") as tx:
+        for start, frame in ((20, 0), (10, 30), (10, 0)):
+            tx.add(Artifact(kind=Kind.CLIP, name=f"{start}-{frame}", start=start, frame_first=frame, seed=start))
+    with lake.transaction("second") as tx:
+        tx.add(Artifact(kind=Kind.CLIP, name="5-0", start=5, frame_first=0))
+    expected = ["10-0", "10-30", "20-0", "5-0"]
+    assert lake.rows()["name"].to_pylist() == expected
+    assert lake.rows("kind = 'clip'")["name"].to_pylist() == expected
+
+
+def test_a_damaged_log_entry_is_told_by_its_name(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "a")
+    put_text(lake, "b")
+    entry = lake.path / "catalog" / "_delta_log" / "00000000000000000001.json"
+    entry.write_text(entry.read_text()[:100])
+    fresh = Lake.open(lake.path)
+    with pytest.raises(CorruptError):
+        fresh.rows()
+    findings = doctor(fresh)
+    assert {"ref-unreadable", "log-damaged"} <= {f.kind for f in findings}
+    assert any(f.where == str(entry) for f in findings)
