@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import torch
 from torch import Tensor
 
 from sim import bending, membrane
 from sim.cloth import gather_sum
-from sim.state import State
 from sim.system import System
 
 _ITERATIONS = 80
@@ -19,14 +19,17 @@ _DEFICIT = 1.05
 # Strain the stiffness is taken at: faces rarely exceed it where strain is not limited.
 _STRETCH = 1.15
 
+_LIMITS: WeakKeyDictionary[System, float] = WeakKeyDictionary()
 
-def stiffest(system: System, state: State) -> Tensor:
+
+def stiffest(system: System) -> Tensor:
     """An upper estimate of the largest eigenvalue ω² of M⁻¹K: (batch,) [1/s²].
 
-    Taken at the given shape stretched by 15 %, with the largest entries of every table, handle springs included.
+    Taken at the rest shape stretched by 15 %, with the largest entries of every table, handle springs included.
     """
     cloth = system.cloth
-    position = state.position * _STRETCH
+    flat = torch.as_tensor(cloth.mesh.rest * _STRETCH, dtype=cloth.dtype, device=cloth.device)
+    position = torch.nn.functional.pad(flat, (0, 1)).unsqueeze(-1).repeat(1, 1, cloth.batch)
     at = membrane.Linearised.at(cloth, position)
     largest = cloth.samples.reshape(len(cloth.samples), -1, 4).amax(1)[cloth.table_of]
     k0, k1, k2, k3 = (largest[:, i].expand_as(k) for i, k in enumerate(at.k))
@@ -52,8 +55,8 @@ def stiffest(system: System, state: State) -> Tensor:
         return product / cloth.mass.unsqueeze(1) * free
 
     # A fixed start that has a part along every mode: no generator is needed, and results repeat.
-    index = torch.arange(state.position[..., 0].numel(), dtype=cloth.dtype, device=cloth.device)
-    field = torch.sin(index * index).reshape(-1, 3, 1).expand_as(state.position) * free
+    index = torch.arange(position[..., 0].numel(), dtype=cloth.dtype, device=cloth.device)
+    field = torch.sin(index * index).reshape(-1, 3, 1).expand_as(position) * free
     value = torch.zeros_like(cloth.damping)
     for _ in range(_ITERATIONS):
         field = field / (field**2).sum((0, 1)).sqrt()
@@ -62,15 +65,18 @@ def stiffest(system: System, state: State) -> Tensor:
     return value * _DEFICIT
 
 
-def stable_step(system: System, state: State) -> float:
+def stable_step(system: System) -> float:
     """The largest step [s] at which leapfrog with lagged Kelvin–Voigt damping d is stable for the whole batch.
 
     The amplification matrix of one mode has determinant 1 − d ω² h and trace 2 − d ω² h − ω² h²; the Jury criterion
     gives ω² h² + 2 d ω² h < 4, that is h < −d + √(d² + 4/ω²).
     """
-    worst = float(stiffest(system, state).max())
-    damping = float(system.cloth.damping.max())
-    return -damping + math.sqrt(damping**2 + 4 / worst)
+    if system not in _LIMITS:
+        with torch.no_grad():
+            worst = float(stiffest(system).max())
+        damping = float(system.cloth.damping.max())
+        _LIMITS[system] = -damping + math.sqrt(damping**2 + 4 / worst)
+    return _LIMITS[system]
 
 
 def _free(system: System) -> Tensor:

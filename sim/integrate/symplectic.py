@@ -37,20 +37,20 @@ class Symplectic:
     """Leapfrog.
 
     Attributes:
-        step: upper bound of the step [s]; None for 0.7 of the stability limit of the system's start.
+        step: upper bound of the step [s]; None for 0.7 of the stability limit of the system.
         backend: what computes the forces.
     """
 
     step: float | None = None
     backend: Backend = Backend.AUTO
 
-    def steps(self, system: System, state: State, duration: float) -> int:
+    def steps(self, system: System, duration: float) -> int:
         """How many steps a duration [s] takes.
 
         Raises:
             UsageError: a forced step beyond the stability limit.
         """
-        limit = stable_step(system, state)
+        limit = stable_step(system)
         if self.step is None:
             return max(1, math.ceil(duration / (_SAFETY * limit) - 1e-9))
         if not (0 < self.step < limit):
@@ -62,7 +62,7 @@ class Symplectic:
 
     def advance(self, system: System, state: State, duration: float) -> State:
         """The state `duration` seconds later."""
-        return advance(system, state, duration, steps=self.steps(system, state, duration), backend=self.backend)
+        return advance(system, state, duration, steps=self.steps(system, duration), backend=self.backend)
 
 
 def advance(system: System, state: State, duration: float, *, steps: int, backend: Backend = Backend.AUTO) -> State:

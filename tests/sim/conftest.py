@@ -1,0 +1,72 @@
+"""Small systems for the simulator's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+import torch
+
+from sim.air import AirForce, QuadraticNormal
+from sim.cloth import Cloth
+from sim.handles import Handles
+from sim.material import Material, isotropic
+from sim.mesh import Mesh, grid
+from sim.scene import upright
+from sim.state import State
+from sim.system import System
+from sim.tables import Evaluation
+from sim.wind.uniform import UniformWind
+
+MakeSystem = Callable[..., tuple[System, State]]
+
+
+@pytest.fixture
+def plain() -> Material:
+    """Constant stiffness, no damping: its forces derive from an energy."""
+    return isotropic(name="plain", density=0.2, stretching=50.0, shear=40.0, bending=1e-4)
+
+
+@pytest.fixture
+def distorted() -> Mesh:
+    """A grid whose inner vertices are moved by up to a fifth of a cell."""
+    mesh = grid(width=0.6, height=0.4, columns=6, rows=4)
+    rest = mesh.rest.copy()
+    inner = np.setdiff1d(np.arange(len(rest)), mesh.boundary)
+    rest[inner] += 0.02 * np.sin(np.arange(2 * len(inner)).reshape(-1, 2) * 7.0)
+    return Mesh(rest=rest, faces=mesh.faces)
+
+
+@pytest.fixture
+def make_system() -> MakeSystem:
+    """A float64 system of any mesh and materials, held or free, without gravity and wind unless given."""
+
+    def make(
+        mesh: Mesh,
+        materials: Sequence[Material],
+        *,
+        handles: Handles | None = None,
+        gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        air: AirForce | None = None,
+        evaluation: Evaluation = Evaluation.ARCSIM,
+        dtype: torch.dtype = torch.float64,
+    ) -> tuple[System, State]:
+        batch = len(materials)
+        cloth = Cloth.build(mesh, materials, evaluation=evaluation, dtype=dtype)
+        held = handles or Handles(vertices=())
+        position = torch.tensor(upright(mesh), dtype=dtype).unsqueeze(-1).repeat(1, 1, batch)
+        vertices = torch.tensor(held.vertices, dtype=torch.int64)
+        system = System(
+            cloth=cloth,
+            gravity=torch.tensor(gravity, dtype=dtype)[:, None].repeat(1, batch),
+            wind=UniformWind(constant=torch.tensor(wind, dtype=dtype)[:, None].repeat(1, batch)),
+            air=air or QuadraticNormal(),
+            handles=held,
+            held=vertices,
+            anchors=position[vertices].clone(),
+        )
+        return system, State(position=position, velocity=torch.zeros_like(position))
+
+    return make

@@ -1,0 +1,86 @@
+"""Materials: the catalog, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, UnknownNameError
+from sim import material
+from sim.material import Material
+
+
+def test_catalog_has_ten_cloths_paper_and_aluminium() -> None:
+    found = material.names()
+    assert len(found) == 12
+    assert {"paper", "aluminium", "camel-ponte-roma", "11oz-black-denim"} <= set(found)
+    for name in found:
+        assert material.named(name).source
+
+
+def test_camel_ponte_roma_has_the_published_numbers() -> None:
+    # Runia et al. 2020, supplement, listing of the material file (cut to 1e-10 N·m); density as measured.
+    cloth = material.named("camel-ponte-roma")
+    assert cloth.density == 0.284
+    np.testing.assert_allclose(
+        cloth.bending[0], [36.3483e-6, 49.5855e-6, 45.7440e-6, 47.4133e-6, 20.7266e-6], rtol=0, atol=1e-10
+    )
+    np.testing.assert_allclose(cloth.stretching[2], [67.368431, 77.767944, 182.273407, -14.661531])
+
+
+@pytest.mark.reference
+def test_catalog_agrees_with_the_distributed_files(reference_data: Path) -> None:
+    for name in material.names():
+        text = (reference_data / "materials" / f"{name}.json").read_text(encoding="utf-8")
+        content = json.loads(re.sub(r"//.*", "", text))
+        cloth = material.named(name)
+        assert cloth.density == content["density"]
+        np.testing.assert_array_equal(cloth.stretching, content["stretching"])
+        np.testing.assert_array_equal(cloth.bending, content["bending"])
+
+
+def test_thicker_cloth_is_heavier_and_stiffer_by_the_same_factor() -> None:
+    thin = material.named("gray-interlock")
+    thick = thin.thickened(2)
+    assert thick.density == 2 * thin.density
+    np.testing.assert_allclose(thick.stretching, 2 * thin.stretching)
+    np.testing.assert_allclose(thick.bending, 2 * thin.bending)
+    assert thick.damping == thin.damping
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"density": -0.1}, "density"),
+        ({"density": float("nan")}, "density"),
+        ({"damping": -1.0}, "damping"),
+        ({"stretching": np.zeros((5, 4))}, "stretching"),
+        ({"bending": -np.ones((3, 5))}, "bending"),
+        ({"bending": np.full((3, 5), np.inf)}, "bending"),
+        ({"stretching": -np.ones((6, 4))}, "stiffness"),
+        ({"stretching": [["a"] * 4] * 6}, "numbers"),
+    ],
+)
+def test_impossible_materials_are_refused_with_the_reason(change: dict[str, object], word: str) -> None:
+    with pytest.raises(InputError, match=word):
+        replace(material.named("paper"), **change)
+
+
+def test_unknown_and_missing_keys_are_named() -> None:
+    content = {"source": "x", "density": 0.1, "stretching": np.ones((6, 4)), "bending": np.ones((3, 5))}
+    with pytest.raises(InputError, match="colour"):
+        Material.from_mapping({**content, "colour": "red"}, name="x")
+    with pytest.raises(InputError, match="density"):
+        Material.from_mapping({k: v for k, v in content.items() if k != "density"}, name="x")
+    with pytest.raises(InputError, match="must be a number"):
+        Material.from_mapping({**content, "density": "0.1"}, name="x")
+
+
+def test_unknown_material_suggests_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="camel-ponte-roma"):
+        material.named("camel-ponte-rom")

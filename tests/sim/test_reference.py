@@ -1,0 +1,88 @@
+"""Validation: against runs of ArcSim 0.2.1 on the same mesh, material and wind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from sim.integrate.implicit import AirShape, BackwardEuler
+from sim.integrate.symplectic import Symplectic
+from sim.material import named
+from sim.motion import edge_motion
+from sim.scene import assemble, flag
+
+pytestmark = pytest.mark.reference
+CAMEL = named("camel-ponte-roma")
+RATE = 25.0
+
+
+def reference(folder: Path, name: str) -> NDArray[np.float64]:
+    """(frame, vertex, 3) positions of a run [m]."""
+    with np.load(folder / "arcsim" / f"{name}.npz") as run:
+        return run["positions"].astype(np.float64)
+
+
+def test_grid_is_the_references(reference_data: Path) -> None:
+    scene = flag(material=CAMEL, wind_speed=4)
+    with np.load(reference_data / "arcsim" / "flag_w4_dt5.npz") as run:
+        np.testing.assert_array_equal(scene.mesh.faces, run["faces"])
+        np.testing.assert_allclose(scene.mesh.rest, run["rest"], atol=1e-6)
+        np.testing.assert_allclose(scene.position, run["positions"][0], atol=1e-6)
+
+
+@pytest.mark.parametrize("wind", [0, 4])
+def test_small_steps_with_declared_damping_follow_the_half_millisecond_runs(wind: int, reference_data: Path) -> None:
+    # The acceptance: mean vertex distance at most 5 mm through frame 5, 15 mm through frame 10, d = 0.25 ms. Observed
+    # at 4 m/s 1.0 and 6.1 mm, the vertices having moved 0.9 m.
+    expected = reference(reference_data, f"flag_w{wind}_dt05")
+    system, state = assemble([flag(material=CAMEL, wind_speed=wind)], dtype=torch.float64)
+    for frame in range(1, 11):
+        state = Symplectic().advance(system, state, 1 / RATE)
+        distance = np.linalg.norm(state.position[..., 0].numpy() - expected[frame], axis=1).mean()
+        assert distance < (5e-3 if frame <= 5 else 15e-3), f"frame {frame}"
+
+
+@pytest.mark.parametrize("wind", [0, 4, 8])
+def test_backward_euler_with_the_references_steps_is_the_reference(wind: int, reference_data: Path) -> None:
+    # Same equations, same steps, the air's shape one step ago, no declared damping: equal to the rounding of the stored
+    # float32 and six-digit files, until a bifurcation amplifies it (without wind the sheet buckles in frame 5).
+    expected = reference(reference_data, f"flag_w{wind}_dt5")
+    scene = flag(material=replace(CAMEL, damping=0.0), wind_speed=wind)
+    system, state = assemble([scene], dtype=torch.float64)
+    method = BackwardEuler(air_shape=AirShape.PREVIOUS)
+    for frame in range(1, 11):
+        state = method.advance(system, state, 1 / RATE)
+        distance = np.linalg.norm(state.position[..., 0].numpy() - expected[frame], axis=1).mean()
+        assert distance < (2e-6 if frame <= 4 else 1e-5 if wind else 2e-3), f"frame {frame}"
+
+
+def test_settled_motion_has_the_references_statistics(reference_data: Path) -> None:
+    # Sixteen starts that differ by 0.1 mm of noise, all forgotten by the second the statistics begin at; the spread
+    # between them, each as long as the reference's one run, is the sampling error that both have.
+    first = 50
+    expected_run = reference(reference_data, "flag_w4_dt05")
+    frames = len(expected_run)
+    scene = flag(material=CAMEL, wind_speed=4)
+    edge = np.flatnonzero(scene.mesh.rest[:, 0] > 1.5 - 1e-6)
+    noise = np.random.default_rng(1).normal(0, 1e-4, (16, *scene.position.shape))
+    system, state = assemble([replace(scene, position=scene.position + n) for n in noise])
+    track = []
+    for _ in range(frames):
+        track.append(state.position[edge].numpy())
+        state = Symplectic().advance(system, state, 1 / RATE)
+    assert bool(state.healthy().all())
+    runs = [edge_motion(np.stack(track)[first:, :, :, b], rate=RATE) for b in range(16)]
+    expected = edge_motion(expected_run[first:, edge], rate=RATE)
+    place = np.mean([run.position for run in runs], axis=0)
+    assert np.linalg.norm(place - expected.position) < 0.05
+    for name, band in (("speed", 0.15), ("frequency", 0.20)):
+        values = np.array([getattr(run, name) for run in runs])
+        goal = getattr(expected, name)
+        assert values.mean() == pytest.approx(goal, rel=band)
+        # The reference's own value is one more draw from the same distribution.
+        assert abs(goal - values.mean()) < 3 * values.std(ddof=1)
