@@ -71,7 +71,7 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
     if days_first or days_second:
         order: Order = "dmy" if days_first else "mdy"
         number = "first" if days_first else "second"
-        reason = f"{days_first or days_second} of {len(parts)} dates have a {number} number above 12"
+        reason = f"{days_first or days_second} of the first {len(parts)} dates have a {number} number above 12"
         if told is not None and told != order:
             raise TimeError(
                 f"dates are not {told}: {reason}", where=where, fix=f"leave the date order out, it is {order}"

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.delimited import read_table
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
+from flagdata.ingest.anemometer.table import read_table
 
 _FIELD = r"[ \t]*(?:[+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?[nN][aA][nN]|[+-]?[iI][nN][fF]|-{2,}|)[ \t]*"
 _STAMP = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}|^\d{10}(?:\.\d+)?(?=[,;\t])")
@@ -76,7 +76,8 @@ class HostStamped:
                 f"the recipe {recipe.name} says nothing of a host's stamp", where=str(source.path),
                 fix="add host = \"iso\" to its [file], or use the format delimited",
             )  # fmt: skip
-        return read_table(source, recipe, HostRows(source, recipe), zone_name=options.zone).reading
+        rows = HostRows(source, recipe)
+        return read_table(rows, recipe, where=str(source.path), zone_name=options.zone).reading
 
 
 def _shape(recipe: Recipe) -> re.Pattern[str]:

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.dates import decide
-from flagdata.ingest.anemometer.delimited import read_table
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
+from flagdata.ingest.anemometer.table import read_table
 from flagdata.signals import Sensor
 from flagdata.units import SPELLINGS, UNITS
 
@@ -113,9 +113,10 @@ class Kestrel:
             sensor=Sensor(name=f"Kestrel {found.device.get('device model', '')}".strip(), **_SENSOR),
         )  # fmt: skip
         claimed = found.units[0] if found.units else ""
+        contradicted = decision.order != "ymd" and claimed.upper().startswith("YYYY")
         findings = [
             Finding(
-                kind="date-order", severity=Severity.NOTE,
+                kind="date-order", severity=Severity.WARNING if contradicted else Severity.NOTE,
                 what=f"dates are read as {decision.order}: {decision.reason}; the header says {claimed!r}",
             )
         ]  # fmt: skip
@@ -126,7 +127,7 @@ class Kestrel:
         if unread:
             text = ", ".join(unread)
             findings.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(unread), what=text))
-        table = read_table(source, recipe, RowReader(source, recipe.file), zone_name=options.zone)
+        table = read_table(RowReader(source, recipe.file), recipe, where=where, zone_name=options.zone)
         return table.reading.with_findings(tuple(findings))
 
 

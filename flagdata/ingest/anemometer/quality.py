@@ -87,19 +87,24 @@ def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]
                     kind="negative-speed", severity=Severity.WARNING, count=count, value=lowest,
                     where=f"line {reading.line[below][0]}",
                     what=f"{count} negative values of {name}, down to {lowest:.3g} m/s; left out of averages",
+                    fix="if calm air reads below zero, give the zero offset",
                 )
             )  # fmt: skip
     return flags, tuple(found)
 
 
 def dead_zone(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
-    """Speeds below the sensor's declared threshold, or exactly 0 where none is declared: DEAD_ZONE."""
+    """Speeds below the sensor's declared threshold, or exactly 0 where none is declared: DEAD_ZONE.
+
+    Calms about a zero offset that was subtracted are flagged and reported by `zero` already.
+    """
     flags = np.zeros(len(reading.time), dtype=np.uint16)
     speed = reading.channels.get("wind_speed")
     if speed is None:
         return flags, ()
     threshold = reading.sensor.threshold
     below = (speed >= 0) & (speed < threshold) if threshold else speed == 0
+    below &= (reading.flags & SampleFlag.DEAD_ZONE) == 0
     if not below.any():
         return flags, ()
     flags[below] = SampleFlag.DEAD_ZONE
@@ -209,7 +214,8 @@ def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...
                 where=f"line {reading.line[near][0]}",
                 what=f"{int(near.sum())} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at "
                 f"the Nyquist limit {limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be "
-                f"{rate - typical:.1f} or {rate + typical:.1f} Hz; only a faster camera can tell",
+                f"{rate - typical:.1f} or {rate + typical:.1f} Hz",
+                fix=f"only a camera faster than {4 * limit:.0f} frames a second can tell",
             )
         )  # fmt: skip
     return flags, tuple(found)

@@ -194,6 +194,7 @@ def _settle(path: Path, codec: str | None) -> tuple[str, tuple[Finding, ...]]:
                 Finding(
                     kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
                     what="not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
+                    fix="name the encoding, e.g. cp1252",
                 ),
             )  # fmt: skip
     return codec or "utf-8", ()

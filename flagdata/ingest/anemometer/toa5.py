@@ -8,21 +8,23 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.delimited import read_table
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
+from flagdata.ingest.anemometer.table import read_table
 from flagdata.schema import CHANNELS, SampleFlag
-from flagdata.signals import Sensor
+from flagdata.signals import Instants, Sensor
+from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
 
 # Field names of Campbell programs, which users choose, → channel; the first that fits a channel is taken.
@@ -62,7 +64,8 @@ class Toa5:
         names, units = header[1], header[2]
         recipe, unread = self._recipe(source, header)
         extra = [name for name in names if name == "RECORD" or _DIAGNOSTIC.fullmatch(name)]
-        table = read_table(source, recipe, RowReader(source, recipe.file), zone_name=options.zone, extra=extra)
+        rows = RowReader(source, recipe.file)
+        table = read_table(rows, recipe, where=str(source.path), zone_name=options.zone, extra=extra)
         found: list[Finding] = []
         flags = table.reading.flags.copy()
         if unread:
@@ -82,7 +85,10 @@ class Toa5:
                             what=f"{int(fault.sum())} rows in which {name} reports a fault; left out of averages",
                         )
                     )  # fmt: skip
-        return table.reading.with_findings(tuple(found), flags=flags)
+        reading = table.reading.with_findings(tuple(found), flags=flags)
+        wind = next(layout.column for name, layout in recipe.channels.items() if name.startswith("wind_"))
+        processing = dict(zip(names, header[3], strict=False)).get(str(wind), "")
+        return replace(reading, sensor=replace(reading.sensor, averaging=_averaging(processing, reading.time)))
 
     def _header(self, source: TextFile) -> list[list[str]]:
         lines = source.head(4)
@@ -146,6 +152,16 @@ def _channel(name: str) -> str | None:
     for pattern, channel in _NAMES:
         if re.fullmatch(pattern, name, re.IGNORECASE):
             return channel
+    return None
+
+
+def _averaging(processing: str, time: Instants) -> float | None:
+    """Length of the logger's own averaging [s] by the header's fourth line: "Smp" a sample, "Avg" or "WVc" a mean."""
+    kind = processing.strip().lower()
+    if kind == "smp":
+        return 0.0
+    if kind in ("avg", "wvc") and len(time) > 1:
+        return float(np.median(np.diff(time))) / NANOSECONDS
     return None
 
 

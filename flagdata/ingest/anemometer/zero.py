@@ -133,13 +133,15 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
 
 
 def _report(reading: Reading, zero: Zero, choice: ZeroOffset) -> list[Finding]:
-    done = "subtracted" if choice == "estimate" else "not applied: see the option zero offset"
+    done = "subtracted" if choice == "estimate" else "not subtracted"
+    fix = None if choice == "estimate" else f"give the zero offset, estimate or {zero.offset:.3g}, to subtract it"
     first = f"line {reading.line[np.argmax(zero.idle)]}"
     found = [
         Finding(
             kind="zero-offset", severity=Severity.NOTE if choice == "estimate" else Severity.WARNING,
             count=int(zero.idle.sum()), value=zero.offset, where=first,
             what=f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}",
+            fix=fix,
         )
     ]  # fmt: skip
     if zero.exits and np.isfinite(zero.jump) and zero.jump > 0.1:
@@ -150,6 +152,7 @@ def _report(reading: Reading, zero: Zero, choice: ZeroOffset) -> list[Finding]:
                 where=f"line {reading.line[leave[0] + 1]}",
                 what=f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({zero.exits} times): lower speeds "
                 f"read as calm",
+                fix="do not use winds below that jump",
             )
         )  # fmt: skip
     return found

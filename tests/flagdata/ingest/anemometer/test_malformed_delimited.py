@@ -177,9 +177,9 @@ REFUSED = [
         {
             "error": TimeError,
             "says": "backwards",
-            "content": csv(*(f"2026-05-01T12:{59 - i:02d}:00Z,3" for i in range(40))),
+            "content": csv(*(f"2026-05-01T12:{(37 * i) % 60:02d}:00Z,3" for i in range(40))),
         },
-        id="time-runs-backwards-throughout",
+        id="time-all-mixed-up",
     ),
     pytest.param(
         {
@@ -192,6 +192,15 @@ REFUSED = [
     ),
 ]
 REPORTED = [
+    pytest.param(
+        {
+            "finding": "newest-first",
+            "count": 40,
+            "samples": 40,
+            "content": csv(*(f"2026-05-01T12:{59 - i:02d}:00Z,3" for i in range(40))),
+        },
+        id="newest-first",
+    ),
     pytest.param(
         {
             "content": csv(ROW, "when?,3", NEXT),

@@ -172,6 +172,18 @@ def test_line_ends_of_any_kind_count_lines_alike(read: Read) -> None:
         assert [f.where for f in read(end.join([*rows, ""])).findings] == ["line 3"]
 
 
+def test_a_log_that_lists_the_newest_row_first_is_read_from_its_end(tmp_path: Path) -> None:
+    # backwards through the hour that occurs twice: 03:00 CET, 02:59 … 02:00 CET, 02:59 … 02:00 CEST, 01:59 CEST
+    hour = [f"2026-10-25 02:{m:02d}:00" for m in range(59, -1, -1)]
+    walls = ["2026-10-25 03:00:00", *hour, *hour, "2026-10-25 01:59:00"]
+    text = "t,v\n" + "".join(f"{w},{i}\n" for i, w in enumerate(walls))
+    log = read(tmp_path, PLAIN, text, zone="Europe/Amsterdam")
+    assert log.series.channels["wind_speed"].tolist() == list(range(121, -1, -1))
+    assert set(np.diff(log.series.time)) == {60 * 10**9}
+    assert iso(int(log.series.time[0])) == "2026-10-24T23:59:00Z"
+    assert "newest-first" in {f.kind for f in log.findings}
+
+
 BAD: list[tuple[str, str, str, str]] = [
     ("key", 'name = "mine"', 'nmae = "mine"', "did you mean 'name'"),
     ("table", "[sensor]", "[sensors]", "did you mean 'sensor'"),

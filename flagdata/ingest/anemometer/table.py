@@ -1,0 +1,307 @@
+"""Cells of a delimited log, by a recipe, into a `Reading`: what the formats with rows and columns share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, TimeError, UnknownNameError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.recipe import ChannelLayout, Recipe
+from flagdata.ingest.anemometer.stamps import Stamps
+from flagdata.ingest.anemometer.stamps import parse as parse_stamps
+from flagdata.ingest.anemometer.wall import to_utc
+from flagdata.schema import CHANNELS, SampleFlag
+from flagdata.signals import Instants
+from flagdata.timebase import zone
+from flagdata.units import unit
+
+NEWEST_FIRST = 0.9
+"""Share of rows older than the row before them from which a log is a list with the newest row on top."""
+
+
+class Rows(Protocol):
+    """Where the cells come from; `shift` is the index of the column that recipes call 1."""
+
+    header: list[str] | None
+    shift: int
+    first_line: int
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]: ...
+
+    def findings(self) -> tuple[Finding, ...]: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A log read by a recipe.
+
+    Attributes:
+        reading: its channels.
+        extra: (n,) float64 of the columns asked for beside the channels, as written.
+    """
+
+    reading: Reading
+    extra: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass
+class _Column:
+    """One column as its blocks come in."""
+
+    index: int
+    values: list[NDArray[np.float64]] = field(default_factory=list)
+    states: list[NDArray[np.uint8]] = field(default_factory=list)
+
+    def value(self, order: slice) -> NDArray[np.float64]:
+        return np.concatenate(self.values)[order]
+
+    def state(self, order: slice) -> NDArray[np.uint8]:
+        return np.concatenate(self.states)[order]
+
+
+@dataclass
+class _Clock:
+    """One clock's stamps as their blocks come in."""
+
+    form: str
+    columns: list[int]
+    step: int = 2**62
+    ns: list[NDArray[np.int64]] = field(default_factory=list)
+    utc: list[NDArray[np.bool_]] = field(default_factory=list)
+
+    def parse(self, block: Sequence[Sequence[str]]) -> Stamps:
+        return parse_stamps([" ".join(row[i].strip() for i in self.columns) for row in block], self.form)
+
+    def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
+        self.ns.append(stamps.ns[keep])
+        self.utc.append(stamps.utc[keep])
+        self.step = min(self.step, stamps.step)
+
+    def order(self) -> slice:
+        """The rows from the oldest on, for logs that list the newest first."""
+        steps = np.diff(np.concatenate(self.ns))
+        turned = len(steps) > 1 and float((steps < 0).mean()) > NEWEST_FIRST
+        return slice(None, None, -1) if turned else slice(None)
+
+    def instants(
+        self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str
+    ) -> tuple[Instants, tuple[Finding, ...]]:
+        wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
+        return instants(wall, utc, line=line, zone_name=zone_name, where=where)
+
+
+@dataclass
+class _Gathered:
+    """All cells wanted, as the blocks come in."""
+
+    clock: _Clock
+    host: _Clock | None
+    channels: dict[str, _Column]
+    extra: dict[str, _Column]
+    lines: list[NDArray[np.int64]] = field(default_factory=list)
+    bad_stamps: list[int] = field(default_factory=list)
+
+    def columns(self) -> list[_Column]:
+        return [*self.channels.values(), *self.extra.values()]
+
+    def width(self) -> int:
+        """Cells a row must have."""
+        return 1 + max([*self.clock.columns, *(column.index for column in self.columns())])
+
+    def add(self, line: NDArray[np.int64], block: Sequence[Sequence[str]], recipe: Recipe) -> None:
+        stamps = self.clock.parse(block)
+        keep = stamps.valid
+        if self.host is not None:
+            host = self.host.parse(block)
+            keep = keep & host.valid
+            self.host.add(host, keep)
+        self.clock.add(stamps, keep)
+        self.bad_stamps.extend(line[~keep].tolist())
+        self.lines.append(line[keep])
+        for column in self.columns():
+            cells = [row[column.index] for row in block]
+            parsed = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing)
+            column.values.append(parsed.value[keep])
+            column.states.append(parsed.state[keep])
+
+    def line(self) -> NDArray[np.int64]:
+        return np.concatenate(self.lines) if self.lines else np.zeros(0, dtype=np.int64)
+
+
+def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None, extra: Sequence[str] = ()) -> Table:
+    """Read cells by a recipe.
+
+    Args:
+        rows: the file's rows.
+        where: the file, for messages.
+        zone_name: of wall-clock stamps; goes before the recipe's.
+        extra: further columns to read, by name.
+
+    Raises:
+        InputError: no such columns, or hardly a row that can be read.
+        TimeError: stamps without a zone, or impossible ones.
+    """
+    own = [_index(column, rows, where) for column in recipe.time.columns]
+    host = _Clock(form=recipe.file.host, columns=[0]) if recipe.file.host else None
+    gathered = _Gathered(
+        clock=_Clock(form=recipe.time.format, columns=own) if own or host is None else host,
+        host=host if own else None,
+        channels={name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()},
+        extra={name: _Column(index=_index(name, rows, where)) for name in extra},
+    )
+    for line, block in rows.blocks(gathered.width()):
+        gathered.add(line, block, recipe)
+    findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
+    order = gathered.clock.order()
+    line = gathered.line()[order]
+    if order.step == -1:
+        text = "the newest row comes first: read from the end"
+        findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))
+    zone_name = zone_name or recipe.time.zone
+    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where)
+    findings.extend(found)
+    host_time = None
+    if gathered.host is not None:
+        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where)
+    channels: dict[str, NDArray[np.float64]] = {}
+    flags = np.zeros(len(line), dtype=np.uint16)
+    for name, column in gathered.channels.items():
+        layout, state = recipe.channels[name], column.state(order)
+        unreadable = int((state == Cell.UNREADABLE).sum())
+        refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
+        channels[name] = calibrated(column.value(order), name, layout)
+        channel_flags, found = cell_flags(name, layout, channels[name], state, line)
+        findings.extend(found)
+        if name in WIND_CHANNELS:
+            flags |= channel_flags
+    reading = Reading(
+        time=time, channels=channels, flags=flags, line=line, sensor=recipe.sensor, step=gathered.clock.step,
+        rules=recipe.quality, host_time=host_time, findings=tuple(findings),
+    )  # fmt: skip
+    return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
+
+
+def _stamp_findings(gathered: _Gathered, rows: Rows, where: str) -> tuple[Finding, ...]:
+    """Rows left out for their stamps.
+
+    Raises:
+        InputError: all or most of them.
+    """
+    bad, form = gathered.bad_stamps, gathered.clock.form
+    count = len(gathered.line())
+    if count == 0:
+        raise InputError(
+            "no row with a readable time stamp",
+            where=f"{where}, line {bad[0] if bad else rows.first_line}",
+            fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded anything",
+        )
+    if not bad:
+        return ()
+    refuse_if_most(len(bad), count, f"rows without a stamp as {form}", where)
+    return (
+        Finding(
+            kind="unreadable-stamps", severity=Severity.ERROR, count=len(bad), where=f"line {bad[0]}",
+            what=f"{len(bad)} rows whose stamp is not {form} or no date; left out",
+        ),
+    )  # fmt: skip
+
+
+def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
+    absent = set(rows.header).isdisjoint if rows.header is not None else None
+    found: dict[str, int] = {}
+    for name, layout in recipe.channels.items():
+        if layout.optional and isinstance(layout.column, str) and absent is not None and absent([layout.column]):
+            continue
+        found[name] = _index(layout.column, rows, where)
+    return found
+
+
+def _index(column: str | int, rows: Rows, where: str) -> int:
+    header = rows.header
+    if isinstance(column, int):
+        if header is not None and column > len(header):
+            raise InputError(f"no column {column}, only {len(header)}", where=where, fix="correct the recipe")
+        return column - 1 + rows.shift
+    names = list(header or ())
+    if column not in names:
+        fix = UnknownNameError.of("column", column, names).fix
+        raise InputError(f"no column {column!r} in the header", where=where, fix=fix)
+    return names.index(column)
+
+
+def instants(
+    wall: NDArray[np.int64], utc: NDArray[np.bool_], *, line: NDArray[np.int64], zone_name: str | None, where: str
+) -> tuple[Instants, tuple[Finding, ...]]:
+    """UTC nanoseconds of stamps, some of which may state their own zone.
+
+    Raises:
+        TimeError: stamps without a zone and none named, or impossible in it.
+    """
+    if utc.all():
+        return wall, ()
+    if zone_name is None:
+        at = int(np.flatnonzero(~utc)[0])
+        raise TimeError(
+            "the stamps carry no time zone", where=f"{where}, line {line[at]}",
+            fix="name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00",
+        )  # fmt: skip
+    time = wall.copy()
+    rows = ~utc
+    time[rows], found = to_utc(wall[rows], zone(zone_name), lines=line[rows], where=where)
+    return time, found
+
+
+def calibrated(value: NDArray[np.float64], name: str, layout: ChannelLayout) -> NDArray[np.float64]:
+    """Cells of a column in SI, directions as 'from', clockwise, 0 to 2π."""
+    converted = unit(layout.unit).to_si(value * layout.gain + layout.offset)
+    if CHANNELS[name].unit != "rad" or not CHANNELS[name].frame.startswith("from"):
+        return converted
+    turned = converted + unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
+    return np.mod(turned, 2 * np.pi)
+
+
+def cell_flags(
+    name: str, layout: ChannelLayout, value: NDArray[np.float64], state: NDArray[np.uint8], line: NDArray[np.int64]
+) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Flags and findings about single cells: missing, unreadable, infinite, outside the instrument's range."""
+    flags = np.zeros(len(value), dtype=np.uint16)
+    found: list[Finding] = []
+
+    def note(mask: NDArray[np.bool_], flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
+        if mask.any():
+            flags[mask] |= flag
+            count = int(mask.sum())
+            found.append(
+                Finding(
+                    kind=kind, severity=severity, count=count, where=f"line {line[mask][0]}",
+                    what=f"{count} {what} of {name}",
+                )
+            )  # fmt: skip
+
+    note(state == Cell.MISSING, SampleFlag.MISSING, "missing-values", Severity.WARNING, "missing values")
+    note(state == Cell.UNREADABLE, SampleFlag.MISSING, "unreadable-values", Severity.ERROR, "unreadable values")
+    note(state == Cell.INFINITE, SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, "infinite values")
+    if layout.range is not None:
+        low, high = (float(unit(layout.unit).to_si(bound)) for bound in layout.range)
+        text = f"values outside {layout.range[0]:g} to {layout.range[1]:g} {layout.unit}"
+        note((value < low) | (value > high), SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, text)
+    return flags, tuple(found)
+
+
+def refuse_if_most(bad: int, good: int, what: str, where: str) -> None:
+    """Refuse a file of which less than half can be read: it is of another format.
+
+    Raises:
+        InputError: with both counts.
+    """
+    if bad > good or (bad and bad == good and good > 1):
+        raise InputError(
+            f"{bad} of {bad + good} are {what}", where=where, fix="look at it with flagdata ingest --sniff"
+        )
