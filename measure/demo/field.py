@@ -169,8 +169,9 @@ def write_log(path: Path, recipe: FieldRecipe, wind: NDArray[np.float64], offset
     speed = np.round(np.maximum(speed, 0.0) / recipe.resolution) * recipe.resolution
     gap = int(rng.integers(seconds // 4, seconds // 2))
     stuck = int(rng.integers(seconds // 2, 3 * seconds // 4))
-    speed[stuck : stuck + 12] = speed[stuck]
     direction = np.cumsum(rng.normal(0, 2, seconds)) + 240
+    for reading in (speed, direction):
+        reading[stuck : stuck + 12] = reading[stuck]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, delimiter=";")
         writer.writerow(["Date", "Time", "Wind speed [km/h]", "Wind direction [deg]"])
