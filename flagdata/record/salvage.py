@@ -2,19 +2,25 @@
 
 A crash, a full disk or a pulled cable leaves a file without the summary that readers by offset need. Everything before
 the break is sound: whole chunks are checked by their CRC-32, and whole messages of a last, partial, uncompressed chunk
-are kept too, named as unchecked. Nothing is invented: every message written is byte for byte one that was read.
+are kept too, named as unchecked. After a stretch that cannot be read (a bad sector) the pass goes on at the next chunk
+whose checksum is right. Nothing is invented: every message written is byte for byte one that was read.
 """
 
 from __future__ import annotations
 
+import mmap
+import os
+import re
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
 
 from google.protobuf.message import DecodeError
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
@@ -23,14 +29,20 @@ from mcap.writer import CompressionType, Writer
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.record import messages
-from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, parse
+from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, open_file, parse, read_summary
 from flagdata.record.metadata import SALVAGE
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso
 
 CHUNK_LIMIT = 1 << 30
 """No chunk, packed or not, is taken to be larger than this [B]; a longer one is a damaged length."""
-_DATA_OPCODES = frozenset(Opcode) - {Opcode.FOOTER}
+_IN_CHUNK = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
+_DATA_OPCODES = _IN_CHUNK | {
+    Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA,
+}  # fmt: skip
+_FIRST_PRIVATE = 0x80
+_DATA_END_BYTES = 4
+_CHUNK_START = re.compile(rb"\x06.{3}[\x00-\x40]\x00{4}", re.DOTALL)  # the opcode, and a length within CHUNK_LIMIT
 _CHUNK_FIELDS = struct.Struct("<QQQII")
 _KNOWN: dict[str, Any] = {
     kind.DESCRIPTOR.full_name: kind
@@ -45,10 +57,11 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     """Write all that can be read of the record `source` into the new record `target`.
 
     Returns:
-        what was found: where the file breaks off ("cut-off"), chunks left out because their checksum is wrong
-        ("damaged-chunk", "damaged-attachment", "damaged-record"), where no record can be found any more
-        ("unreadable"), messages kept without a checksum ("unchecked-messages"), messages of channels whose
-        definition is lost ("unknown-channel"), and how much was recovered ("recovered").
+        what was found: where the file breaks off ("cut-off"), what was left out because its checksum or content is
+        wrong ("damaged-chunk", "damaged-attachment", "damaged-record"), stretches without a record ("unreadable"),
+        messages kept without a checksum ("unchecked-messages"), messages of channels whose definition is lost
+        ("unknown-channel"), messages that the old summary counted and that are gone ("lost-messages"), and how much
+        was recovered ("recovered").
 
     Raises:
         NotFoundError: no `source`.
@@ -69,6 +82,7 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
         try:
             with out:
                 copy = _Copy(out)
+                _definitions(source, copy)
                 _Pass(stream, size=source.stat().st_size, where=str(source), copy=copy).run()
                 if not copy.counts:
                     raise CorruptError("no whole message is left in the record", where=str(source), fix="it is lost")
@@ -77,6 +91,21 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
             target.unlink()
             raise
     return tuple(copy.findings)
+
+
+def _definitions(source: Path, copy: _Copy) -> None:
+    """Schemas and channels from the summary, where it is sound: the chunk that holds them first may be damaged."""
+    file = open_file(source)
+    try:
+        summary = read_summary(file, where=str(source))
+    except CorruptError:
+        return
+    finally:
+        os.close(file)
+    for schema in summary.schemas.values():
+        copy.schema(schema)
+    for channel in summary.channels.values():
+        copy.channel(channel)
 
 
 class _Copy:
@@ -182,17 +211,42 @@ class _Pass:
             start = self._stream.tell()
             head = self._stream.read(RECORD_HEAD)
             if len(head) < RECORD_HEAD:
-                return self._cut_off(start, "between two records" if not head else "inside a record's head")
+                return self._cut_off(start, "inside a record's head" if head else "between two records")
             opcode, length = struct.unpack("<BQ", head)
-            if opcode not in _DATA_OPCODES and opcode < 0x80:
-                return self._damaged(start, f"no record begins at byte {start}")
-            if start + RECORD_HEAD + length > self._size:
-                return self._partial(opcode, length, start)
-            if opcode == Opcode.DATA_END:
-                return self._end(start + RECORD_HEAD + length)
-            if length > CHUNK_LIMIT:
-                return self._damaged(start, f"a record at byte {start} claims {length} bytes")
-            self._record(opcode, self._stream.read(length), start)
+            if opcode == Opcode.DATA_END and length == _DATA_END_BYTES:
+                self._stream.seek(length, os.SEEK_CUR)
+                return self._end()
+            known = opcode in _DATA_OPCODES or opcode >= _FIRST_PRIVATE
+            if known and start + RECORD_HEAD + length <= self._size and length <= CHUNK_LIMIT:
+                self._record(opcode, self._stream.read(length), start)
+                continue
+            if opcode == Opcode.CHUNK:
+                self._partial(start)
+            following = self._next_chunk(start + 1)
+            if following is None:
+                if known:
+                    return self._cut_off(start, f"inside a {_name(opcode)}")
+                return self._unreadable(start, self._size)
+            self._unreadable(start, following)
+            self._stream.seek(following)
+
+    def _next_chunk(self, start: int) -> int | None:
+        """Where the next chunk begins whose lengths fit and whose checksum is right, at or after `start`."""
+        with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as view:
+            for found in _CHUNK_START.finditer(view, start):
+                at = found.start()
+                length = int.from_bytes(view[at + 1 : at + RECORD_HEAD], "little")
+                end = at + RECORD_HEAD + length
+                if end > self._size or length > CHUNK_LIMIT:
+                    continue
+                try:
+                    chunk = Chunk.read(ReadDataStream(BytesIO(view[at + RECORD_HEAD : end])))
+                    inside, size = get_chunk_data_stream(chunk)
+                except Exception:  # noqa: BLE001  anything may follow a byte that only looks like a chunk's first
+                    continue
+                if size == chunk.uncompressed_size and zlib.crc32(inside.read(size)) == chunk.uncompressed_crc:
+                    return at
+        return None
 
     def _record(self, opcode: int, content: bytes, start: int) -> None:
         try:
@@ -239,27 +293,31 @@ class _Pass:
             return
         self._copy.attachment(parse(Attachment.read, content, where=self._where))
 
-    def _partial(self, opcode: int, length: int, start: int) -> None:
-        """The file ends inside a record that claims `length` bytes: keep the whole messages of a plain chunk."""
+    def _partial(self, start: int) -> None:
+        """Keep the whole messages of a plain chunk whose end is missing, or whose length is wrong."""
         content = self._stream.read(CHUNK_LIMIT)
+        if len(content) <= CHUNK_HEAD - RECORD_HEAD:
+            return
+        first, last, _, _, name_length = _CHUNK_FIELDS.unpack_from(content)
+        if name_length:
+            return
         kept = 0
-        if opcode == Opcode.CHUNK and len(content) > CHUNK_HEAD - RECORD_HEAD and length <= CHUNK_LIMIT:
-            first, last, _, _, name_length = _CHUNK_FIELDS.unpack_from(content)
-            if name_length == 0:
-                for inner, record in _whole_records(content[CHUNK_HEAD - RECORD_HEAD :]):
-                    if inner == Opcode.MESSAGE:
-                        message = parse(_read_message(len(record)), record, where=self._where)
-                        if not first <= message.log_time <= last or not self._plausible(message):
-                            break
-                        kept += 1
-                    self._inner(inner, record)
+        for opcode, record in _whole_records(content[CHUNK_HEAD - RECORD_HEAD :]):
+            try:
+                if opcode == Opcode.MESSAGE:
+                    message = parse(_read_message(len(record)), record, where=self._where)
+                    if not first <= message.log_time <= last or not self._plausible(message):
+                        break
+                    kept += 1
+                self._inner(opcode, record)
+            except FlagdataError:
+                break
         if kept:
             self._copy.find(
                 "unchecked-messages", Severity.WARNING,
                 f"{kept} messages kept from a chunk whose end, and so its checksum, is missing",
                 where=f"byte {start}", count=kept,
             )  # fmt: skip
-        self._cut_off(start, f"inside a {_name(opcode)}")
 
     def _plausible(self, message: Message) -> bool:
         """Whether a message without a checksum decodes as what its channel says (a crash may leave zeros behind)."""
@@ -272,9 +330,18 @@ class _Pass:
             return False
         return kind is not messages.CompressedImage or decoded.data.endswith(b"\xff\xd9")
 
-    def _end(self, at: int) -> None:
-        """All data was read; only the summary may be missing or damaged, and it is written anew."""
-        self._stream.seek(max(self._size - len(MAGIC), at))
+    def _end(self) -> None:
+        """All data was read. The summary is written anew; what is left of the old one says how much there was."""
+        held: int | None = None
+        for opcode, record in _whole_records(self._stream.read(CHUNK_LIMIT), among=frozenset(Opcode)):
+            if opcode == Opcode.STATISTICS and len(record) >= 8:
+                held = int.from_bytes(record[:8], "little")
+        if held is not None and held > self._copy.counts.total():
+            lost = held - self._copy.counts.total()
+            self._copy.find(
+                "lost-messages", Severity.ERROR, f"{lost} of {held} messages of the record are lost", count=lost
+            )
+        self._stream.seek(self._size - len(MAGIC))
         if self._stream.read() != MAGIC:
             self._copy.find(
                 "cut-off", Severity.NOTE, "all data is there; the summary at the end was cut off and is written anew",
@@ -286,23 +353,23 @@ class _Pass:
             "cut-off", Severity.WARNING, f"the file ends {place}, at byte {self._size}", where=f"byte {start}"
         )
 
-    def _damaged(self, start: int, what: str) -> None:
-        self._copy.find("unreadable", Severity.ERROR, f"{what}; nothing after it can be read", where=f"byte {start}")
+    def _unreadable(self, start: int, end: int) -> None:
+        self._copy.find(
+            "unreadable", Severity.ERROR, f"bytes {start} to {end} hold no record that can be read",
+            where=f"byte {start}", count=end - start,
+        )  # fmt: skip
 
     def _damaged_chunk(self, start: int, why: str) -> None:
         self._copy.find("damaged-chunk", Severity.ERROR, f"a chunk left out: {why}", where=f"byte {start}")
 
 
-_IN_CHUNK = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
-
-
-def _whole_records(body: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and content of the records that lie whole in `body`, up to the first that does not."""
+def _whole_records(body: bytes, *, among: frozenset[Opcode] = _IN_CHUNK) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of the records that lie whole in `body`, up to the first that does not or is not `among`."""
     at = 0
     while at + RECORD_HEAD <= len(body):
         opcode, length = struct.unpack_from("<BQ", body, at)
         at += RECORD_HEAD
-        if opcode not in _IN_CHUNK or at + length > len(body):
+        if opcode not in among or at + length > len(body):
             return
         yield opcode, body[at : at + length]
         at += length

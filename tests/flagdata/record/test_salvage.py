@@ -101,6 +101,63 @@ def test_a_damaged_chunk_is_left_out_and_named(tmp_path: Path, live: Path) -> No
     assert "checksum" in metadata["salvage/1"]["0"]
 
 
+def _touched(data: bytes, chunks: list[tuple[int, int]], first: int, last: int, whole: list) -> list:
+    """Messages of the chunks that share a byte with first…last."""
+    hit = [(s, e) for s, e in chunks if s <= last and e > first]
+    return [m for m in whole if any(s < data.find(m[4]) < e for s, e in hit)]
+
+
+def test_a_bad_sector_costs_the_chunks_it_touches_and_no_more(tmp_path: Path, live: Path) -> None:
+    data = live.read_bytes()
+    whole = _messages(live)
+    chunks = [(s, e) for s, opcode, e in _boundaries(data) if opcode == 6]
+    rng = np.random.default_rng(8)
+    for number, first in enumerate(rng.integers(chunks[0][1], chunks[-1][0], 40).tolist()):
+        last = first + 511
+        damaged = bytearray(data)
+        damaged[first : last + 1] = b"\0" * 512 if number % 2 else rng.bytes(512)
+        source, target = tmp_path / f"{number}.mcap", tmp_path / f"{number}-out.mcap"
+        source.write_bytes(damaged)
+        findings = salvage(source, target)
+        found = _messages(target)
+        assert found == [m for m in whole if m in found], f"at {first}: order or content"
+        lost = [m for m in whole if m not in found]
+        assert all(m in _touched(data, chunks, first, last, whole) for m in lost), f"at {first}"
+        counted = sum(f.count for f in findings if f.kind == "lost-messages")
+        assert counted == len(lost), f"at {first}"
+        assert bool(lost) <= any(f.severity is Severity.ERROR for f in findings)
+
+
+def test_a_chunk_with_a_damaged_head_does_not_take_the_next_ones_along(tmp_path: Path, live: Path) -> None:
+    data = live.read_bytes()
+    whole = _messages(live)
+    chunks = [(s, e) for s, opcode, e in _boundaries(data) if opcode == 6]
+    start, end = chunks[1]
+    for place, value in [
+        (0, 0x00),
+        (0, 0x0F),
+        (0, 0x07),
+        (0, 0xFF),
+        (1, 0x01),
+        (4, 0x01),
+        (7, 0xFF),
+        (8, 0x80),
+        (37, 9),
+    ]:
+        damaged = bytearray(data)
+        damaged[start + place] = value
+        source, target = tmp_path / "bad.mcap", tmp_path / "out.mcap"
+        source.write_bytes(damaged)
+        target.unlink(missing_ok=True)
+        findings = salvage(source, target)
+        found = _messages(target)
+        others = [m for m in whole if not start < data.find(m[4]) < end]
+        assert [m for m in found if m in others] == others, f"byte {place} = {value}"
+        assert all(m in whole for m in found)
+        if len(found) < len(whole):
+            assert "lost-messages" in {f.kind for f in findings}, f"byte {place} = {value}"
+
+
 @pytest.mark.parametrize("length", [1, 4096, 300_000])
 def test_zeros_that_a_crash_left_behind_become_no_messages(tmp_path: Path, live: Path, length: int) -> None:
     """Delayed allocation: the file has its length, the last pages were never written."""
