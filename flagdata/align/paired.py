@@ -22,7 +22,7 @@ from flagdata.align.clock import ClockModel, Segment
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.signals import Instants, Series
+from flagdata.signals import Instants, Series, WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 
 LEAST_JUMP = 0.1  # s; smaller steps are taken for delays
@@ -250,3 +250,14 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
             )
         )
     return tuple(found)
+
+
+def host_clock(series: WindSeries) -> PairedClocks | None:
+    """A logged device's clock on the computer's; `None` where the log has one kind of stamp only, or one sample.
+
+    Raises:
+        InputError: see `pair_clocks`.
+    """
+    if series.host_time is None or len(series) < 2:
+        return None
+    return pair_clocks(series.time, series.host_time, device=series.sensor.name, reference="host")

@@ -1,7 +1,8 @@
 """A camera and an anemometer made one recording: one record on the wind's clock, its clips, one commit.
 
-Frames are copied as the JPEG bytes they are. The instant of a frame in the record is its instant on the camera's clock
-taken to the wind's by the clock model, which goes into the record's metadata and into the catalog with its σ.
+Frames are copied as the JPEG bytes they are; those of an H.264 archive are decoded and become JPEGs. The instant of a
+frame in the record is its instant on the camera's clock taken to the wind's by the clock model, which goes into the
+record's metadata and into the catalog with its σ.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical, code_version, recipe_hash
-from flagdata.record import Record, RecordWriter
+from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
 from flagdata.schema import Kind
 from flagdata.signals import WindSeries
@@ -253,12 +254,16 @@ def _write(
         for first in range(0, len(device), _FRAMES_AT_ONCE):
             count = min(_FRAMES_AT_ONCE, len(device) - first)
             exposed = clock.to_common(source.timestamps(first, count))
+            if source.coding is Coding.JPEG:
+                images = [source.jpeg(index) for index in range(first, first + count)]
+            else:
+                images = list(source.frames(first, count))
             for index in range(first, first + count):
                 record.frame(
                     log_time=int(frames[index]),
                     publish_time=int(device[index]),
                     timestamp=int(exposed[index - first]),
-                    image=source.jpeg(index),
+                    image=images[index - first],
                 )
                 if progress:
                     progress(1)

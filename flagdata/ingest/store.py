@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pyarrow.compute as pc
 
+from flagdata.align.paired import host_clock
 from flagdata.errors import ConflictError, InputError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
@@ -186,7 +187,8 @@ def ingest_wind(
         return present
     log = read_log(path, options.wind)
     time = log.series.time
-    findings = log.findings
+    paired = host_clock(log.series)
+    findings = (*log.findings, *(paired.findings if paired is not None else ()))
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
@@ -201,6 +203,8 @@ def ingest_wind(
                 record.attach(name, text, media_type="application/toml", log_time=int(time[0]))
         source.check_unchanged()
         report = _wind_report(log, findings, named=options.wind.recipe)
+        if paired is not None:
+            report["host_clock"] = json.loads(paired.model.to_json())
         artifact = _artifact(
             Kind.WIND, source, recipe, labels, findings=findings, report=report, start=int(time[0]), end=int(time[-1]),
             rate=report["rate"], frame_count=None, stored=transaction.put(staged),
