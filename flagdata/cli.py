@@ -21,6 +21,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "log": ("flagdata.commands.lake:log", "List commits."),
     "tag": ("flagdata.commands.lake:tag", "Name a version for good."),
     "branch": ("flagdata.commands.lake:branch", "Create or list lines of work."),
+    "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch has."),
     "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
     "withdraw": ("flagdata.commands.lake:withdraw", "Take artifacts off a branch; tags keep them."),
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),

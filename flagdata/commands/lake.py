@@ -164,6 +164,24 @@ def branch(name: str | None, at: str | None, as_json: bool, lake_path: str) -> N
 
 
 @click.command()
+@click.argument("branch_name", metavar="BRANCH")
+@click.option("--into", default="main", show_default=True, help="The branch that takes the rows.")
+@click.option("--message", "-m", help="What is merged and why.")
+@json_option
+@lake_option
+def merge(branch_name: str, into: str, message: str | None, as_json: bool, lake_path: str) -> None:
+    """Commit on main what was committed on BRANCH."""
+    from flagdata.lake import Lake
+
+    result = Lake.open(lake_path).merge(branch_name, message or f"merge {branch_name}", into=into)
+    if as_json:
+        content = {"version": result.version, "commit": result.commit}
+        document("merge", {**content, "added": list(result.added), "existing": list(result.existing)})
+    else:
+        click.echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there")
+
+
+@click.command()
 @click.argument("before")
 @click.argument("after", required=False)
 @json_option

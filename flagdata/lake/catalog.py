@@ -15,12 +15,13 @@ from __future__ import annotations
 import json
 import os
 import random
+import threading
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import deltalake
 import pyarrow as pa
@@ -55,11 +56,12 @@ class Moved(Exception):  # noqa: N818 — an outcome to act on, never shown to a
     """Another writer has published since the version the append was based on."""
 
 
-def _in_one_process(function: Callable[P, T]) -> Callable[P, T]:
-    """Refuses the Delta library in a forked child of a process that used it: it would hang or crash there."""
+def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Concatenate[Catalog, P], T]:
+    """Keeps other threads out of the same catalog, and refuses the Delta library in a forked child of a process that
+    used it: it would hang or crash there."""
 
-    @wraps(function)
-    def guarded(*args: P.args, **kwargs: P.kwargs) -> T:
+    @wraps(method)
+    def guarded(self: Catalog, *args: P.args, **kwargs: P.kwargs) -> T:
         global _user_pid
         if _user_pid is None:
             _user_pid = os.getpid()
@@ -69,7 +71,8 @@ def _in_one_process(function: Callable[P, T]) -> Callable[P, T]:
                 where=f"process {os.getpid()}",
                 fix="resolve the query in the parent, or start workers by spawn",
             )
-        return function(*args, **kwargs)
+        with self._lock:
+            return method(self, *args, **kwargs)
 
     return guarded
 
@@ -100,15 +103,19 @@ class Catalog:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._log = path / "_delta_log"
+        self._lock = threading.RLock()
         self._newest = 0
         self._table: DeltaTable | None = None
         self._files: dict[str, pa.Table] = {}
         self._rows: tuple[int, pa.Table] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_table": None, "_files": {}, "_rows": None}
+        return {"path": self.path}
 
-    @_in_one_process
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["path"])
+
+    @_one_at_a_time
     def create(self, info: Mapping[str, str]) -> None:
         """Make the empty table."""
         DeltaTable.create(
@@ -120,6 +127,7 @@ class Catalog:
         )
         self._flush_log(0)
 
+    @_one_at_a_time
     def head(self) -> int:
         """The newest version; they have no holes and never expire, so it is enough to look for the next.
 
@@ -134,7 +142,7 @@ class Catalog:
         self._newest = version
         return version
 
-    @_in_one_process
+    @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
         """All rows of one version, of all branches, in the catalog's schema; absent columns of old rows are null.
 
@@ -155,7 +163,7 @@ class Catalog:
         self._rows = (version, rows)
         return rows
 
-    @_in_one_process
+    @_one_at_a_time
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
         """Publish `rows` as version `base + 1`; durable when it returns.
 
@@ -166,7 +174,7 @@ class Catalog:
         self._commit(table, rows, removed=(), rows_change=True, info=info)
         return base + 1
 
-    @_in_one_process
+    @_one_at_a_time
     def replace(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
         """Publish `rows` as all there is at version `base + 1`; earlier versions stay.
 
@@ -178,7 +186,7 @@ class Catalog:
         self._commit(table, rows, removed=files, rows_change=True, info=info)
         return base + 1
 
-    @_in_one_process
+    @_one_at_a_time
     def tidy(self) -> None:
         """Every `_TIDY_EVERY` versions, merge the small files and write a checkpoint; called before an append.
 
@@ -215,7 +223,7 @@ class Catalog:
         entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
         return sorted([*rows, *entries])
 
-    @_in_one_process
+    @_one_at_a_time
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
         """One entry a version, newest first: version, timestamp (UTC ms), operation and what the writer said of it.
 

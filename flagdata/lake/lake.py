@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import cast
 from urllib.parse import unquote
 
 import pyarrow as pa
@@ -19,10 +20,10 @@ from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
 from flagdata.lake.durable import disk_errors, put_if_absent
-from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.objects import STORES, Objects
 from flagdata.lake.refs import MAIN, Refs, View
-from flagdata.lake.transaction import Transaction
+from flagdata.lake.transaction import CommitResult, Transaction
 from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
@@ -183,7 +184,7 @@ class Lake:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
-        with keeping_collectors_out(self.staging):
+        with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
             self.refs.put("tags", name, self.view(at))
 
     def branch(self, name: str, *, at: str | None = None) -> None:
@@ -193,8 +194,26 @@ class Lake:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
-        with keeping_collectors_out(self.staging):
+        with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
             self.refs.put("branches", name, self.view(at))
+
+    def merge(self, branch: str, message: str, *, into: str = MAIN) -> CommitResult:
+        """Commit on `into` what was committed on `branch` itself; rows that are there already stay as they are.
+
+        Rows are only ever added, so nothing can conflict; what `branch` withdrew is not withdrawn from `into`.
+
+        Raises:
+            UnknownNameError: no such branch.
+            NotFoundError: a row was made from one that `into` does not show: merge the branch it is on first.
+        """
+        own = self.view(branch)[0]
+        if own.branch != branch or branch == into:
+            raise UsageError(f"{branch!r} cannot be merged into {into!r}", fix="name two branches")
+        rows = self.table((own,)).to_pylist()
+        with self.transaction(message, branch=into) as transaction:
+            for row in rows:
+                transaction.add(Artifact.from_row(row))
+        return cast(CommitResult, transaction.result)
 
     def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> int:
         """Take rows off a branch, in one commit; returns its version.

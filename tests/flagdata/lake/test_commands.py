@@ -118,6 +118,15 @@ def test_tags_and_branches_are_made_and_listed(run: Run, lake: Lake, put_text: P
     assert run("tag", "--at", "v1").code == 2
 
 
+def test_merge_brings_a_branch_to_main(run: Run, lake: Lake, put_text: Put) -> None:
+    run("branch", "try")
+    put_text(lake, "a", branch="try")
+    assert run("merge", "try").out == "version 2: 1 added, 0 were there\n"
+    assert run("merge", "try", "--json").document["added"] == []
+    assert [a["name"] for a in run("ls", "--json").document["artifacts"]] == ["a"]
+    assert run("merge", "v1").code == 2
+
+
 def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put) -> None:
     gone = put_text(lake, "gone")
     run("tag", "v1")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -92,3 +93,42 @@ def test_unknown_refs_are_refused_with_the_nearest_name(lake: Lake) -> None:
 def test_a_row_whose_object_was_never_put_is_refused(lake: Lake) -> None:
     with pytest.raises(NotFoundError), lake.transaction("dangling") as tx:
         tx.add(Artifact(kind=Kind.WIND, name="x", object="mcap/" + "0" * 64))
+
+
+def test_a_merge_brings_a_branch_s_own_rows_to_main_once(lake: Lake, put_text: Put) -> None:
+    base = put_text(lake, "base")
+    lake.branch("try")
+    put_text(lake, "made on try", branch="try", parents=(base.id,))
+    put_text(lake, "on both")
+    put_text(lake, "on both", branch="try")
+    result = lake.merge("try", "it worked")
+    assert (len(result.added), len(result.existing)) == (1, 1)
+    assert lake.rows()["name"].to_pylist() == ["base", "on both", "made on try"]
+    again = lake.merge("try", "once more")
+    assert (again.added, again.commit) == ((), None)
+    for pair in (("main", "main"), ("try", "try")):
+        with pytest.raises(UsageError):
+            lake.merge(pair[0], "no", into=pair[1])
+    with pytest.raises(UnknownNameError):
+        lake.merge("other", "no")
+
+
+def test_a_merge_without_the_parents_is_refused_and_adds_nothing(lake: Lake, put_text: Put) -> None:
+    lake.branch("one")
+    parent = put_text(lake, "parent", branch="one")
+    lake.branch("two", at="one")
+    put_text(lake, "child", branch="two", parents=(parent.id,))
+    with pytest.raises(NotFoundError, match="parent"):
+        lake.merge("two", "too early")
+    assert lake.rows().num_rows == 0
+    lake.merge("one", "first")
+    lake.merge("two", "then")
+    assert lake.rows()["name"].to_pylist() == ["parent", "child"]
+
+
+def test_threads_that_share_a_lake_lose_no_row_and_repeat_none(lake: Lake, put_text: Put) -> None:
+    texts = [f"{i}" for i in range(12)] * 3
+    with ThreadPoolExecutor(max_workers=6) as pool:
+        ids = {artifact.id for artifact in pool.map(lambda text: put_text(lake, text), texts)}
+    assert len(ids) == 12
+    assert sorted(lake.rows()["artifact"].to_pylist()) == sorted(ids)
