@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -55,20 +56,47 @@ def _advice(path: Path) -> str:
     return "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG images"
 
 
-def check_file(path: Path) -> None:
-    """Refuse what is not a file with something in it.
+def check_path(path: Path) -> None:
+    """Refuse a path that leads nowhere.
 
     Raises:
-        NotFoundError, InputError
+        NotFoundError
     """
     try:
-        size = path.stat().st_size if path.is_file() else None
+        path.stat()
     except (OSError, ValueError) as error:
-        raise NotFoundError(f"the path cannot be used ({error})", where=repr(str(path)), fix="check it") from error
-    if size is None:
-        raise NotFoundError("there is no such file", where=str(path), fix="check the path")
-    if size == 0:
+        reason = getattr(error, "strerror", None) or str(error)
+        shown = str(path) if len(str(path)) <= 300 else f"{str(path)[:300]}…"
+        raise NotFoundError(f"there is no such file ({reason})", where=repr(shown), fix="check the path") from error
+
+
+def check_file(path: Path, limits: Limits) -> None:
+    """Refuse what is not a file with something in it, and animated pictures whose first bytes state an absurd size.
+
+    Raises:
+        NotFoundError, InputError, LimitError
+    """
+    check_path(path)
+    if not path.is_file():
+        raise InputError("it is neither a file nor a folder", where=str(path), fix="give a video file")
+    with path.open("rb") as stream:
+        head = stream.read(24)
+    if not head:
         raise InputError("the file is empty", where=str(path), fix="copy it from the camera again")
+    size = (0, 0)
+    if head[:4] == b"GIF8" and len(head) >= 10:
+        size = struct.unpack("<HH", head[6:10])
+    elif head[:8] == b"\x89PNG\r\n\x1a\n" and len(head) >= 24:
+        size = struct.unpack(">II", head[16:24])
+    if size[0] * size[1] > limits.frame_pixels:
+        raise _too_large(*size, limits, path)
+
+
+def _too_large(width: int, height: int, limits: Limits, path: Path) -> LimitError:
+    return LimitError(
+        f"frames of {width} × {height} px are beyond the limit of {limits.frame_pixels} px",
+        where=str(path), fix="raise the limit if the file is to be trusted",
+    )  # fmt: skip
 
 
 def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputContainer, VideoStream]:
@@ -84,7 +112,7 @@ def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputCo
             options={
                 "protocol_whitelist": "file",
                 "format_whitelist": _FORMATS,
-                "max_pixels": str(limits.frame_pixels),
+                "max_pixels": str(2 * limits.frame_pixels),
             },
             metadata_errors="replace",
         )
@@ -92,12 +120,9 @@ def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputCo
         stream = _choose(container, path)
         context = stream.codec_context
         if context.width * context.height > limits.frame_pixels:
-            raise LimitError(
-                f"frames of {context.width} × {context.height} px are beyond the limit of {limits.frame_pixels} px",
-                where=str(path), fix="raise the limit if the file is to be trusted",
-            )  # fmt: skip
-        # The decoder itself refuses frames that turn out larger than the header said.
-        context.options = {"max_pixels": str(limits.frame_pixels)}
+            raise _too_large(context.width, context.height, limits, path)
+        # The decoder itself refuses frames that turn out larger than the header said; its own count includes padding.
+        context.options = {"max_pixels": str(2 * limits.frame_pixels)}
         context.thread_count = threads
         context.thread_type = "FRAME" if threads > 1 else "SLICE"
     except BaseException:
@@ -206,11 +231,16 @@ def _truncation(
 ) -> list[Finding]:
     """Whether the file ends before its own header says, or inside a transport packet."""
     if stream.frames > read:
+        lost = stream.frames - read
+        return [
+            _cut_off(f"the file states {stream.frames} frames and holds {read}: it is cut off or damaged", read, lost)
+        ]
+    if 0 < stream.frames < read:
         return [
             Finding(
-                kind="truncated", severity=Severity.ERROR,
-                what=f"the file states {stream.frames} frames and holds {read}: it is cut off", where=f"frame {read}",
-                count=stream.frames - read,
+                kind="index-damaged", severity=Severity.WARNING,
+                what=f"the file states {stream.frames} frames and holds {read}: its index is damaged",
+                count=read - stream.frames,
             )
         ]  # fmt: skip
     name = container.format.name
@@ -218,14 +248,13 @@ def _truncation(
         stated = Fraction(container.duration, 1_000_000)
         held = (timing.span + timing.period) * timing.tick
         lost = stated - held
-        if lost > max(Fraction(1, 2), 3 * timing.period * timing.tick):
-            return [
-                Finding(
-                    kind="truncated", severity=Severity.ERROR,
-                    what=f"the file states {float(stated):.2f} s and holds {float(held):.2f} s: it is cut off",
-                    where=f"frame {read}", count=max(1, int(lost / (timing.period * timing.tick))), value=float(lost),
-                )
-            ]  # fmt: skip
+        # The last frame's own length is not known where the rate varies.
+        step = timing.longest if timing.variable else timing.period
+        if lost > Fraction(3, 4) * step * timing.tick:
+            frames = max(1, round(lost / (timing.period * timing.tick)))
+            return [_cut_off(f"the file states {float(stated):.2f} s and holds {float(held):.2f} s", read, frames)]
+    if name.startswith("mov") and _box_is_cut(path):
+        return [_cut_off("the file ends inside one of its boxes: it is cut off", read, 1)]
     if name == "mpegts":
         with path.open("rb") as raw:
             length = 192 if raw.read(5)[4:5] == b"\x47" else 188
@@ -237,3 +266,29 @@ def _truncation(
                 )
             ]  # fmt: skip
     return []
+
+
+def _cut_off(what: str, read: int, lost: int) -> Finding:
+    return Finding(
+        kind="truncated", severity=Severity.ERROR, what=what, where=f"frame {read}", count=lost,
+        fix="copy it from the camera again; what was read is kept",
+    )  # fmt: skip
+
+
+def _box_is_cut(path: Path) -> bool:
+    """Whether the last box of an MP4 or MOV reaches beyond the file's end (ISO/IEC 14496-12, 4.2)."""
+    end = path.stat().st_size
+    at = 0
+    with path.open("rb") as stream:
+        while at + 8 <= end:
+            stream.seek(at)
+            head = stream.read(16)
+            size = int.from_bytes(head[:4], "big")
+            if size == 1:
+                size = int.from_bytes(head[8:16], "big")
+            if size == 0:
+                return False
+            if size < 8:
+                return True
+            at += size
+    return at != end

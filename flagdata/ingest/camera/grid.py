@@ -38,7 +38,7 @@ class GridReport:
         left_out: grid instants without a source frame within tolerance.
         first_left_out: index of the first of them on the grid.
         gaps: runs of such instants.
-        longest_gap: largest distance between the source frames around such a run [ns].
+        longest_gap: largest distance between the source frames around such a run, or from the start [ns].
         worst_error: largest distance of an output frame from its source frame [ns].
     """
 
@@ -100,7 +100,9 @@ class Resampler(Generic[T]):
         self.report.sources += 1
         if self._held is None:
             self._held = (stamp, source)
-            self._skip_before(stamp - self._tolerance)
+            if self._skip_before(stamp - self._tolerance):
+                self.report.gaps += 1
+                self.report.longest_gap = stamp - self._start
             return
         held_stamp, held = self._held
         if stamp <= held_stamp:

@@ -44,7 +44,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     if name.startswith(("xyz", "bayer", "vaapi", "cuda")):
         raise InputError(f"pixel format {name} is not a picture of luma or RGB", fix="convert the file to H.264 first")
     if frame.format.is_rgb or frame.format.has_palette or name.startswith("mono"):
-        rgb = frame.reformat(format="rgb24")
+        rgb = _converted(frame, "rgb24")
         plane = rgb.planes[0]
         colour = Image.frombuffer("RGB", (rgb.width, rgb.height), bytes(plane), "raw", "RGB", plane.line_size, 1)
         return Luma(image=colour.convert("L"), black=0.0, white=255.0)
@@ -53,7 +53,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     alone = sum(component.plane == 0 for component in frame.format.components) == 1
     if not (alone and (bits == 8 or (name.startswith(("yuv", "gray")) and name.endswith("le")))):
         bits = 8 if bits == 8 else 16
-        frame = frame.reformat(format="yuv444p" if bits == 8 else "yuv444p16le")
+        frame = _converted(frame, "yuv444p" if bits == 8 else "yuv444p16le")
     plane = frame.planes[0]
     if bits == 8:
         memory = cast(bytes, plane)  # Pillow takes any buffer, and keeps it alive
@@ -66,6 +66,11 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     if _is_full(frame, name, codec):
         return Luma(image=image, black=0.0, white=float(2**bits - 1))
     return Luma(image=image, black=float(16 << (bits - 8)), white=float(235 << (bits - 8)))
+
+
+def _converted(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
+    """The same picture in another layout, by one thread: with several, swscale has been seen to mix up bands of rows."""
+    return frame.reformat(format=pixel_format, threads=1)
 
 
 def _is_full(frame: av.VideoFrame, name: str, codec: str) -> bool:

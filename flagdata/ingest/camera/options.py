@@ -95,7 +95,7 @@ class CameraOptions:
             Any of them is scaled into the output without distortion and padded with black where it is not square.
         exposure: exposure time [s]; half of it is added to each stamp, which then is mid-exposure. `None` when unknown.
         tolerance: largest distance of a source frame from the grid instant it may stand for [s]. `None` takes half a
-            grid period or 3/4 of a source period, whichever is more.
+            grid period or 3/4 of a source period, whichever is more, but no more than 3 grid periods.
         size: side of the square frames that come out [px].
         threads: decoder threads; frames do not depend on it.
     """
@@ -120,8 +120,8 @@ class CameraOptions:
             if value is not None and not (math.isfinite(value) and 0.01 <= value <= 1e6):
                 raise UsageError(f"{name} = {value} Hz is not a frame rate", fix="give a rate of 0.01 to 1e6 Hz")
         for name, value in {"exposure": self.exposure, "tolerance": self.tolerance}.items():
-            if value is not None and not (math.isfinite(value) and 0 <= value <= 3600):
-                raise UsageError(f"{name} = {value} s is not a duration", fix="give seconds, 0 to 3600")
+            if value is not None and not (math.isfinite(value) and 0 <= value <= 10):
+                raise UsageError(f"{name} = {value} s is out of range", fix="give seconds, 0 to 10")
         if self.rate == "native" and self.tolerance is not None:
             raise UsageError("a tolerance has no meaning at the native rate", fix="drop it, or give a rate")
         if not 8 <= self.size <= 4096:

@@ -103,6 +103,7 @@ def _from_creation_time(text: str, *, place: str | None, duration: float, where:
         severity=Severity.WARNING,
         what=f"{what}; some cameras write the end of it (then it is {duration:.1f} s early) and some local time",
         value=sigma,
+        fix="give --start with a zone, or align the recording by its contents",
     )
     start = _checked(instant, "creation_time", sigma)
     return Start(instant=start.instant, source=start.source, sigma=sigma, findings=(finding,))

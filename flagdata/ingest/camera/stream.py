@@ -9,6 +9,7 @@ from types import TracebackType
 
 from flagdata.errors import LimitError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.container import check_path
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import GridReport, Resampler
 from flagdata.ingest.camera.motion import CropProposal, propose
@@ -125,11 +126,11 @@ class CameraStream:
 
     def _grid(self, rate: Fraction) -> Resampler[Picture]:
         grid_period = Fraction(NANOSECONDS) / rate
+        # A source slower than a quarter of the grid is a series of stills: most instants have no frame.
+        period = min(Fraction(self._period), 4 * grid_period)
         given = self._options.tolerance
-        tolerance = (
-            max(grid_period / 2, Fraction(3, 4) * self._period) if given is None else Fraction(given) * NANOSECONDS
-        )
-        return Resampler(start=0, rate=rate, tolerance=int(tolerance), tail=self._period // 2)
+        tolerance = max(grid_period / 2, Fraction(3, 4) * period) if given is None else Fraction(given) * NANOSECONDS
+        return Resampler(start=0, rate=rate, tolerance=int(tolerance), tail=int(period / 2))
 
     def _repaired(self, repair: StampRepair[Picture]) -> Iterator[tuple[int, Picture]]:
         """Source pictures with strictly increasing instants, counted from the start [ns]."""
@@ -156,6 +157,7 @@ class CameraStream:
                     severity=Severity.NOTE if chosen else Severity.WARNING,
                     what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is not square and was padded with "
                     "black" + ("" if chosen else "; no crop was chosen, so the flag may be small or off centre"),
+                    fix=None if chosen else "choose a crop: --crop auto proposes one",
                 )
             )
         if self._options.exposure is None:
@@ -260,6 +262,7 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 def open_source(path: Path, options: CameraOptions) -> Source:
     """The reader for `path`: a folder is an image sequence, anything else a video file."""
+    check_path(path)
     return SequenceSource(path, options) if path.is_dir() else VideoSource(path, options)
 
 

@@ -27,6 +27,7 @@ from flagdata.ingest.camera.container import (
     packets,
     survey_file,
 )
+from flagdata.ingest.camera.damage import Damage
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import luma_of_frame
 from flagdata.ingest.camera.options import CameraOptions
@@ -49,12 +50,8 @@ class VideoSource:
     def __init__(self, path: Path, options: CameraOptions) -> None:
         self._path = path
         self._options = options
-        self._bad_packets = 0
-        self._first_bad: int | None = None
-        self._corrupt_frames = 0
-        self._suspect_frames = 0
-        self._resized = 0
-        check_file(path)
+        self._damage = Damage()
+        check_file(path, options.limits)
         timing, surveyed = survey_file(path, options)
         self._timing = timing
         self._container, self._stream = open_container(path, options.limits, threads=options.threads)
@@ -135,7 +132,7 @@ class VideoSource:
         yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
         for stamp, frame in self._decoded:
             if (frame.width, frame.height) != (self.facts.width, self.facts.height):
-                self._resized += 1
+                self._damage.resized += 1
                 continue
             yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
 
@@ -178,7 +175,9 @@ class VideoSource:
                     ordered.sent(stamp)
                 frames = packet.decode()
             except DECODE_ERRORS:
-                self._bad(count)
+                self._damage.refuse(count)
+                if ordered is not None:
+                    ordered.lost(stamp)
                 damaged = True
                 continue
             for frame in frames:
@@ -186,53 +185,16 @@ class VideoSource:
                     continue
                 own = frame.pts if frame.pts is not None else frame.dts
                 shown = ordered.shown(own) if ordered is not None else own
-                damaged = damaged and not frame.key_frame
+                self._damage.shown += 1
                 if frame.is_corrupt or (flagged and own in flagged):
-                    self._corrupt_frames += 1
+                    self._damage.corrupt += 1
                     continue
-                self._suspect_frames += damaged
+                damaged = damaged and not frame.key_frame
+                self._damage.suspect += damaged
                 yield shown, frame
 
-    def _bad(self, count: int) -> None:
-        self._bad_packets += 1
-        if self._first_bad is None:
-            self._first_bad = count
-
     def damage(self) -> list[Finding]:
-        found = []
-        if self._bad_packets:
-            found.append(
-                Finding(
-                    kind="corrupt-packets", severity=Severity.ERROR,
-                    what=f"{self._bad_packets} packets could not be decoded and were skipped",
-                    where=f"packet {self._first_bad}", count=self._bad_packets,
-                )
-            )  # fmt: skip
-        if self._corrupt_frames:
-            found.append(
-                Finding(
-                    kind="corrupt-frames", severity=Severity.ERROR,
-                    what=f"{self._corrupt_frames} frames came out damaged and were left out",
-                    count=self._corrupt_frames,
-                )
-            )  # fmt: skip
-        if self._suspect_frames:
-            found.append(
-                Finding(
-                    kind="damaged-references", severity=Severity.WARNING,
-                    what=f"{self._suspect_frames} frames between damage and the next key frame may show traces of it",
-                    count=self._suspect_frames,
-                )
-            )  # fmt: skip
-        if self._resized:
-            found.append(
-                Finding(
-                    kind="size-changed", severity=Severity.ERROR,
-                    what=f"{self._resized} frames have another size than the first and were left out",
-                    count=self._resized,
-                )
-            )  # fmt: skip
-        return found
+        return self._damage.findings(expected=self._timing.count + self._timing.missing)
 
     def close(self) -> None:
         self._container.close()
@@ -266,6 +228,12 @@ class _DecodeOrderStamps:
     def sent(self, stamp: int | None) -> None:
         if stamp is not None:
             heapq.heappush(self._waiting, stamp)
+
+    def lost(self, stamp: int | None) -> None:
+        """The packet with `stamp` gives no frame."""
+        if stamp in self._waiting:
+            self._waiting.remove(stamp)
+            heapq.heapify(self._waiting)
 
     def shown(self, own: int | None) -> int | None:
         """The stamp of the frame shown next, whose packet carried `own`; those of frames that never came go."""

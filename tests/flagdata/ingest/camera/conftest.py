@@ -91,7 +91,9 @@ def write_video() -> Callable[..., Path]:
             if aspect is not None:
                 stream.codec_context.sample_aspect_ratio = aspect
             for number, stamp in enumerate(stamps):
-                frame = av.VideoFrame.from_ndarray(picture(number), format="gray").reformat(format=pixel_format)
+                frame = av.VideoFrame.from_ndarray(picture(number), format="gray").reformat(
+                    format=pixel_format, threads=1
+                )
                 frame.pts, frame.time_base = stamp, tick
                 out.mux(stream.encode(frame))
             out.mux(stream.encode())

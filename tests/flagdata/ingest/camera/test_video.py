@@ -279,7 +279,7 @@ def test_sound_beside_the_video_changes_nothing(
         video.pix_fmt = "yuv420p"
         sound = out.add_stream("aac", rate=48_000)
         for i in range(10):
-            frame = av.VideoFrame.from_ndarray(numbered(i), format="gray").reformat(format="yuv420p")
+            frame = av.VideoFrame.from_ndarray(numbered(i), format="gray").reformat(format="yuv420p", threads=1)
             frame.pts, frame.time_base = i, Fraction(1, 25)
             out.mux(video.encode(frame))
             noise = av.AudioFrame.from_ndarray(np.zeros((1, 1920), dtype=np.float32), format="fltp", layout="mono")
@@ -461,3 +461,46 @@ def test_a_probe_tells_the_file_without_needing_a_start(cfr60: Path) -> None:
     assert not seen.variable_rate
     assert seen.start is None
     assert seen.as_dict()["start"] is None
+
+
+def test_a_transport_stream_joined_in_the_middle_keeps_time_from_its_first_packet(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int], start: int
+) -> None:
+    whole = write_video(
+        tmp_path / "whole.ts", range(60), tick=Fraction(1, 25),
+        encoder={"preset": "ultrafast", "crf": "12", "bf": "0", "g": "20"},
+    )  # fmt: skip
+    data = whole.read_bytes()
+    with av.open(str(whole)) as raw:
+        first = [p.pos for p in raw.demux(video=0) if p.size][5]
+    joined = tmp_path / "joined.ts"
+    # The tables at the head, then from the sixth frame on; the next key frame is frame 20.
+    joined.write_bytes(data[: 3 * 188] + data[first:])
+    _, frames, found = read(joined, plain)
+    assert [number_of(f.image) for f in frames] == list(range(20, 60))
+    assert grid_of(frames, start) == list(range(15, 55))
+    assert found["frames-missing"].count == 15
+    assert found["frames-missing"].value == pytest.approx(15 * 0.04)
+
+
+def test_hidden_reference_frames_are_not_missed(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int]
+) -> None:
+    # VP8 with alternate reference frames: packets that are decoded and never shown.
+    path = write_video(
+        tmp_path / "hidden.webm", range(60), tick=Fraction(1, 25), codec="libvpx",
+        encoder={"auto-alt-ref": "1", "lag-in-frames": "16", "deadline": "good", "cpu-used": "5", "b": "2M"},
+    )  # fmt: skip
+    _, frames, found = read(path, plain)
+    assert [number_of(f.image) for f in frames] == list(range(60))
+    assert "frames-missing" not in found
+
+
+def test_true_fps_of_a_variable_rate_is_applied_and_warned_about(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions
+) -> None:
+    path = write_video(tmp_path / "slow.mp4", [0, 23, 56, 99, 122, 155, 198, 221, 254, 297])
+    info, _, found = read(path, replace(plain, true_fps=240.0))
+    # The median step is 33 ms: eight times slower than 240 Hz, within its rounding.
+    assert info.duration == pytest.approx(0.297 / 8, rel=0.02)
+    assert found["true-rate-of-variable"].severity is Severity.WARNING

@@ -1,0 +1,78 @@
+"""A tally of what a decoder could not give, and its findings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flagdata.findings import Finding, Severity
+
+
+@dataclass
+class Damage:
+    """Counts that grow while a file is decoded.
+
+    Attributes:
+        packets: packets the decoder refused; `first_packet` is the number of the first, from 1.
+        corrupt: frames that came out marked as damaged, or of packets marked so.
+        suspect: frames shown between damage and the next key frame.
+        resized: frames of another size than the first.
+        shown: frames that came out at all.
+    """
+
+    packets: int = 0
+    first_packet: int | None = None
+    corrupt: int = 0
+    suspect: int = 0
+    resized: int = 0
+    shown: int = 0
+
+    def refuse(self, packet: int) -> None:
+        self.packets += 1
+        if self.first_packet is None:
+            self.first_packet = packet
+
+    def findings(self, *, expected: int) -> list[Finding]:
+        """What was lost, of `expected` frames that the file's packets announce."""
+        found = []
+        if self.packets:
+            found.append(
+                Finding(
+                    kind="corrupt-packets", severity=Severity.ERROR,
+                    what=f"{self.packets} packets could not be decoded and were skipped",
+                    where=f"packet {self.first_packet}", count=self.packets,
+                    fix="copy the file from the camera again",
+                )
+            )  # fmt: skip
+        if self.corrupt:
+            found.append(
+                Finding(
+                    kind="corrupt-frames", severity=Severity.ERROR,
+                    what=f"{self.corrupt} frames came out damaged and were left out", count=self.corrupt,
+                    fix="copy the file from the camera again",
+                )
+            )  # fmt: skip
+        if self.suspect:
+            found.append(
+                Finding(
+                    kind="damaged-references", severity=Severity.WARNING,
+                    what=f"{self.suspect} frames between damage and the next key frame may show traces of it",
+                    count=self.suspect,
+                )
+            )  # fmt: skip
+        if self.resized:
+            found.append(
+                Finding(
+                    kind="size-changed", severity=Severity.ERROR,
+                    what=f"{self.resized} frames have another size than the first and were left out",
+                    count=self.resized, fix="cut the file where its size changes and ingest the parts",
+                )
+            )  # fmt: skip
+        missing = expected - self.packets - self.shown
+        if missing > 0:
+            found.append(
+                Finding(
+                    kind="frames-undecoded", severity=Severity.WARNING,
+                    what=f"the file announces {expected} frames, the decoder gave {self.shown}", count=missing,
+                )
+            )  # fmt: skip
+        return found

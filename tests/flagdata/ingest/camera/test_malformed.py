@@ -1,0 +1,288 @@
+"""Malformed camera files: each ends in an error that says what to do, or in frames kept and marked."""
+
+from __future__ import annotations
+
+import io
+import struct
+import wave
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flagdata.errors import FlagdataError, InputError, LimitError, NotFoundError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import CameraOptions, Limits, open_camera, probe
+from flagdata.signals import Frame
+
+FRAMES = 50
+# name → container, codec, encoder options, muxer options
+BASES = {
+    "mp4": ("mp4", "libx264", {"preset": "ultrafast", "bf": "0", "g": "10"}, {}),
+    "faststart": ("mp4", "libx264", {"preset": "veryfast", "bf": "2", "g": "10"}, {"movflags": "faststart"}),
+    "fragments": ("mp4", "libx264", {"preset": "ultrafast", "bf": "0", "g": "10"}, {"movflags": "frag_keyframe"}),
+    "mts": ("mpegts", "libx264", {"preset": "veryfast", "bf": "2", "g": "10"}, {}),
+    "avi": ("avi", "mjpeg", {"qscale": "5"}, {}),
+    "mkv": ("matroska", "libx264", {"preset": "veryfast", "bf": "2", "g": "10"}, {}),
+}
+
+
+@pytest.fixture(scope="module")
+def bases(
+    tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., Path], numbered: Callable[..., np.ndarray]
+) -> dict[str, bytes]:
+    grain = np.random.default_rng(3)
+
+    def grainy(picture: np.ndarray) -> np.ndarray:
+        """With noise, so that the pictures and not the headers are most of the file."""
+        return np.clip(picture.astype(int) + grain.integers(-40, 41, picture.shape), 0, 255).astype(np.uint8)
+
+    folder = tmp_path_factory.mktemp("bases")
+    made = {}
+    for name, (container, codec, encoder, muxer) in BASES.items():
+        path = write_video(
+            folder / name, range(FRAMES), tick=Fraction(1, 25), container=container, codec=codec, encoder=encoder,
+            muxer=muxer, pixel_format="yuvj420p" if codec == "mjpeg" else "yuv420p",
+            picture=lambda number: grainy(numbered(number)),
+        )  # fmt: skip
+        made[name] = path.read_bytes()
+    return made
+
+
+def kept_or_refused(path: Path, options: CameraOptions) -> tuple[list[Frame], tuple[Finding, ...]] | FlagdataError:
+    """The frames and findings, or the error; checks what must hold of either."""
+    try:
+        with open_camera(path, options) as stream:
+            frames = list(stream)
+            findings = stream.findings
+    except FlagdataError as error:
+        return error
+    times = [f.time for f in frames]
+    assert times
+    assert all(b > a for a, b in pairwise(times))
+    assert all(f.image.shape == (96, 96) and f.image.dtype == np.uint8 for f in frames)
+    return frames, findings
+
+
+def marked(findings: tuple[Finding, ...]) -> bool:
+    return any(f.severity is not Severity.NOTE for f in findings)
+
+
+@pytest.mark.parametrize("share", [0.0005, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99])
+@pytest.mark.parametrize("base", BASES)
+def test_a_file_cut_anywhere_is_refused_or_kept_and_marked(
+    base: str, share: float, bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions,
+    number_of: Callable[..., int], start: int,
+) -> None:  # fmt: skip
+    whole = bases[base]
+    path = tmp_path / "cut"
+    path.write_bytes(whole[: int(len(whole) * share)])
+    outcome = kept_or_refused(path, plain)
+    if isinstance(outcome, FlagdataError):
+        # Only the head of a file, or an MP4 without its index, leaves nothing to keep.
+        assert share <= 0.1 or base in ("mp4", "faststart")
+        return
+    frames, findings = outcome
+    # What was kept is right: each picture is the one whose time it carries, to within its stated error. The last may
+    # be the torn one.
+    off = [abs(number_of(f.image) * 0.04 - (f.time - start) / 1e9) - f.stamp_error for f in frames]
+    assert max(off[:-1], default=0) < 1e-6
+    assert marked(findings) or len(frames) == FRAMES
+
+
+def test_an_mp4_without_index_says_that_it_was_not_closed(
+    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
+) -> None:
+    path = tmp_path / "unclosed.mp4"
+    path.write_bytes(bases["mp4"][: len(bases["mp4"]) // 2])
+    outcome = kept_or_refused(path, plain)
+    assert isinstance(outcome, InputError)
+    assert "moov" in outcome.fix
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("base", BASES)
+def test_flipped_bytes_anywhere_never_end_in_a_traceback(
+    base: str, seed: int, bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
+) -> None:
+    random = np.random.default_rng(seed)
+    data = bytearray(bases[base])
+    # Half of them in the headers and the index, where they do most harm.
+    edge = min(len(data), 3000)
+    places = np.concatenate(
+        [random.integers(0, len(data), 10), random.integers(0, edge, 5), len(data) - 1 - random.integers(0, edge, 5)]
+    )
+    for place in places:
+        data[place] ^= int(random.integers(1, 256))
+    path = tmp_path / "flipped"
+    path.write_bytes(data)
+    kept_or_refused(path, plain)
+
+
+@pytest.mark.parametrize("hole", ["zeros", "noise", "removed", "repeated"])
+@pytest.mark.parametrize("base", BASES)
+def test_a_hole_in_the_middle_is_refused_or_marked(
+    base: str, hole: str, bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
+) -> None:
+    data = bases[base]
+    a, b = int(len(data) * 0.4), int(len(data) * 0.5)
+    middle = {
+        "zeros": bytes(b - a),
+        "noise": np.random.default_rng(1).bytes(b - a),
+        "removed": b"",
+        "repeated": data[a:b] * 2,
+    }[hole]
+    path = tmp_path / "hole"
+    path.write_bytes(data[:a] + middle + data[b:])
+    outcome = kept_or_refused(path, plain)
+    assert isinstance(outcome, FlagdataError) or marked(outcome[1])
+
+
+def _zip() -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a", bytes(10**6))
+    return stream.getvalue()
+
+
+def _wave() -> bytes:
+    stream = io.BytesIO()
+    with wave.open(stream, "wb") as sound:
+        sound.setparams((1, 2, 8000, 0, "NONE", ""))
+        sound.writeframes(bytes(16_000))
+    return stream.getvalue()
+
+
+def _png() -> bytes:
+    stream = io.BytesIO()
+    Image.new("L", (32, 32)).save(stream, "PNG")
+    return stream.getvalue()
+
+
+OTHER = {
+    "empty": b"",
+    "one byte": b"\x00",
+    "zeros": bytes(100_000),
+    "noise": np.random.default_rng(0).bytes(100_000),
+    "text": b"time,speed\n2026-05-01T12:00:00Z,3.2\n" * 50,
+    "html": b"<!DOCTYPE html><html><body>404</body></html>",
+    "utf-16": "Zeit;Wind\n".encode("utf-16") * 100,
+    "zip": _zip(),
+    "sound": _wave(),
+    "one picture": _png(),
+    "pdf": b"%PDF-1.7\n1 0 obj\n<<>>\nendobj\n",
+    "riff without chunks": b"RIFF\x04\x00\x00\x00AVI ",
+    "riff of absurd length": b"RIFF\xff\xff\xff\xffAVI LIST\xff\xff\xff\xffhdrl",
+    "ftyp alone": struct.pack(">I4s4sI", 16, b"ftyp", b"isom", 512),
+    "box of size zero": struct.pack(">I4s4sI", 16, b"ftyp", b"isom", 512) + struct.pack(">I4s", 0, b"moov"),
+    "box larger than the file": struct.pack(">I4s4sI", 16, b"ftyp", b"isom", 512)
+    + struct.pack(">I4s", 0x7FFFFFFF, b"moov"),
+    "boxes within boxes": b"".join(struct.pack(">I4s", 8 * (400 - i), b"moov") for i in range(400)),
+    "matroska magic alone": b"\x1a\x45\xdf\xa3",
+    "matroska of absurd size": b"\x1a\x45\xdf\xa3\x01\xff\xff\xff\xff\xff\xff\xfe",
+    "transport packets of nothing": (b"\x47\x1f\xff\x10" + bytes(184)) * 50,
+    "gif header": b"GIF89a" + struct.pack("<HHBBB", 65535, 65535, 0xF7, 0, 0),
+    "flv header": b"FLV\x01\x01\x00\x00\x00\x09\x00\x00\x00\x00",
+    "y4m of no size": b"YUV4MPEG2 W0 H0 F25:1\nFRAME\n",
+    "y4m of negative size": b"YUV4MPEG2 W-5 H5 F25:1\nFRAME\n",
+    "y4m of absurd size": b"YUV4MPEG2 W65535 H65535 F25:1 C420\nFRAME\n",
+    "y4m without frames": b"YUV4MPEG2 W16 H16 F25:1 C420\n",
+    "y4m cut in a frame": b"YUV4MPEG2 W16 H16 F25:1 C420\nFRAME\n" + bytes(50),
+    "y4m of rate zero": b"YUV4MPEG2 W16 H16 F0:0 C420\nFRAME\n" + bytes(384),
+}
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_what_is_no_video_is_refused_with_the_way_out(name: str, tmp_path: Path, plain: CameraOptions) -> None:
+    path = tmp_path / "a.mp4"
+    path.write_bytes(OTHER[name])
+    outcome = kept_or_refused(path, plain)
+    if name == "y4m of rate zero":
+        # One readable frame without a rate is kept: it needs none.
+        assert isinstance(outcome, FlagdataError) or len(outcome[0]) == 1
+        return
+    assert isinstance(outcome, InputError | LimitError)
+    assert outcome.fix
+    with pytest.raises(FlagdataError):
+        probe(path)
+
+
+def test_frames_beyond_the_limit_are_refused_by_the_header(
+    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
+) -> None:
+    path = tmp_path / "a.mp4"
+    path.write_bytes(bases["mp4"])
+    for limits, word in (
+        (Limits(frame_pixels=96 * 96 - 1), "96 × 96"),
+        (Limits(frames=49), "49 frames"),
+        (Limits(total_pixels=49 * 96 * 96), "in all"),
+        (Limits(duration=1.9), "limit of 2 s"),
+    ):
+        outcome = kept_or_refused(path, replace(plain, limits=limits))
+        assert isinstance(outcome, LimitError)
+        assert word in outcome.what
+    exact = Limits(frame_pixels=96 * 96, frames=50, total_pixels=50 * 96 * 96, duration=1.97)
+    assert not isinstance(kept_or_refused(path, replace(plain, limits=exact)), FlagdataError)
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+@pytest.mark.parametrize(("width", "height"), [(30_000, 30_000), (100_000, 1000), (2**31 - 1, 1), (10_000, 9_000)])
+def test_a_small_png_of_absurd_size_is_refused_by_its_header(
+    width: int, height: int, tmp_path: Path, plain: CameraOptions
+) -> None:
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    bomb = b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(bytes(1 << 20)))
+    (tmp_path / "0001.png").write_bytes(bomb + _chunk(b"IEND", b""))
+    outcome = kept_or_refused(tmp_path, replace(plain, sequence_fps=25.0))
+    assert isinstance(outcome, LimitError)
+
+
+def test_a_bomb_later_in_a_sequence_is_refused_too(
+    tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray]
+) -> None:
+    Image.fromarray(numbered(0)).save(tmp_path / "0.png")
+    header = struct.pack(">IIBBBBB", 20_000, 20_000, 8, 0, 0, 0, 0)
+    bomb = b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(bytes(1 << 20)))
+    (tmp_path / "1.png").write_bytes(bomb)
+    assert isinstance(kept_or_refused(tmp_path, replace(plain, sequence_fps=25.0)), LimitError)
+
+
+def test_an_animated_picture_of_absurd_size_is_refused(tmp_path: Path, plain: CameraOptions) -> None:
+    frame = b"\x21\xf9\x04\x00\x0a\x00\x00\x00\x2c" + struct.pack("<HHHHB", 0, 0, 60_000, 60_000, 0)
+    body = frame + b"\x02\x02\x4c\x01\x00"
+    data = b"GIF89a" + struct.pack("<HHBBB", 60_000, 60_000, 0x80, 0, 0) + bytes(6) + body * 20 + b"\x3b"
+    path = tmp_path / "bomb.gif"
+    path.write_bytes(data)
+    assert isinstance(kept_or_refused(path, plain), LimitError)
+
+
+def test_an_mp4_that_lies_about_its_frame_count_or_duration_costs_nothing(
+    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
+) -> None:
+    data = bases["faststart"]
+    # stts: version, entries = 1, (count, delta); 50 frames of some delta.
+    at = data.index(b"stts") + 8
+    count, delta = struct.unpack(">II", data[at + 4 : at + 12])
+    assert count == FRAMES
+    for name, entry in (("many", (0xFFFFFFFF, delta)), ("slow", (count, 0x7FFFFFFF)), ("still", (count, 0))):
+        path = tmp_path / f"{name}.mp4"
+        path.write_bytes(data[: at + 4] + struct.pack(">II", *entry) + data[at + 12 :])
+        outcome = kept_or_refused(path, plain)
+        # However far apart the frames claim to be, the instants between them are not filled with copies.
+        assert isinstance(outcome, LimitError) or len(outcome[0]) <= 6 * FRAMES, name
+
+
+@pytest.mark.parametrize("name", ["", "nothing.mp4", "\x00", "a" * 5000])
+def test_paths_that_lead_nowhere_are_not_found(name: str, tmp_path: Path, plain: CameraOptions) -> None:
+    with pytest.raises((NotFoundError, InputError)):
+        open_camera(Path(f"{tmp_path}/{name}"), plain)

@@ -1,0 +1,125 @@
+"""A crop proposed from where the motion is."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flagdata.errors import RefusedError
+from flagdata.ingest.camera import CameraOptions, open_camera, propose_crop
+
+WIDE, HIGH = 384, 216
+
+
+def scene(
+    number: int, *, flag: tuple[int, int, int] | None, flicker: float = 0.0, passer_by: bool = False, seed: int = 0
+) -> np.ndarray:
+    """(216, 384) still texture; waves in the square `flag` (x, y, side); all of it brighter and darker by `flicker`."""
+    still = np.random.default_rng(seed).integers(60, 180, (HIGH // 8, WIDE // 8)).astype(float)
+    image = np.kron(still, np.ones((8, 8)))
+    if flag:
+        x, y, side = flag
+        rows, columns = np.mgrid[:side, :side]
+        image[y : y + side, x : x + side] = 120 + 80 * np.sin(columns / 6 - number * 0.9 + rows / 15)
+    if passer_by and 40 <= number < 80:
+        at = 8 * (number - 40)
+        image[150:210, at : at + 30] = 20
+    image = image * (1 + flicker * np.sin(2.1 * number)) + 20 * flicker * np.cos(1.3 * number)
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+@pytest.fixture
+def film(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path]:
+    def write(name: str, picture: Callable[[int], np.ndarray], *, frames: int = 300) -> Path:
+        return write_video(
+            tmp_path / name, range(frames), tick=Fraction(1, 25), picture=picture,
+            encoder={"preset": "ultrafast", "crf": "18", "g": "50", "bf": "0"},
+        )  # fmt: skip
+
+    return write
+
+
+def covers(box: tuple[int, int, int, int], flag: tuple[int, int, int]) -> bool:
+    x, y, width, height = box
+    fx, fy, side = flag
+    return x <= fx and y <= fy and x + width >= fx + side and y + height >= fy + side
+
+
+@pytest.mark.parametrize("flag", [(200, 60, 80), (10, 10, 64), (300, 120, 80)])
+def test_the_proposal_is_a_square_just_around_the_moving_part(
+    flag: tuple[int, int, int], film: Callable[..., Path]
+) -> None:
+    proposal = propose_crop(film("flag.mp4", lambda n: scene(n, flag=flag), frames=120))
+    box = proposal.box
+    assert box.width == box.height
+    assert covers(box.as_tuple(), flag)
+    # 15 % of padding on each side, and a pixel or two of blur: less than 1.6 times the flag.
+    assert box.width <= 1.6 * flag[2]
+    assert proposal.share > 0.95
+
+
+def test_flicker_of_the_whole_image_is_no_motion(film: Callable[..., Path]) -> None:
+    flag = (200, 60, 80)
+    proposal = propose_crop(film("flicker.mp4", lambda n: scene(n, flag=flag, flicker=0.15), frames=120))
+    assert covers(proposal.box.as_tuple(), flag)
+    assert proposal.box.width <= 1.6 * flag[2]
+    with pytest.raises(RefusedError, match="nothing moves"):
+        propose_crop(film("still.mp4", lambda n: scene(n, flag=None, flicker=0.02), frames=60))
+
+
+def test_a_passer_by_is_forgotten(film: Callable[..., Path]) -> None:
+    flag = (200, 30, 80)
+    proposal = propose_crop(film("passer.mp4", lambda n: scene(n, flag=flag, passer_by=True)))
+    assert covers(proposal.box.as_tuple(), flag)
+    assert proposal.box.y + proposal.box.height <= 150
+
+
+def test_motion_all_over_the_image_is_refused(film: Callable[..., Path]) -> None:
+    places = [(10, 10, 40), (180, 10, 40), (330, 10, 40), (10, 150, 40), (180, 150, 40), (330, 150, 40)]
+
+    def everywhere(number: int) -> np.ndarray:
+        image = scene(number, flag=None)
+        for place in places:
+            x, y, side = place
+            image[y : y + side, x : x + side] = scene(number, flag=place)[y : y + side, x : x + side]
+        return image
+
+    with pytest.raises(RefusedError, match="all over"):
+        propose_crop(film("everywhere.mp4", everywhere, frames=100))
+
+
+def test_the_picture_shows_the_image_the_motion_and_the_box(film: Callable[..., Path]) -> None:
+    proposal = propose_crop(film("flag.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=100))
+    picture = np.asarray(Image.open(io.BytesIO(proposal.picture)).convert("RGB")).astype(int)
+    # The longer side is 960 px: 2.5 times the source.
+    assert picture.shape == (540, 960, 3)
+    red = (picture[..., 0] - picture[..., 1] > 60) & (picture[..., 0] - picture[..., 2] > 60)
+    rows, columns = np.nonzero(red)
+    inside = (columns > 190 * 2.5) & (columns < 290 * 2.5) & (rows > 50 * 2.5) & (rows < 150 * 2.5)
+    yellow = (picture[..., 0] > 200) & (picture[..., 1] > 180) & (picture[..., 2] < 60)
+    assert inside.mean() > 0.9
+    assert yellow.sum() > 500
+
+
+def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[..., Path], plain: CameraOptions) -> None:
+    path = film("flag.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=100)
+    with open_camera(path, replace(plain, crop="auto")) as stream:
+        frames = list(stream)
+        assert stream.proposal is not None
+        assert stream.info.crop == stream.proposal.box.as_tuple() == propose_crop(path).box.as_tuple()
+        assert {f.kind for f in stream.findings} >= {"crop-proposed"}
+    assert len(frames) == 100
+    with open_camera(path, plain) as stream:
+        assert stream.proposal is None
+
+
+def test_a_single_frame_shows_no_motion(film: Callable[..., Path]) -> None:
+    with pytest.raises(RefusedError, match="too few"):
+        propose_crop(film("one.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=1))
