@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
 from flagdata.align.clock import ClockModel
-from flagdata.errors import ConflictError, InputError, LimitError, UsageError
+from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.ingest.anemometer.averaging import average
 from flagdata.record import messages
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
@@ -267,6 +267,11 @@ class RecordWriter:
         self._last_frame = (log_time, publish_time)
 
     def _message(self, topic: str, message: Any, *, log_time: int, publish_time: int) -> None:
+        if min(log_time, publish_time) < 0:
+            raise TimeError(
+                "an instant before 1970, which MCAP cannot hold", where=f"{self.path}, {topic}",
+                fix="set the device's start time",
+            )  # fmt: skip
         if topic not in self._channels:
             schema = self._writer.register_schema(
                 name=message.DESCRIPTOR.full_name,

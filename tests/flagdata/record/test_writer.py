@@ -16,7 +16,7 @@ from mcap.records import ChunkIndex
 from mcap_protobuf.decoder import DecoderFactory
 
 from flagdata.align.clock import ClockModel, Segment
-from flagdata.errors import ConflictError, InputError, LimitError, UsageError
+from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.record import Chunking, Coding, Record, RecordWriter, writer
 from flagdata.signals import WindSeries
 
@@ -149,6 +149,11 @@ def test_frames_out_of_order_are_refused(tmp_path: Path, pictures: np.ndarray, t
         record.frame(log_time=times[0], publish_time=times[0], timestamp=times[0], image=pictures[0])
         with pytest.raises(InputError, match="order of time"):
             record.frame(log_time=times[1], publish_time=times[1], timestamp=times[1], image=pictures[0])
+
+
+def test_instants_before_1970_are_refused(tmp_path: Path, pictures: np.ndarray) -> None:
+    with RecordWriter(tmp_path / "a.mcap", metadata={}) as record, pytest.raises(TimeError, match="1970"):
+        record.frame(log_time=-1, publish_time=1, timestamp=1, image=pictures[0])
 
 
 @pytest.mark.parametrize(
