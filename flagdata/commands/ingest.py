@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
 CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "rate", "crop", "crop_picture", "exposure", "archive")
-WIND_ONLY = ("sensor", "date", "date_order", "platform", "azimuth", "zero_offset", "encoding")
+WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "zero_offset", "encoding")
 SNIFF = ("sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture")
 ONE_SOURCE = ("start", "date", "name", "crop_picture")
 
@@ -77,6 +77,7 @@ class _Given:
 )
 @click.option("--date-order", type=click.Choice(["dmy", "mdy"]), help="Wind: of dates written with numbers only.")
 @click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
+@click.option("--talker", metavar="ID", help="Wind: of NMEA 0183, where several instruments share a stream.")
 @click.option(
     "--azimuth", type=float, metavar="DEG", help="Wind: of the sensor's north or bow, clockwise from true north."
 )
@@ -106,6 +107,7 @@ def ingest(
     date: str | None,
     date_order: str | None,
     platform: str | None,
+    talker: str | None,
     azimuth: float | None,
     zero_offset: str | None,
     encoding: str | None,
@@ -138,7 +140,8 @@ def ingest(
         ),
         wind=_wind_options(
             format_name=None if format_name == "camera" else format_name, sensor=sensor, zone_name=zone, date=date,
-            date_order=date_order, platform=platform, azimuth=azimuth, zero_offset=zero_offset, encoding=encoding,
+            date_order=date_order, platform=platform, talker=talker, azimuth=azimuth, zero_offset=zero_offset,
+            encoding=encoding,
         ),
         labels=_labels(name, session),
         branch=branch,
@@ -203,6 +206,7 @@ def _wind_options(
     date: str | None,
     date_order: Any,
     platform: Any,
+    talker: str | None,
     azimuth: float | None,
     zero_offset: str | None,
     encoding: str | None,
@@ -229,6 +233,7 @@ def _wind_options(
             date=day,
             date_order=date_order,
             platform=platform,
+            talker=talker,
             azimuth=float(unit("deg").to_si(azimuth)) if azimuth is not None else None,
             zero_offset=offset,
         )
