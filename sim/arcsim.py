@@ -1,0 +1,262 @@
+"""ArcSim 0.2 scenes and materials, read as typed scenes. What the simulator does not do is refused by name.
+
+A scene file names one cloth with one material, its handles, gravity and wind. Stages that ArcSim runs unless they are
+disabled and that are not simulated here (remeshing, strain limiting, collision, plasticity) are an error unless the
+scene disables them, has no settings that make them act, or the caller accepts to leave them out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flagdata.errors import InputError, UnknownNameError
+from flagdata.ingest.meshes import read_obj
+from flagdata.ingest.meshes.folder import read_json
+from sim.air import QuadraticNormal
+from sim.handles import ARCSIM_STIFFNESS, Handles
+from sim.material import Material
+from sim.mesh import Mesh
+from sim.scene import Scene
+
+STAGES = ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter", "plasticity")
+"""Stages of ArcSim's step that a scene may disable."""
+
+_TOP = {
+    "frame_time", "frame_steps", "end_time", "end_frame", "duration", "cloths", "handles", "gravity", "wind", "disable",
+    "magic", "motions", "obstacles", "morphs",
+}  # fmt: skip
+_CLOTH = {"mesh", "transform", "materials", "remeshing"}
+_TRANSFORM = {"translate", "scale", "rotate"}
+_MATERIAL = {
+    "data", "thicken", "density_mult", "stretching_mult", "bending_mult", "damping", "strain_limits", "yield_curv",
+    "weakening",
+}  # fmt: skip
+_HANDLE = {"nodes", "type"}
+_WIND = {"velocity", "density", "drag"}
+_MAGIC = {"handle_stiffness", "repulsion_thickness", "collision_stiffness", "friction"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArcsimScene:
+    """A scene file.
+
+    Attributes:
+        scene: what is simulated.
+        frame_time: seconds between frames.
+        frame_steps: ArcSim's backward Euler steps a frame.
+        frames: frames after the first.
+        left_out: stages that ArcSim would run and that the caller accepted to leave out.
+    """
+
+    scene: Scene
+    frame_time: float
+    frame_steps: int
+    frames: int
+    left_out: tuple[str, ...]
+
+    @property
+    def step(self) -> float:
+        """ArcSim's time step [s]."""
+        return self.frame_time / self.frame_steps
+
+
+def read_material(path: Path) -> Material:
+    """A material file: density, stretching (6 × 4) and bending (3 × 5). Its damping is 0, as ArcSim's.
+
+    Raises:
+        NotFoundError: no such file.
+        InputError: missing or unknown keys, impossible values.
+    """
+    content = read_json(path)
+    _known(content, {"density", "stretching", "bending"}, f"material {path}")
+    missing = sorted({"density", "stretching", "bending"} - set(content))
+    if missing:
+        raise InputError(f"keys missing: {', '.join(missing)}", where=f"material {path}", fix="add them")
+    return Material.from_mapping(
+        {**content, "source": f"ArcSim material file {path.name}", "damping": 0.0}, name=path.stem
+    )
+
+
+def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] = ()) -> ArcsimScene:
+    """A scene file with its mesh and material.
+
+    Args:
+        root: folder that the mesh and material paths are relative to; the scene file's own if None.
+        accept: stages (of `STAGES`) that may be left out although the scene has them act.
+
+    Raises:
+        NotFoundError: a file that is not there.
+        InputError: keys or stages that are not supported, all of them listed; several cloths or materials; impossible
+            values.
+        UnknownNameError: an accepted or disabled stage that does not exist.
+    """
+    content = read_json(path)
+    where = f"scene {path}"
+    folder = path.parent if root is None else root
+    for stage in (*accept, *_list(content, "disable", where)):
+        if stage not in STAGES:
+            raise UnknownNameError.of("ArcSim stage", str(stage), STAGES, where=where)
+    _known(content, _TOP, where)
+    filled = [key for key in ("motions", "obstacles", "morphs") if content.get(key)]
+    if filled:
+        raise InputError(f"{', '.join(filled)} are not supported", where=where, fix="remove them")
+    cloth = _one(content, "cloths", where)
+    _known(cloth, _CLOTH, f"{where}, cloths")
+    entry = _one(cloth, "materials", where)
+    _known(entry, _MATERIAL, f"{where}, materials")
+    left_out = _stages(content, cloth, entry, where, frozenset(accept))
+
+    shape = read_obj(folder / _text(cloth, "mesh", where))
+    mesh = Mesh(rest=shape.rest, faces=shape.faces)
+    wind = content.get("wind", {})
+    _known(wind, _WIND, f"{where}, wind")
+    magic = content.get("magic", {})
+    _known(magic, _MAGIC, f"{where}, magic")
+    nodes: list[int] = []
+    for handle in _list(content, "handles", where):
+        _known(handle, _HANDLE, f"{where}, handles")
+        if handle.get("type", "node") != "node":
+            raise InputError(f"handle type {handle['type']!r}", where=where, fix="only node handles are supported")
+        nodes += [int(node) for node in handle.get("nodes", [])]
+    scene = Scene(
+        mesh=mesh,
+        position=_placed(shape.positions, cloth.get("transform", {}), where),
+        material=_scaled(read_material(folder / _text(entry, "data", where)), entry, where),
+        handles=Handles(
+            vertices=tuple(nodes), stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, f"{where}, magic")
+        ),
+        wind=_vector(wind, "velocity", (0.0, 0.0, 0.0), f"{where}, wind"),
+        gravity=_vector(content, "gravity", (0.0, 0.0, 0.0), where),
+        air=QuadraticNormal(
+            density=_number(wind, "density", 1.0, f"{where}, wind"), drag=_number(wind, "drag", 0.0, f"{where}, wind")
+        ),
+    )
+    frame_time = _number(content, "frame_time", math.nan, where)
+    frame_steps = _number(content, "frame_steps", math.nan, where)
+    if not (frame_time > 0 and frame_steps >= 1 and frame_steps == int(frame_steps)):
+        raise InputError("frame_time or frame_steps are missing or impossible", where=where, fix="give both")
+    return ArcsimScene(
+        scene=scene,
+        frame_time=frame_time,
+        frame_steps=int(frame_steps),
+        frames=_frames(content, frame_time, where),
+        left_out=left_out,
+    )
+
+
+def _frames(content: Mapping[str, Any], frame_time: float, where: str) -> int:
+    given = [key for key in ("end_time", "duration", "end_frame") if key in content]
+    if len(given) != 1:
+        raise InputError(
+            f"its end is given {len(given)} times", where=where, fix="give end_time, duration or end_frame"
+        )
+    value = _number(content, given[0], math.nan, where)
+    frames = value if given[0] == "end_frame" else value / frame_time
+    if not (math.isfinite(frames) and frames >= 1):
+        raise InputError(f"{given[0]} is {value!r}", where=where, fix="let it last at least one frame")
+    return math.floor(frames + 1e-9)
+
+
+def _stages(
+    content: Mapping[str, Any], cloth: Mapping[str, Any], entry: Mapping[str, Any], where: str, accept: frozenset[str]
+) -> tuple[str, ...]:
+    """The stages that would act and were accepted to be left out.
+
+    Raises:
+        InputError: some would act and were not.
+    """
+    acts = {"proximity", "collision", "separation", "popfilter"}
+    if "remeshing" in cloth:
+        acts.add("remeshing")
+    if "strain_limits" in entry:
+        acts.add("strainlimiting")
+    if "yield_curv" in entry:
+        acts.add("plasticity")
+    acting = [stage for stage in STAGES if stage in acts - set(content.get("disable", []))]
+    refused = [stage for stage in acting if stage not in accept]
+    if refused:
+        raise InputError(
+            f"stages that are not simulated: {', '.join(refused)}",
+            where=where, fix='add them to the scene\'s "disable", or accept to leave them out',
+        )  # fmt: skip
+    return tuple(acting)
+
+
+def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Material:
+    thicken = _number(entry, "thicken", 1.0, where)
+    scaled = material.scaled(
+        density=thicken * _number(entry, "density_mult", 1.0, where),
+        stretching=thicken * _number(entry, "stretching_mult", 1.0, where),
+        bending=thicken * _number(entry, "bending_mult", 1.0, where),
+    )
+    return replace(scaled, damping=_number(entry, "damping", 0.0, where))
+
+
+def _placed(positions: NDArray[np.float64], transform: Mapping[str, Any], where: str) -> NDArray[np.float64]:
+    """Scaled, turned (angle in degrees about an axis), then moved."""
+    _known(transform, _TRANSFORM, f"{where}, transform")
+    placed = positions * _number(transform, "scale", 1.0, where)
+    if "rotate" in transform:
+        turn = transform["rotate"]
+        if not isinstance(turn, list) or len(turn) != 4 or not any(turn[1:]):
+            raise InputError(f"rotate is {turn!r}", where=where, fix="give [degrees, x, y, z]")
+        axis = np.array(turn[1:], dtype=np.float64)
+        placed = Rotation.from_rotvec(math.radians(turn[0]) * axis / np.linalg.norm(axis)).apply(placed)
+    return placed + np.array(_vector(transform, "translate", (0.0, 0.0, 0.0), where))
+
+
+def _known(content: Any, known: Collection[str], where: str) -> None:
+    if not isinstance(content, Mapping):
+        raise InputError(f"{content!r} is not an object", where=where, fix="give {…}")
+    unknown = sorted(set(content) - set(known))
+    if unknown:
+        raise InputError(
+            f"keys that are not supported: {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(known))}"
+        )
+
+
+def _list(content: Mapping[str, Any], key: str, where: str) -> list[Any]:
+    value = content.get(key, [])
+    if not isinstance(value, list):
+        raise InputError(f"{key} is {value!r}", where=where, fix="give a list")
+    return value
+
+
+def _one(content: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    entries = _list(content, key, where)
+    if len(entries) != 1:
+        raise InputError(f"{len(entries)} {key}", where=where, fix="one is supported")
+    return entries[0]
+
+
+def _text(content: Mapping[str, Any], key: str, where: str) -> str:
+    value = content.get(key)
+    if not isinstance(value, str):
+        raise InputError(f"{key} is {value!r}", where=where, fix="give a path")
+    return value
+
+
+def _number(content: Mapping[str, Any], key: str, default: float, where: str) -> float:
+    value = content.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{key} is {value!r}", where=where, fix="give a number")
+    return float(value)
+
+
+def _vector(
+    content: Mapping[str, Any], key: str, default: tuple[float, float, float], where: str
+) -> tuple[float, float, float]:
+    value = content.get(key, default)
+    try:
+        x, y, z = (float(v) for v in value)
+    except (TypeError, ValueError):
+        raise InputError(f"{key} is {value!r}", where=where, fix="give [x, y, z]") from None
+    return x, y, z
