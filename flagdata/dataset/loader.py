@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 import torch
 from torch.utils.data import DataLoader
 
-from flagdata.dataset.sample import Batch, collate
+from flagdata.dataset.sample import Batch, Sample, collate
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
 
@@ -19,8 +22,10 @@ if TYPE_CHECKING:
 Order: TypeAlias = Literal["shuffled", "stored"]
 Last: TypeAlias = Literal["keep", "drop"]
 Memory: TypeAlias = Literal["pageable", "pinned"]
+RunIn: TypeAlias = Literal["threads", "fork", "spawn", "forkserver"]
 State: TypeAlias = dict[str, str | int | None]
 
+_AHEAD = 2  # batches that each thread reads ahead, as many as torch's worker processes do
 _MOVING = ("epoch", "cursor", "at")  # parts of a state that may differ from the loader that takes it up
 
 
@@ -33,11 +38,13 @@ class PairLoader:
     Args:
         pairs: the dataset.
         batch_size: pairs a batch.
-        workers: processes that read and decode; 0 reads in this one.
+        workers: threads or processes that read and decode ahead; 0 reads when a batch is asked for.
+        run_in: what the workers are. "threads" share memory with the caller, so a batch costs no copy between
+            processes; reading and JPEG decoding leave Python's lock. Processes, started by "fork", "spawn" or
+            "forkserver", are for callers that hold that lock themselves most of the time.
         order: "shuffled" anew each epoch, or as "stored": by recording and frame.
         last: whether to "keep" or "drop" the last batch when it is not full.
         memory: "pinned" copies batches to page-locked memory for transfer to a GPU.
-        start_method: of the workers, "fork", "spawn" or "forkserver"; `None` is the platform's.
 
     Attributes:
         epoch: number of the epoch that the next batch belongs to, from 0.
@@ -53,10 +60,10 @@ class PairLoader:
         *,
         batch_size: int,
         workers: int = 0,
+        run_in: RunIn = "threads",
         order: Order = "shuffled",
         last: Last = "keep",
         memory: Memory = "pageable",
-        start_method: str | None = None,
     ) -> None:
         if batch_size < 1 or workers < 0:
             raise UsageError(f"batches of {batch_size} with {workers} workers", fix="give at least 1 and 0")
@@ -64,11 +71,10 @@ class PairLoader:
             ("order", order, ("shuffled", "stored")),
             ("last", last, ("keep", "drop")),
             ("memory", memory, ("pageable", "pinned")),
+            ("run_in", run_in, ("threads", "fork", "spawn", "forkserver")),
         ):
             if value not in known:
                 raise UsageError(f"{option} {value!r}", fix=f"give {' or '.join(map(repr, known))}")
-        if start_method is not None and workers == 0:
-            raise UsageError(f"start method {start_method!r} without workers", fix="give workers, or leave it out")
         if last == "drop" and len(pairs) < batch_size:
             raise UsageError(
                 f"{len(pairs)} pairs do not fill one batch of {batch_size}", fix="give a smaller batch, or last='keep'"
@@ -79,18 +85,22 @@ class PairLoader:
         self._batch_size = batch_size
         self._order: Order = order
         self._last: Last = last
+        self._memory: Memory = memory
+        self._threads = workers if run_in == "threads" else 0
         self._todo = _Todo()
         self._iteration = 0
-        self._loader = DataLoader(
-            pairs,
-            batch_sampler=self._todo,
-            num_workers=workers,
-            collate_fn=collate,
-            pin_memory=memory == "pinned",
-            persistent_workers=workers > 0,
-            multiprocessing_context=start_method,
-            generator=torch.Generator(),  # its own, so that loading draws nothing from the global stream
-        )
+        self._processes: DataLoader[Sample] | None = None
+        if workers and run_in != "threads":
+            self._processes = DataLoader(
+                pairs,
+                batch_sampler=self._todo,
+                num_workers=workers,
+                collate_fn=collate,
+                pin_memory=memory == "pinned",
+                persistent_workers=True,
+                multiprocessing_context=run_in,
+                generator=torch.Generator(),  # its own, so that loading draws nothing from the global stream
+            )
 
     def __len__(self) -> int:
         """Batches in a whole epoch."""
@@ -115,13 +125,32 @@ class PairLoader:
 
     def _run(self, iteration: int) -> Iterator[Batch]:
         self._todo.batches = self.batches(self.epoch)[self.cursor :]
-        for batch in self._loader:
+        for batch in self._processes or self._in_this_process():
             if iteration != self._iteration:
                 raise UsageError("another iteration of this loader has begun", fix="use one loader for each iteration")
             self.cursor += 1
             if self.cursor == len(self):
                 self.epoch, self.cursor = self.epoch + 1, 0
             yield batch
+
+    def _in_this_process(self) -> Iterator[Batch]:
+        todo = iter(self._todo)
+        if not self._threads:
+            yield from map(self._batch, todo)
+            return
+        pool = ThreadPoolExecutor(self._threads, thread_name_prefix="pairs")
+        try:
+            ahead = deque(pool.submit(self._batch, batch) for batch in islice(todo, _AHEAD * self._threads))
+            while ahead:
+                batch = ahead.popleft().result()
+                ahead.extend(pool.submit(self._batch, indices) for indices in islice(todo, 1))
+                yield batch
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def _batch(self, indices: list[int]) -> Batch:
+        batch = collate([self.pairs[index] for index in indices])
+        return batch.pin_memory() if self._memory == "pinned" else batch
 
     def state_dict(self) -> State:
         """Everything that determines the batches still to come; put it into the checkpoint beside the model."""

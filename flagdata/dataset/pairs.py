@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,20 @@ import torch
 from torch.utils.data import Dataset
 
 from flagdata.dataset.cache import DecodedCache
-from flagdata.dataset.loader import Last, Memory, Order, PairLoader
+from flagdata.dataset.loader import Last, Memory, Order, PairLoader, RunIn
 from flagdata.dataset.sample import Sample
 from flagdata.dataset.table import PairTable
 from flagdata.dataset.tolerance import Refusal
 from flagdata.record import Record
 
-OPEN_RECORDS = 256  # record files a process keeps open
+OPEN_RECORDS = 64  # record files that a thread keeps open
+
+
+class _OpenRecords(threading.local):
+    """The records that this thread has open, the least recently used first; each thread has its own."""
+
+    def __init__(self) -> None:
+        self.records: OrderedDict[int, Record] = OrderedDict()
 
 
 class Pairs(Dataset[Sample]):
@@ -50,7 +58,7 @@ class Pairs(Dataset[Sample]):
         self.fingerprint = table.fingerprint()
         self._paths = paths
         self._cache = cache
-        self._records: OrderedDict[int, Record] = OrderedDict()
+        self._open = _OpenRecords()
 
     def __len__(self) -> int:
         return len(self.table)
@@ -83,7 +91,11 @@ class Pairs(Dataset[Sample]):
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_records": OrderedDict()}
+        return {name: value for name, value in self.__dict__.items() if name != "_open"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._open = _OpenRecords()
 
     def __repr__(self) -> str:
         at = self.at or "the head of main"
@@ -94,20 +106,20 @@ class Pairs(Dataset[Sample]):
         batch_size: int,
         *,
         workers: int = 0,
+        run_in: RunIn = "threads",
         order: Order = "shuffled",
         last: Last = "keep",
         memory: Memory = "pageable",
-        start_method: str | None = None,
     ) -> PairLoader:
         """Batches in a deterministic order that can be saved and taken up again; see `PairLoader`."""
         return PairLoader(
             self,
             batch_size=batch_size,
             workers=workers,
+            run_in=run_in,
             order=order,
             last=last,
             memory=memory,
-            start_method=start_method,
         )
 
     def _clip(self, index: int) -> torch.Tensor:
@@ -124,11 +136,12 @@ class Pairs(Dataset[Sample]):
         return torch.from_numpy(frames).unsqueeze(0)
 
     def _record(self, number: int) -> Record:
-        record = self._records.get(number)
+        records = self._open.records
+        record = records.get(number)
         if record is None:
-            record = self._records[number] = Record.open(self._paths[number])
-            if len(self._records) > OPEN_RECORDS:
-                self._records.popitem(last=False)
+            record = records[number] = Record.open(self._paths[number])
+            if len(records) > OPEN_RECORDS:
+                records.popitem(last=False)
         else:
-            self._records.move_to_end(number)
+            records.move_to_end(number)
         return record

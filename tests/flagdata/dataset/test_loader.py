@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import threading
 import time
 from dataclasses import fields
 
@@ -13,12 +14,21 @@ import torch
 
 import flagdata
 from flagdata.dataset import DecodedCache
-from flagdata.errors import RefusedError, UsageError
+from flagdata.errors import CorruptError, RefusedError, UsageError
+from flagdata.lake import Lake
 
 
 @pytest.fixture(scope="module")
 def pairs(field_lake):
     return flagdata.open(field_lake.path).pairs(at="v1", seed=11)
+
+
+@pytest.fixture
+def lake_to_damage(tmp_path, add_recording, made):
+    """A lake of one recording, and the file that holds it."""
+    lake = Lake.create(tmp_path / "lake")
+    identity = add_recording(lake, made(number=1))
+    return lake, lake.object_path(lake.artifact(identity).object)
 
 
 def contents(batch):
@@ -46,18 +56,20 @@ def expected(pairs):
     return [epoch(loader), epoch(loader)]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_batches_are_identical_with_0_1_and_2_workers(pairs, expected, workers):
-    loader = pairs.loader(7, workers=workers)
+@pytest.mark.parametrize(
+    ("workers", "run_in"), [(1, "threads"), (2, "threads"), (5, "threads"), (1, "fork"), (2, "fork")]
+)
+def test_batches_are_identical_with_any_number_of_workers(pairs, expected, workers, run_in):
+    loader = pairs.loader(7, workers=workers, run_in=run_in)
     assert epoch(loader) == expected[0]
     assert epoch(loader) == expected[1]
 
 
-@pytest.mark.parametrize("start_method", ["fork", "spawn"])
-def test_batches_are_identical_however_workers_start(field_lake, expected, start_method):
+@pytest.mark.parametrize("run_in", ["fork", "spawn"])
+def test_worker_processes_need_nothing_of_the_catalog(field_lake, expected, run_in):
     # The catalog was used in this process just now: what the workers inherit must not need it.
     fresh = flagdata.open(field_lake.path).pairs(at="v1", seed=11)
-    assert epoch(fresh.loader(7, workers=2, start_method=start_method)) == expected[0]
+    assert epoch(fresh.loader(7, workers=2, run_in=run_in)) == expected[0]
 
 
 def test_an_epoch_holds_every_pair_once_in_another_order_than_the_last(pairs, expected):
@@ -84,12 +96,15 @@ def test_the_last_batch_may_be_dropped(pairs):
     assert [len(batch) for batch in loader] == [7] * 6
 
 
-@pytest.mark.parametrize("workers", [0, 2])
+WAYS = [{}, {"workers": 2}, {"workers": 2, "run_in": "fork"}]
+
+
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("stop", [1, 6, 7, 9])
-def test_a_saved_cursor_continues_bit_for_bit_in_another_process(field_lake, expected, workers, stop):
+def test_a_saved_cursor_continues_bit_for_bit_in_another_process(field_lake, expected, way, stop):
     flat = expected[0] + expected[1]
     pairs = flagdata.open(field_lake.path).pairs(at="v1", seed=11)
-    loader = pairs.loader(7, workers=workers)
+    loader = pairs.loader(7, **way)
     done = 0
     while done < stop:
         for _ in loader:
@@ -105,9 +120,9 @@ def test_a_saved_cursor_continues_bit_for_bit_in_another_process(field_lake, exp
     assert rest == flat[stop:]
 
 
-@pytest.mark.parametrize("workers", [0, 2])
-def test_an_iteration_left_early_is_taken_up_where_it_stopped(pairs, expected, workers):
-    loader = pairs.loader(7, workers=workers)
+@pytest.mark.parametrize("way", WAYS)
+def test_an_iteration_left_early_is_taken_up_where_it_stopped(pairs, expected, way):
+    loader = pairs.loader(7, **way)
     first = [contents(batch) for batch, _ in zip(loader, range(3), strict=False)]
     # zip asks for a fourth batch before it stops: that one was handed out too.
     assert first == expected[0][:3]
@@ -145,21 +160,38 @@ def test_loading_draws_nothing_from_the_global_random_stream(pairs):
     torch.manual_seed(5)
     expected = torch.rand(3)
     torch.manual_seed(5)
-    next(iter(pairs.loader(7, workers=1)))
+    next(iter(pairs.loader(7, workers=1, run_in="fork")))
     assert torch.equal(torch.rand(3), expected)
 
 
 def test_batches_from_the_decoded_cache_are_the_same(field_lake, expected, tmp_path):
     cache = DecodedCache(tmp_path / "cache", limit=10**8)
     cached = flagdata.open(field_lake.path).pairs(at="v1", seed=11, cache=cache)
-    loader = cached.loader(7, workers=2)
-    assert epoch(loader) == expected[0]  # filled by two workers at once
+    loader = cached.loader(7, workers=2, run_in="fork")
+    assert epoch(loader) == expected[0]  # filled by two processes at once
     assert epoch(loader) == expected[1]  # read back
     assert cache.size() > 48 * 30 * 32 * 32
 
 
-def test_workers_end_with_their_loader(pairs):
-    loader = pairs.loader(7, workers=2)
+def test_threads_end_with_the_iteration(pairs):
+    loader = pairs.loader(3, workers=3)
+    iteration = iter(loader)
+    next(iteration)
+    assert sum(thread.name.startswith("pairs") for thread in threading.enumerate()) > 0
+    del iteration
+    assert not any(thread.name.startswith("pairs") for thread in threading.enumerate())
+
+
+def test_an_error_in_a_thread_reaches_the_caller_at_its_batch(lake_to_damage):
+    lake, path = lake_to_damage
+    pairs = flagdata.open(lake.path).pairs()
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(CorruptError, match="cut off"):
+        list(pairs.loader(2, workers=2))
+
+
+def test_worker_processes_end_with_their_loader(pairs):
+    loader = pairs.loader(7, workers=2, run_in="fork")
     next(iter(loader))
     children = multiprocessing.active_children()
     assert len(children) >= 2
@@ -178,7 +210,7 @@ def test_workers_end_with_their_loader(pairs):
         {"batch_size": 1, "order": "random"},
         {"batch_size": 1, "last": "pad"},
         {"batch_size": 1, "memory": "fast"},
-        {"batch_size": 1, "start_method": "spawn"},
+        {"batch_size": 1, "run_in": "fibres"},
         {"batch_size": 49, "last": "drop"},
     ],
 )
