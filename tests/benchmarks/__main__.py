@@ -5,6 +5,7 @@ from __future__ import annotations
 from tests.evidence import run_all
 
 BENCHMARKS = {
+    "lake": "tests.benchmarks.bench_lake",
     "pairs": "tests.benchmarks.bench_pairs",
     "records": "tests.benchmarks.bench_records",
 }
