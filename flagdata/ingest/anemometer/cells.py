@@ -35,12 +35,10 @@ class Numbers:
     Attributes:
         value: (n,) float64, NaN unless `state` is NUMBER.
         state: (n,) uint8 of `Cell`.
-        decimals: most digits after the decimal mark, which tells the resolution of the display.
     """
 
     value: NDArray[np.float64]
     state: NDArray[np.uint8]
-    decimals: int
 
 
 def numbers(cells: Sequence[str], *, decimal: str = ".", missing: Sequence[str] = ()) -> Numbers:
@@ -72,7 +70,7 @@ def numbers(cells: Sequence[str], *, decimal: str = ".", missing: Sequence[str] 
     for code in _numeric(missing):
         state[(value == code) & (state == Cell.NUMBER)] = Cell.MISSING
     value[state != Cell.NUMBER] = np.nan
-    return Numbers(value=value, state=state, decimals=_decimals(text))
+    return Numbers(value=value, state=state)
 
 
 def _mask(array: pa.BooleanArray) -> NDArray[np.bool_]:
@@ -87,11 +85,3 @@ def _numeric(codes: Sequence[str]) -> list[float]:
         except ValueError:
             continue
     return [code for code in found if np.isfinite(code)]
-
-
-def _decimals(text: pa.StringArray) -> int:
-    """Most digits after the point among plain decimals of up to 6 digits after it."""
-    head = text.slice(0, 5000)
-    fraction = pc.extract_regex(head, r"\.(?P<digits>\d{1,6})$")
-    digits = pc.max(pc.binary_length(pc.struct_field(fraction, [0]))).as_py()
-    return int(digits or 0)

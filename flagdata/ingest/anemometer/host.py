@@ -18,7 +18,11 @@ from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
 
-_FIELD = r"[ \t]*(?:[+-]?(?:\d+[.,]?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?[nN][aA][nN]|[+-]?[iI][nN][fF]|-{2,}|)[ \t]*"
+# Possessive quantifiers: a line of 60,000 blanks or digits must not take quadratic time.
+_FIELD = (
+    r"[ \t]*+(?:[+-]?(?:\d++(?:{mark}\d*+)?|{mark}\d++)(?:[eE][+-]?\d++)?"
+    r"|[+-]?[nN][aA][nN]|[+-]?[iI][nN][fF]|-{{2,}}+|)[ \t]*+"
+)
 _STAMP = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}|^\d{10}(?:\.\d+)?(?=[,;\t])")
 _RAW = re.compile(r"raw|line|message|payload|sentence|serial", re.IGNORECASE)
 LEAST = 0.05
@@ -82,8 +86,8 @@ class HostStamped:
 
 def _shape(recipe: Recipe) -> re.Pattern[str]:
     fields = max([int(c.column) for c in recipe.channels.values()] + [int(c) for c in recipe.time.columns])
-    between = re.escape(recipe.file.delimiter)
-    return re.compile(f"^{_FIELD}(?:{between}{_FIELD}){{{fields - 1}}}$")
+    between, one = re.escape(recipe.file.delimiter), _FIELD.format(mark=re.escape(recipe.file.decimal))
+    return re.compile(f"^{one}(?:{between}{one}){{{fields - 1}}}$")
 
 
 def _payload(line: str, delimiter: str) -> tuple[str, str]:
@@ -130,7 +134,7 @@ class HostRows:
             numbers: list[int] = []
             rows: list[list[str]] = []
             for number, line in enumerate(lines, start=first):
-                if number < self.first_line or not line.strip(" \t\x00"):
+                if not line.strip(" \t\x00") or (number < self.first_line and not _STAMP.match(line)):
                     continue
                 stamp, raw = _payload(line, delimiter)
                 if raw and self._shape.match(raw):

@@ -138,7 +138,8 @@ def _channels(found: _Preamble, where: str) -> tuple[dict[str, ChannelLayout], l
     repaired: list[str] = []
     units = [*found.units, *[""] * len(found.names)]
     for number, name in enumerate(found.names[1:], start=2):
-        channel = next((c for pattern, c in _COLUMNS if re.fullmatch(pattern, name, re.IGNORECASE)), None)
+        short = name[:80]  # a header cell of any length must not cost more
+        channel = next((c for pattern, c in _COLUMNS if re.fullmatch(pattern, short, re.IGNORECASE)), None)
         if channel is None or channel in channels:
             if name:
                 unread.append(name)

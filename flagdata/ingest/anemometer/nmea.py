@@ -97,9 +97,10 @@ class Nmea:
                     _take(stream, line, at, options.talker)
         where = str(source.path)
         if not stream.line:
+            by = f" of the talker {options.talker}" if options.talker is not None else ""
             seen = ", ".join(f"{count} {kind}" for kind, count in stream.kinds.most_common(6))
             raise InputError(
-                f"no valid MWV or MWD sentence{'; there are ' + seen if seen else ''}", where=where,
+                f"no valid MWV or MWD sentence{by}{'; there are ' + seen if seen else ''}", where=where,
                 fix="have the instrument send MWV, or check its baud rate if sentences are broken",
             )  # fmt: skip
         if len(stream.talkers) > 1:

@@ -130,10 +130,27 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     """
     names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
     names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    found: list[Finding] = []
+    # Streams interleave kinds of wind: rows that hold the same channels are compared with each other.
+    held = np.zeros(len(reading.time), dtype=np.int64)
+    for bit, name in enumerate(names):
+        held |= np.isfinite(reading.channels[name]).astype(np.int64) << bit
+    for kind in np.unique(held[held > 0]).tolist():
+        rows = np.flatnonzero(held == kind)
+        present = [name for bit, name in enumerate(names) if kind >> bit & 1]
+        repeats, finding = _stale_rows(reading.take(rows), present)
+        flags[rows[repeats]] = SampleFlag.STALE
+        found.extend(finding)
+    return flags, tuple(found)
+
+
+def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    """Indices of stale rows among rows that hold all of `names`."""
     n = len(reading.time)
-    flags = np.zeros(n, dtype=np.uint16)
-    if n < STALE_SHORTEST or not names:
-        return flags, ()
+    nothing = np.zeros(0, dtype=np.int64)
+    if n < STALE_SHORTEST:
+        return nothing, ()
     same = np.ones(n - 1, dtype=bool)
     for name in names:
         values = reading.channels[name]
@@ -141,7 +158,7 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     same &= (reading.flags[1:] & (SampleFlag.DEAD_ZONE | SampleFlag.OUT_OF_RANGE)) == 0
     starts, lengths = _runs(same)
     if len(starts) == 0:
-        return flags, ()
+        return nothing, ()
     span = (reading.time[starts + lengths] - reading.time[starts]) / NANOSECONDS
     if reading.rules.stale_after is not None:
         long = span > reading.rules.stale_after
@@ -151,13 +168,12 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
         long = (lengths >= limit) & (span >= STALE_SECONDS)
         text = f"{limit} times or more, which chance and resolution do not explain"
     if not long.any():
-        return flags, ()
-    for start, length in zip(starts[long], lengths[long], strict=True):
-        flags[start + 1 : start + length + 1] = SampleFlag.STALE
+        return nothing, ()
+    stale_rows = np.concatenate([np.arange(s + 1, s + k + 1) for s, k in zip(starts[long], lengths[long], strict=True)])
     worst = int(np.argmax(np.where(long, lengths, 0)))
     seconds = float(reading.time[starts[worst] + lengths[worst]] - reading.time[starts[worst]]) / NANOSECONDS
-    count = int((flags != 0).sum())
-    return flags, (
+    count = len(stale_rows)
+    return stale_rows, (
         Finding(
             kind="stale-repeats", severity=Severity.WARNING, count=count, value=seconds,
             where=f"line {reading.line[starts[long][0] + 1]}",

@@ -41,7 +41,8 @@ class RowReader:
         self.shift = 0
         self.header: list[str] | None = None
         if layout.header:
-            self.header = [cell.strip() for cell in _cut([head[layout.preamble]], layout.delimiter)[0]]
+            names = head[layout.preamble].lstrip("\ufeff")
+            self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
 
     def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
         """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.

@@ -233,6 +233,10 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
     if column not in names:
         fix = UnknownNameError.of("column", column, names).fix
         raise InputError(f"no column {column!r} in the header", where=where, fix=fix)
+    if names.count(column) > 1:
+        raise InputError(
+            f"{names.count(column)} columns are called {column!r}", where=where, fix="give the column's number instead"
+        )
     return names.index(column)
 
 

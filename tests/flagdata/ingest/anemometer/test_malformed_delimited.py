@@ -37,6 +37,14 @@ NEXT = "2026-05-01T12:00:01Z,3.2"
 DATE = {"date": dt.date(2026, 5, 1)}
 
 REFUSED = [
+    pytest.param(
+        {
+            "content": csv("2026-05-01T12:00:00Z,3,4", header="time,wind_speed,wind_speed"),
+            "error": InputError,
+            "says": "2 columns are called 'wind_speed'",
+        },
+        id="column-twice",
+    ),
     pytest.param({"content": csv(), "error": InputError, "where": "line 2", "says": "no row"}, id="header-only"),
     pytest.param({"content": b"time,wind_speed", "error": InputError, "says": "no row"}, id="header-without-line-end"),
     pytest.param({"content": csv("", "", ""), "error": InputError, "says": "no row"}, id="header-and-blank-lines"),

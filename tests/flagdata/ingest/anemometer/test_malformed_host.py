@@ -9,6 +9,7 @@ import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.schema import SampleFlag
+from flagdata.signals import WindLog
 
 Check = Callable[..., None]
 
@@ -91,6 +92,25 @@ REPORTED = [
         id="no-payload",
     ),
 ]
+
+
+def test_a_log_without_header_loses_no_line(read: Callable[..., WindLog]) -> None:
+    content = "\n".join(map(host_line, range(5))).encode()
+    assert len(read(content, recipe="serial-speed", zone="UTC").series) == 5
+
+
+def test_two_numbers_are_no_decimal_comma(check_reported: Check) -> None:
+    lines = hosted(*map(host_line, range(9)), host_line(9, '"3,2"'))
+    check_reported(lines, finding="non-data-lines", count=1, samples=9, options=UTC)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("filler", [" ", "1", "-", "1,", "1e", "\t"])
+def test_long_lines_of_anything_take_linear_time(filler: str, read: Callable[..., WindLog]) -> None:
+    # quadratic time in 60,000 characters would be minutes
+    junk = [f"2026-05-01T12:00:1{i}.5,{filler * (60_000 // len(filler))}x" for i in range(3)]
+    log = read(hosted(*map(host_line, range(9)), *junk), recipe="serial-speed", zone="UTC")
+    assert len(log.series) == 9
 
 
 @pytest.mark.parametrize("case", REFUSED)

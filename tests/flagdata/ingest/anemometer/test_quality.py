@@ -79,6 +79,17 @@ def test_calm_is_not_stale() -> None:
     assert not quality.stale(log.with_findings((), flags=flags))[0].any()
 
 
+def test_a_frozen_reading_is_stale_though_another_kind_of_wind_goes_on_between() -> None:
+    n = 2000
+    relative, theoretical = gusts(n), gusts(n) + 1
+    relative[500:600] = 9.99
+    both = {name: np.full(2 * n, np.nan) for name in ("apparent_wind_speed", "theoretical_wind_speed")}
+    both["apparent_wind_speed"][::2], both["theoretical_wind_speed"][1::2] = relative, theoretical
+    flags, found = quality.stale(reading(T0 + np.arange(2 * n) * (S // 10), **both))
+    assert np.flatnonzero(flags).tolist() == list(range(1002, 1200, 2))
+    assert [f.count for f in found] == [99]
+
+
 def test_a_recipe_may_say_how_long_a_reading_may_stand() -> None:
     speed = [3.0] * 30 + [4.0, 5.0] * 10
     log = reading(T0 + np.arange(50) * S, wind_speed=speed, rules=QualityRules(stale_after=60))
