@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from flagdata.errors import InputError, LimitError, NotFoundError, TimeError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.stamps import Timing, survey
+from flagdata.ingest.camera.truncation import cut_off, truncation
 
 # Containers of one file's own frames. Playlists and scripts that name other files or addresses (HLS, DASH, concat, SDP)
 # are not among them.
@@ -30,7 +32,6 @@ _FORMATS = (
 UNTIMED = frozenset({"h264", "hevc", "mjpeg", "m4v", "mpegvideo"})
 # Containers that number packets in decoding order.
 BY_DECODE_ORDER = frozenset({"avi"})
-DECODE_ERRORS = (av.error.FFmpegError, ValueError, OSError)
 
 
 @contextmanager
@@ -151,10 +152,13 @@ def _choose(container: InputContainer, path: Path) -> VideoStream:
 
 
 def packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Packet]:
-    """Packets of the stream, the empty one that flushes the decoder last; damage of the container ends them."""
+    """Packets of the stream, the empty one that flushes the decoder last; damage of the container ends them.
+
+    `survey_file` reports such damage.
+    """
     try:
         yield from container.demux(stream)
-    except DECODE_ERRORS:
+    except av.error.FFmpegError:
         flush = av.Packet()
         flush.stream = stream
         yield flush
@@ -169,34 +173,54 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
         TimeError: a raw stream and no `sequence_fps`.
         UsageError: `sequence_fps` for a file with stamps of its own.
     """
-    limits = options.limits
-    container, stream = open_container(path, limits, threads=1)
+    container, stream = open_container(path, options.limits, threads=1)
     with container:
-        pixels = max(1, stream.codec_context.width * stream.codec_context.height)
-        stamps: list[int] = []
-        missing = 0
-        discarded = 0
-        for packet in packets(container, stream):
-            if packet.size == 0 and packet.pts is None and packet.dts is None:
+        tally = _tally(container, stream, path, options.limits)
+        timing = _timing(path, options, container, stream, tally)
+        if tally.unreadable is not None:
+            return timing, [tally.unreadable]
+        return timing, truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
+
+
+@dataclass
+class _Tally:
+    """Stamps of a stream's packets in ticks, how many packets have none, and how many an edit list discards."""
+
+    stamps: list[int] = field(default_factory=list)
+    missing: int = 0
+    discarded: int = 0
+    unreadable: Finding | None = None
+
+    @property
+    def frames(self) -> int:
+        return len(self.stamps) + self.missing
+
+
+def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: Limits) -> _Tally:
+    tally = _Tally()
+    pixels = max(1, stream.codec_context.width * stream.codec_context.height)
+    try:
+        for packet in container.demux(stream):
+            stamp = packet.pts if packet.pts is not None else packet.dts
+            if packet.size == 0 and stamp is None:
                 continue
             if packet.is_discard:
-                discarded += 1
+                tally.discarded += 1
                 continue
-            stamp = packet.pts if packet.pts is not None else packet.dts
             if stamp is None:
-                missing += 1
+                tally.missing += 1
             else:
-                stamps.append(stamp)
-            count = len(stamps) + missing
-            if count > limits.frames or count * pixels > limits.total_pixels:
+                tally.stamps.append(stamp)
+            if tally.frames > limits.frames or tally.frames * pixels > limits.total_pixels:
                 raise LimitError(
-                    f"more than {count - 1} frames of {pixels} px are beyond the limit of {limits.frames} frames and "
-                    f"{limits.total_pixels} px in all",
+                    f"{tally.frames} frames of {pixels} px and perhaps more are beyond the limit of {limits.frames} "
+                    f"frames and {limits.total_pixels} px in all",
                     where=str(path), fix="cut the file into parts, or raise the limit",
                 )  # fmt: skip
-        timing = _timing(path, options, container, stream, stamps, missing)
-        findings = _truncation(path, container, stream, timing, read=len(stamps) + missing + discarded)
-    return timing, findings
+    except av.error.FFmpegError as error:
+        what = f"the container cannot be read any further ({error.strerror})"
+        tally.unreadable = cut_off(what, tally.frames, 1)
+    return tally
 
 
 def _timing(
@@ -204,8 +228,7 @@ def _timing(
     options: CameraOptions,
     container: InputContainer,
     stream: VideoStream,
-    stamps: list[int],
-    missing: int,
+    tally: _Tally,
 ) -> Timing:
     if container.format.name in UNTIMED:
         if options.sequence_fps is None:
@@ -214,7 +237,7 @@ def _timing(
                 fix="give the camera's frame rate (sequence_fps), or wrap the stream in a container with stamps",
             )  # fmt: skip
         rate = exact(options.sequence_fps)
-        places = np.arange(len(stamps) + missing, dtype=np.int64)
+        places = np.arange(tally.frames, dtype=np.int64)
         return survey(places, tick=1 / rate, missing=0, fallback_rate=rate)
     if options.sequence_fps is not None:
         raise UsageError(
@@ -223,72 +246,4 @@ def _timing(
         )  # fmt: skip
     tick = stream.time_base or Fraction(1, 1000)
     rate = stream.average_rate or stream.guessed_rate
-    return survey(np.array(stamps, dtype=np.int64), tick=tick, missing=missing, fallback_rate=rate or None)
-
-
-def _truncation(
-    path: Path, container: InputContainer, stream: VideoStream, timing: Timing, *, read: int
-) -> list[Finding]:
-    """Whether the file ends before its own header says, or inside a transport packet."""
-    if stream.frames > read:
-        lost = stream.frames - read
-        return [
-            _cut_off(f"the file states {stream.frames} frames and holds {read}: it is cut off or damaged", read, lost)
-        ]
-    if 0 < stream.frames < read:
-        return [
-            Finding(
-                kind="index-damaged", severity=Severity.WARNING,
-                what=f"the file states {stream.frames} frames and holds {read}: its index is damaged",
-                count=read - stream.frames,
-            )
-        ]  # fmt: skip
-    name = container.format.name
-    if name.startswith("matroska") and container.duration is not None and len(container.streams) == 1:
-        stated = Fraction(container.duration, 1_000_000)
-        held = (timing.span + timing.period) * timing.tick
-        lost = stated - held
-        # The last frame's own length is not known where the rate varies.
-        step = timing.longest if timing.variable else timing.period
-        if lost > Fraction(3, 4) * step * timing.tick:
-            frames = max(1, round(lost / (timing.period * timing.tick)))
-            return [_cut_off(f"the file states {float(stated):.2f} s and holds {float(held):.2f} s", read, frames)]
-    if name.startswith("mov") and _box_is_cut(path):
-        return [_cut_off("the file ends inside one of its boxes: it is cut off", read, 1)]
-    if name == "mpegts":
-        with path.open("rb") as raw:
-            length = 192 if raw.read(5)[4:5] == b"\x47" else 188
-        if path.stat().st_size % length:
-            return [
-                Finding(
-                    kind="truncated", severity=Severity.WARNING,
-                    what=f"the file is not a whole number of transport packets of {length} B: it is cut off or damaged",
-                )
-            ]  # fmt: skip
-    return []
-
-
-def _cut_off(what: str, read: int, lost: int) -> Finding:
-    return Finding(
-        kind="truncated", severity=Severity.ERROR, what=what, where=f"frame {read}", count=lost,
-        fix="copy it from the camera again; what was read is kept",
-    )  # fmt: skip
-
-
-def _box_is_cut(path: Path) -> bool:
-    """Whether the last box of an MP4 or MOV reaches beyond the file's end (ISO/IEC 14496-12, 4.2)."""
-    end = path.stat().st_size
-    at = 0
-    with path.open("rb") as stream:
-        while at + 8 <= end:
-            stream.seek(at)
-            head = stream.read(16)
-            size = int.from_bytes(head[:4], "big")
-            if size == 1:
-                size = int.from_bytes(head[8:16], "big")
-            if size == 0:
-                return False
-            if size < 8:
-                return True
-            at += size
-    return at != end
+    return survey(np.array(tally.stamps, dtype=np.int64), tick=tick, missing=tally.missing, fallback_rate=rate or None)

@@ -160,6 +160,16 @@ class CameraStream:
                     fix=None if chosen else "choose a crop: --crop auto proposes one",
                 )
             )
+        enlarged = self._options.size / max(self.info.crop[2:])
+        if enlarged > 1:
+            found.append(
+                Finding(
+                    kind="enlarged", severity=Severity.WARNING if enlarged > 2 else Severity.NOTE,
+                    what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is smaller than the "
+                    f"{self._options.size} px that come out: it was enlarged {enlarged:.3g}-fold",
+                    value=enlarged,
+                )
+            )  # fmt: skip
         if self._options.exposure is None:
             half = self._period / 2 / NANOSECONDS
             found.append(

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import cast
 
 import av
+import av.error
 import numpy as np
 from av.sidedata.sidedata import SideData, Type
 from av.video.stream import VideoStream
@@ -20,7 +21,6 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.avchd import recording_time
 from flagdata.ingest.camera.container import (
     BY_DECODE_ORDER,
-    DECODE_ERRORS,
     UNTIMED,
     check_file,
     open_container,
@@ -151,7 +151,7 @@ class VideoSource:
                             pictures.append(Picture(stamp=frame.pts, luma=luma))
                         if len(pictures) == count:
                             break
-                except DECODE_ERRORS:
+                except av.error.FFmpegError:
                     # A spot that cannot be decoded is no loss to a sample; what came before it counts.
                     pass
                 if pictures:
@@ -174,7 +174,7 @@ class VideoSource:
                 if ordered is not None:
                     ordered.sent(stamp)
                 frames = packet.decode()
-            except DECODE_ERRORS:
+            except av.error.FFmpegError:
                 self._damage.refuse(count)
                 if ordered is not None:
                     ordered.lost(stamp)

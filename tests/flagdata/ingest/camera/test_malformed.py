@@ -221,7 +221,7 @@ def test_frames_beyond_the_limit_are_refused_by_the_header(
     path.write_bytes(bases["mp4"])
     for limits, word in (
         (Limits(frame_pixels=96 * 96 - 1), "96 × 96"),
-        (Limits(frames=49), "49 frames"),
+        (Limits(frames=49), "50 frames"),
         (Limits(total_pixels=49 * 96 * 96), "in all"),
         (Limits(duration=1.9), "limit of 2 s"),
     ):

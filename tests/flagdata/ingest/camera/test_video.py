@@ -504,3 +504,33 @@ def test_true_fps_of_a_variable_rate_is_applied_and_warned_about(
     # The median step is 33 ms: eight times slower than 240 Hz, within its rounding.
     assert info.duration == pytest.approx(0.297 / 8, rel=0.02)
     assert found["true-rate-of-variable"].severity is Severity.WARNING
+
+
+def test_what_an_edit_list_cuts_away_is_not_shown(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int], start: int
+) -> None:
+    path = write_video(
+        tmp_path / "edited.mp4", range(30), tick=Fraction(1, 25),
+        encoder={"preset": "ultrafast", "crf": "12", "bf": "0", "g": "10"},
+    )  # fmt: skip
+    data = bytearray(path.read_bytes())
+    with av.open(str(path)) as raw:
+        ticks = int(1 / (25 * raw.streams.video[0].time_base))
+    # elst, version 0: flags, one entry of (duration, media time, rate); the player is to start at frame 12.
+    at = data.index(b"elst") + 12
+    assert data[at - 8 : at] == bytes([0, 0, 0, 0, 0, 0, 0, 1])
+    data[at + 4 : at + 8] = (12 * ticks).to_bytes(4, "big")
+    path.write_bytes(data)
+    _, frames, found = read(path, plain)
+    assert [number_of(f.image) for f in frames] == list(range(12, 30))
+    assert grid_of(frames, start) == list(range(18))
+    assert "frames-missing" not in found
+    assert "truncated" not in found
+    # Frames 0…9 are not even needed to decode; 10 and 11 are, since frame 10 is the key frame.
+    assert found["frames-not-shown"].count == 10
+
+
+def test_a_small_crop_is_enlarged_and_says_so(cfr60: Path, plain: CameraOptions) -> None:
+    _, frames, found = read(cfr60, replace(plain, crop=CropBox(x=0, y=0, width=32, height=32)))
+    assert frames[0].image.shape == (96, 96)
+    assert (found["enlarged"].severity, found["enlarged"].value) == (Severity.WARNING, 3.0)
