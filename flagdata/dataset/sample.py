@@ -15,7 +15,7 @@ from flagdata.errors import InputError
 _TensorMap: TypeAlias = Callable[[torch.Tensor], torch.Tensor]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Sample:
     """One pair: a clip, and the wind it was filmed in.
 
@@ -69,7 +69,7 @@ class Sample:
             )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Batch:
     """Samples stacked along a first axis of length n; the attributes mean what they mean in `Sample`.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.dataset.table import PairTable
+from flagdata.dataset.truth import LOW_COVERAGE, STALE
 from flagdata.errors import UsageError
 
 
@@ -25,8 +26,8 @@ class Tolerance:
     """
 
     clock_sigma: float = 1.0
-    staleness: float = 5.0
-    coverage: float = 0.8
+    staleness: float = STALE
+    coverage: float = LOW_COVERAGE
 
     def __post_init__(self) -> None:
         if not (self.clock_sigma >= 0 and self.staleness >= 0 and 0 <= self.coverage <= 1):

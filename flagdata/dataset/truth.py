@@ -3,6 +3,10 @@
 The window is (end - window, end]: a sample stamped exactly at the clip's end counts, one stamped exactly a window
 earlier does not, and nothing after the end does. A sample speaks for the time since the row before it, so that an
 irregular logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
+
+The uncertainty is that of the mean wind of such minutes, of which the window is one draw: the standard error of a
+correlated series, the instrument and the clock, all independent. Not included: the response time of the sensor, its
+distance from the flag, and what it missed while it gave no sample; coverage and staleness speak of that.
 """
 
 from __future__ import annotations
@@ -19,7 +23,9 @@ from flagdata.signals import Instants, Sensor, Series, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 BLOCK = 1.0  # s, length of the block means whose correlation gives the standard error
-GAP = 1.5  # sampling periods; a longer silence is a gap
+GAP = 1.5  # sampling periods; a longer silence, if it is longer than a block too, is a gap
+LOW_COVERAGE = 0.8  # of the window; less is flagged, and refused by default
+STALE = 5.0  # s; an older newest sample is flagged, and refused by default
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +95,7 @@ class TruthSeries:
         speed: (n,) [m/s].
         held: (n,) time each sample speaks for, up to its stamp [s].
         dead: (n,) whether the sample lies in the sensor's dead zone.
-        period: the sampling period [s], a spacing that nine in ten do not exceed.
+        period: the sampling period, the median spacing of rows [s].
         sensor: the instrument.
     """
 
@@ -120,9 +126,10 @@ class TruthSeries:
         time, speed, flags = series.time[present], speed[present], series.flags[present]
         usable = np.isfinite(speed) & ((flags & int(UNUSABLE)) == 0)
         spacing = np.diff(time) / NANOSECONDS
-        period = float(np.quantile(spacing, 0.9, method="lower")) if len(spacing) else BLOCK
+        period = float(np.median(spacing)) if len(spacing) else BLOCK
         since = np.concatenate([[period], spacing])[: len(speed)]
-        held = np.where(since <= GAP * period, since, period)
+        # Rows that arrive in bunches within a second are no gaps between the bunches.
+        held = np.where(since <= max(GAP * period, BLOCK), since, period)
         return cls(
             time=time[usable],
             speed=speed[usable],
@@ -159,7 +166,10 @@ class TruthSeries:
         dead = float(np.average(self.dead[first:last], weights=held))
         sigma_sensor = _sensor_sigma(self.sensor, wind, dead)
         sigma_clock = clock_sigma * self._slope(first, last, begin, end, clock_sigma)
+        coverage = min(1.0, float(inside.sum()) / window)
         flags = {
+            "wind-coverage-low": coverage < LOW_COVERAGE,
+            "wind-stale": staleness > STALE,
             "sensor-accuracy-unknown": self.sensor.accuracy is None and self.sensor.accuracy_relative is None,
             "wind-dead-zone": dead > 0,
             "wind-sigma-unknown": math.isnan(sigma_mean),
@@ -170,7 +180,7 @@ class TruthSeries:
             sigma_mean=sigma_mean,
             sigma_sensor=sigma_sensor,
             sigma_clock=sigma_clock,
-            coverage=min(1.0, float(inside.sum()) / window),
+            coverage=coverage,
             staleness=staleness,
             count=last - first,
             flags=tuple(sorted(name for name, holds in flags.items() if holds)),

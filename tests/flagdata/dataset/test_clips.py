@@ -91,6 +91,7 @@ def test_a_clip_with_a_thin_minute_stays_as_a_row_that_says_so(tmp_path, write_r
     # All of the minute before the first frame is missing; the log resumes at the first frame.
     assert rows[0].wind_coverage == pytest.approx(1 / 60, abs=0.02)
     assert rows[0].wind_staleness == pytest.approx(0.16, abs=1e-9)
+    assert "wind-coverage-low" in rows[0].quality
 
 
 def test_a_record_without_wind_gives_clips_without_ground_truth(tmp_path, write_record, made):

@@ -111,6 +111,18 @@ def test_irregular_logger_is_not_biased_towards_its_busy_moments():
     assert truth(series(seconds, speed), 60).wind == pytest.approx(5.0, rel=1e-12)
 
 
+def test_a_log_that_lost_every_fifth_row_covers_four_fifths():
+    seconds = np.array([second for second in range(-60, 121) if second % 5 != 1])
+    assert truth(series(seconds, 4.0), 100).coverage == pytest.approx(4 / 5, rel=1e-12)
+
+
+def test_rows_that_arrive_in_bunches_cover_the_time_between():
+    # A serial port that hands over ten readings at once, five times a second.
+    bunches = np.arange(0, 120, 0.2)
+    seconds = np.sort((bunches[:, None] + 0.0001 * np.arange(10)).ravel())
+    assert truth(series(seconds, 4.0), 100).coverage == pytest.approx(1.0, abs=0.01)
+
+
 def test_clock_uncertainty_acts_through_the_slope_of_the_wind():
     seconds = np.arange(-60, 200, 0.1)
     ramp = series(seconds, 10 + 0.02 * seconds)
@@ -148,6 +160,14 @@ def test_unknown_accuracy_is_said():
     assert "sensor-accuracy-unknown" in truth(series(np.arange(0, 121), 5.0), 100).flags
     known = Sensor(name="cup", accuracy=0.1)
     assert truth(series(np.arange(0, 121), 5.0, sensor=known), 100).flags == ()
+
+
+@pytest.mark.parametrize(
+    ("last", "flags"), [(96, ()), (94, ("wind-stale",)), (80, ("wind-coverage-low", "wind-stale"))]
+)
+def test_a_thin_or_stale_minute_is_flagged(last, flags):
+    wind = series(np.arange(0, last + 1), 4.0, sensor=Sensor(name="cup", accuracy=0.1))
+    assert truth(wind, 100).flags == flags
 
 
 def test_one_sample_has_a_mean_but_no_known_uncertainty():
