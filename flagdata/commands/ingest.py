@@ -150,7 +150,7 @@ def ingest(
     if sniff:
         for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):
             raise UsageError(f"{_option(parameter)} means nothing to --sniff", fix="leave it out")
-        _sniff(sources, options, as_json=as_json)
+        _sniff(sources, options, given=given, as_json=as_json)
         return
     from flagdata.lake import Lake
 
@@ -267,11 +267,12 @@ def _ingest(
     kinds: list[Guess | FlagdataError] = []
     for source in sources:
         try:
-            kinds.append(classify(source, format_name=format_name, recipe=options.wind.wind.recipe))
+            guess = classify(source, format_name=format_name, recipe=options.wind.wind.recipe)
         except FlagdataError as error:
             kinds.append(error)
         else:
-            _check_applies(kinds[-1], source, given)
+            _check_applies(guess, source, given)
+            kinds.append(guess)
     results: list[IngestResult] = []
     failures: list[tuple[Path, FlagdataError]] = []
     for source, kind in zip(sources, kinds, strict=True):
@@ -295,16 +296,27 @@ def _ingest(
             {
                 "lake": str(lake.path),
                 "results": [result.as_dict() for result in results],
-                "failures": [{"source": str(source), **error.as_dict()} for source, error in failures],
+                "failures": _failures(failures),
             },
         )
+    _exit_on(failures, sources)
+
+
+def _failures(failures: Sequence[tuple[Path, FlagdataError]]) -> list[dict[str, str | None]]:
+    return [{"source": str(source), **error.as_dict()} for source, error in failures]
+
+
+def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[Path]) -> None:
+    """Exit with 1, naming what failed, if anything did."""
     if failures:
         say(f"flagdata: {len(failures)} of {len(sources)} sources failed: {', '.join(str(s) for s, _ in failures)}")
         sys.exit(1)
 
 
-def _check_applies(guess: Any, source: Path, given: frozenset[str]) -> None:
+def _check_applies(guess: Guess, source: Path, given: frozenset[str]) -> None:
     """Refuse options that mean nothing for this source, before anything is written."""
+    if guess.kind not in ("camera", "anemometer"):
+        return
     foreign = WIND_ONLY if guess.kind == "camera" else CAMERA_ONLY
     what = "a camera file" if guess.kind == "camera" else "an anemometer log"
     for parameter in foreign:
@@ -346,27 +358,48 @@ def _write(path: Path, data: bytes) -> None:
         raise InputError(f"cannot be written: {error.strerror}", where=str(path), fix="choose another path") from None
 
 
-def _sniff(sources: Sequence[Path], options: _Given, *, as_json: bool) -> None:
+def _sniff(sources: Sequence[Path], options: _Given, *, given: frozenset[str], as_json: bool) -> None:
+    entries: list[dict[str, Any]] = []
+    failures: list[tuple[Path, FlagdataError]] = []
+    for source in sources:
+        try:
+            entry = _look(source, options, given=given)
+        except FlagdataError as error:
+            if len(sources) == 1:
+                raise
+            failures.append((source, error))
+            if not as_json:
+                fail(error, as_json=False)
+            continue
+        entries.append(entry)
+        if not as_json:
+            print_sniffed(entry)
+    if as_json:
+        document("sniff", {"sources": entries, "failures": _failures(failures)})
+    _exit_on(failures, sources)
+
+
+def _look(source: Path, options: _Given, *, given: frozenset[str]) -> dict[str, Any]:
+    """Guesses at a source; of a camera file, what its headers say and the crop if one was asked for."""
     from flagdata.ingest.camera import probe, propose_crop
     from flagdata.ingest.classify import guesses
 
-    found: list[dict[str, Any]] = []
-    for source in sources:
-        ranked = guesses(source)
-        entry: dict[str, Any] = {"source": str(source), "guesses": [_guess(guess) for guess in ranked]}
-        if ranked[0].kind == "camera":
-            entry["camera"] = probe(source, options.camera.camera).as_dict()
-            if options.camera.camera.crop == "auto":
-                proposal = propose_crop(source, options.camera.camera)
-                entry["crop"] = {"box": list(proposal.box.as_tuple()), "share": proposal.share}
-                if options.crop_picture is not None:
-                    _write(options.crop_picture, proposal.picture)
-        found.append(entry)
-    if as_json:
-        document("sniff", {"sources": found})
-        return
-    for entry in found:
-        print_sniffed(entry)
+    ranked = guesses(source)
+    entry: dict[str, Any] = {"source": str(source), "guesses": [_guess(guess) for guess in ranked]}
+    if ranked[0].kind != "camera":
+        _check_applies(ranked[0], source, given)
+        return entry
+    try:
+        entry["camera"] = probe(source, options.camera.camera).as_dict()
+    except FlagdataError as error:
+        entry["problem"] = error.as_dict()
+        return entry
+    if options.camera.camera.crop == "auto":
+        proposal = propose_crop(source, options.camera.camera)
+        entry["crop"] = {"box": list(proposal.box.as_tuple()), "share": proposal.share}
+        if options.crop_picture is not None:
+            _write(options.crop_picture, proposal.picture)
+    return entry
 
 
 def _guess(guess: Guess) -> dict[str, Any]:

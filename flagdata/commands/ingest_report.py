@@ -62,6 +62,8 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
             click.echo(f"    to do: {guess['fix']}")
+    if "problem" in entry:
+        click.echo(f"  {entry['problem']['what']}: {entry['problem']['fix']}")
     if "camera" in entry:
         seen = entry["camera"]
         click.echo(

@@ -275,13 +275,13 @@ class _Source:
 
 
 def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Name, size and time of change of the file, or of each file in the folder."""
+    """Name, size and time of change of the file, or of each file in the folder that is not hidden."""
     try:
         if not path.is_dir():
             status = path.stat()
             return ((path.name, status.st_size, status.st_mtime_ns),)
         with os.scandir(path) as entries:
-            found = [(e.name, e.stat()) for e in entries if e.is_file()]
+            found = [(e.name, e.stat()) for e in entries if e.is_file() and not e.name.startswith(".")]
         return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None

@@ -6,7 +6,9 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from flagdata.cli import main
 from flagdata.lake import Lake
@@ -70,6 +72,37 @@ def test_sniff_says_what_and_why_and_touches_no_lake(run, lake: Lake, video: Pat
     assert code == 0
     assert json.loads(out)["sources"][0]["camera"]["frames"] == 100
     assert lake.rows().num_rows == 0
+
+
+def test_sniff_goes_on_after_a_source_it_cannot_read_and_says_what_is_missing(
+    run, video: Path, wind_log: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "frames").mkdir()
+    for k in range(3):
+        Image.fromarray(np.full((48, 64), 60 * k, dtype=np.uint8)).save(tmp_path / "frames" / f"{k}.png")
+    code, out, err = run("--sniff", tmp_path / "frames", tmp_path / "nothing", video)
+    assert code == 1
+    assert "image sequence" in out
+    assert "no time stamps" in out
+    assert "100 frames" in out
+    assert "1 of 3 sources failed" in err
+    code, _, err = run("--sniff", wind_log, "--crop", "auto")
+    assert code == 2
+    assert "--crop means nothing for an anemometer log" in err
+
+
+def test_a_folder_of_pictures_is_one_camera_whatever_hidden_files_lie_in_it(run, lake: Lake, tmp_path: Path) -> None:
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for k in range(10):
+        Image.fromarray(np.full((48, 64), 20 * k, dtype=np.uint8)).save(folder / f"{k:02d}.png")
+    given = (folder, "--sequence-fps", 25, "--start", "2026-05-01T10:00:00Z")
+    assert run(*given)[0] == 0
+    (folder / ".DS_Store").write_bytes(b"x")
+    assert run(*given)[1].startswith("already in the lake")
+    (folder / "10.png").write_bytes((folder / "09.png").read_bytes())
+    assert run(*given)[0] == 0
+    assert sorted(row["frame_count"] for row in lake.rows().to_pylist()) == [10, 11]
 
 
 def test_a_failing_source_stops_neither_the_others_nor_goes_unnamed(
