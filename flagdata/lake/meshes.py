@@ -10,8 +10,9 @@ space, PhysicsNeMo writes `mesh_pos (time, vertex, 3)`. Where conventions of xar
 them: CF 1.11 for the time axis and units, UGRID 1.0 (`cf_role`, `start_index`) for the connectivity.
 
 The same arrays give the same bytes (with the same zarr and blosc), so equal sequences are stored once. Positions are
-chunked by whole frames, about 1 MiB a chunk, up to 64 chunks a shard file; bytes of equal weight are put together
-before zstd, which saves 12 % over zstd alone on simulated flags.
+chunked by whole frames, about 1 MiB a chunk, up to 64 chunks a shard file; within a chunk x, y and z come one after the
+other and bytes of equal weight together before zstd. Simulated flags take 77 % of their raw size so, and 90 % with
+Zarr's defaults.
 """
 
 from __future__ import annotations
@@ -267,7 +268,7 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
 
 
 def _write(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...]) -> None:
-    from zarr.codecs import BloscCodec
+    from zarr.codecs import BloscCodec, TransposeCodec
 
     rows = max(1, len(values))
     row_bytes = max(1, values.nbytes // rows)
@@ -284,6 +285,7 @@ def _write(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, 
         dtype=values.dtype,
         chunks=(chunk, *rest),
         shards=(shard, *rest),
+        filters=[TransposeCodec(order=(values.ndim - 1, *range(values.ndim - 1)))] if values.ndim > 1 else None,
         compressors=BloscCodec(cname="zstd", clevel=5, shuffle="shuffle", typesize=values.dtype.itemsize),
         fill_value=np.nan if values.dtype.kind == "f" else -1,  # so that a lost chunk cannot pass for data
         dimension_names=dims,

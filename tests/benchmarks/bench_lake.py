@@ -137,7 +137,7 @@ def _flag(seed: int) -> MeshSequence:
     phase = 4 * rest[None, :, 0] - 0.3 * np.arange(MESH_FRAMES)[:, None]
     wave = 0.1 * np.sin(phase) + stream(seed, "mesh").normal(scale=1e-4, size=phase.shape)
     along = rest[None, :, 0] + 0.01 * np.cos(phase)
-    positions = np.stack([along, wave, np.broadcast_to(rest[:, 1], wave.shape)], axis=2)
+    positions = np.stack([along, wave, rest[None, :, 1] - 0.005 * np.cos(0.7 * phase)], axis=2)
     return MeshSequence(
         time=np.arange(MESH_FRAMES, dtype=np.int64) * 40_000_000,
         positions=positions.astype(np.float32),
