@@ -8,6 +8,7 @@ BENCHMARKS = {
     "lake": "tests.benchmarks.bench_lake",
     "pairs": "tests.benchmarks.bench_pairs",
     "records": "tests.benchmarks.bench_records",
+    "sim": "tests.benchmarks.bench_sim",
 }
 
 if __name__ == "__main__":

@@ -1,0 +1,117 @@
+"""Speed of the simulator on one core, with the distance to the reference run beside it.
+
+Float32, batch 16, contact off, tables and damping included, from flags in 4.0 to 5.5 m/s. The peer is ArcSim 0.2.1 on
+the same mesh, material and wind, by the wall times stored with its runs (another run of this machine class).
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from sim.integrate.implicit import BackwardEuler
+from sim.integrate.stability import stable_step
+from sim.integrate.symplectic import Backend, Symplectic, advance
+from sim.material import named
+from sim.scene import assemble, flag
+
+FRAME = 0.04
+BATCH = 16
+# Frames a flag of ArcSim, ms, measured on this machine class: at 0.5 ms and at its own 5 ms steps.
+PEER = {651: (550.0, 50.0), 2501: (3700.0, 370.0)}
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Times of one 40 ms frame a flag [ms]; the scenes are fixed, so that `seed` and `out` change nothing."""
+    torch.set_num_threads(1)
+    result: dict[str, Any] = {"batch": BATCH, "dtype": "float32", "machine": platform.machine(), "meshes": []}
+    if hasattr(os, "sched_setaffinity"):
+        allowed = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {max(allowed)})
+    try:
+        with torch.no_grad():
+            for columns in (30, 60):
+                result["meshes"].append(_mesh(columns))
+            result["linear_in_batch"] = _batches()
+            result["accuracy"] = _accuracy()
+    finally:
+        if hasattr(os, "sched_setaffinity"):
+            os.sched_setaffinity(0, allowed)
+    result["peak_memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return result
+
+
+def _mesh(columns: int) -> dict[str, Any]:
+    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=4.0 + 0.1 * b, columns=columns) for b in range(BATCH)]
+    system, state = assemble(scenes)
+    steps = Symplectic().steps(system, FRAME)
+    for _ in range(10):
+        state = advance(system, state, FRAME, steps=steps, backend=Backend.KERNEL)
+    frame = _median(lambda: advance(system, state, FRAME, steps=steps, backend=Backend.KERNEL), 7) / BATCH
+    vertices = system.cloth.mesh.vertex_count
+    fine, coarse = PEER[vertices]
+    report = {
+        "vertices": vertices,
+        "stability_limit_ms": 1e3 * stable_step(system),
+        "steps_a_frame": steps,
+        "ms_a_flag_frame": 1e3 * frame,
+        "us_a_flag_step": 1e6 * frame / (steps + 1),
+        "ns_a_vertex_step": 1e9 * frame / (steps + 1) / vertices,
+        "times_arcsim_at_half_millisecond": fine / (1e3 * frame),
+        "times_arcsim_at_its_5_ms": coarse / (1e3 * frame),
+        "torch_us_a_flag_step": 1e6
+        * _median(lambda: advance(system, state, FRAME / steps, steps=1, backend=Backend.TORCH), 3)
+        / BATCH
+        / 2,
+    }
+    if columns == 30:
+        implicit = BackwardEuler(tolerance=1e-4)
+        report["implicit_5_ms_ms_a_flag_frame"] = (
+            1e3 * _median(lambda: implicit.advance(system, state, FRAME), 1) / BATCH
+        )
+    return report
+
+
+def _batches() -> list[dict[str, float]]:
+    """Time of a frame against the batch, with one flag's worth of steps: linear beyond one block of 16 lanes."""
+    rows = []
+    for batch in (16, 32, 64):
+        system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0)] * batch)
+        seconds = _median(lambda s=system, x=state: advance(s, x, FRAME, steps=60, backend=Backend.KERNEL), 3)
+        rows.append({"batch": batch, "us_a_flag_step": 1e6 * seconds / 61 / batch})
+    return rows
+
+
+def _accuracy() -> dict[str, Any]:
+    """Mean vertex distance to the reference's 0.5 ms run after 1, 5 and 10 frames [mm], float32, as timed."""
+    folder = Path(os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data"))
+    path = folder / "arcsim" / "flag_w4_dt05.npz"
+    if not path.is_file():
+        return {"skipped": f"no reference data at {path.name}"}
+    with np.load(path) as run_:
+        expected, seconds = run_["positions"].astype(np.float64), run_["frame_seconds"]
+    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0)])
+    distance = {}
+    for frame in range(1, 11):
+        state = Symplectic(backend=Backend.KERNEL).advance(system, state, FRAME)
+        if frame in (1, 5, 10):
+            gap = state.position[..., 0].double().numpy() - expected[frame]
+            distance[f"frame_{frame}_mm"] = 1e3 * float(np.linalg.norm(gap, axis=1).mean())
+    return {**distance, "arcsim_ms_a_frame_when_run": 1e3 * float(np.median(seconds))}
+
+
+def _median(work: Any, repeats: int) -> float:
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times)
