@@ -34,8 +34,40 @@ class AirForce(Protocol):
     """A model of the air's force on the cloth."""
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch) [m/s]."""
+        """(vertex, 3, batch) [N] for a wind (3, batch), or (vertex, 3, batch) where it differs in space [m/s]."""
         ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaceWind:
+    """The air as the faces meet it.
+
+    Attributes:
+        normal: (face, 3, batch) unit normals of the deformed faces.
+        relative: (face, 3, batch) wind less face velocity [m/s].
+        across: (face, 1, batch) its part along the normal [m/s].
+    """
+
+    normal: Tensor
+    relative: Tensor
+    across: Tensor
+
+    @property
+    def along(self) -> Tensor:
+        """(face, 3, batch) the tangential part of the relative wind [m/s]."""
+        return self.relative - self.across * self.normal
+
+
+def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> FaceWind:
+    """The relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+    normal = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
+    length = (normal * normal).sum(1, keepdim=True).sqrt()
+    normal = normal / length.clamp(min=torch.finfo(position.dtype).tiny)
+    at_vertices = wind - velocity
+    r0, r1, r2 = (at_vertices[cloth.faces[:, c]] for c in range(3))
+    relative = (r0 + r1 + r2) / 3
+    return FaceWind(normal=normal, relative=relative, across=(relative * normal).sum(1, keepdim=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,16 +90,10 @@ class QuadraticNormal:
                 )
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch) [m/s]."""
-        x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
-        normal = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
-        length = (normal * normal).sum(1, keepdim=True).sqrt()
-        normal = normal / length.clamp(min=torch.finfo(position.dtype).tiny)
-        v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
-        relative = wind - (v0 + v1 + v2) / 3
-        across = (relative * normal).sum(1, keepdim=True)
+        """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        seen = face_wind(cloth, position, velocity, wind)
         third = (cloth.areas / 3)[:, None, None]
-        push = third * (self.density * across.abs() * across * normal + self.drag * (relative - across * normal))
+        push = third * (self.density * seen.across.abs() * seen.across * seen.normal + self.drag * seen.along)
         return gather_sum([push, push, push], cloth.face_slots)
 
 
@@ -88,7 +114,7 @@ class Stokes:
             )
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch) [m/s]."""
+        """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
         areas = torch.tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
         coefficient = 6 * math.pi * self.viscosity * (areas / math.pi).sqrt()
         return coefficient[:, None, None] * (wind - velocity)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Protocol
 
 import torch
@@ -20,7 +21,15 @@ class Effect(Protocol):
     """A force the base model lacks."""
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] at a time [s], for a wind (3, batch) [m/s]."""
+        """(vertex, 3, batch) [N] at a time [s], for a wind (3, batch), or (vertex, 3, batch) where it varies [m/s]."""
+        ...
+
+
+class Flow(Protocol):
+    """What makes the wind differ from place to place."""
+
+    def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
+        """The air at the vertices, (vertex, 3, batch) [m/s], for a wind (3, batch) or (vertex, 3, batch) so far."""
         ...
 
 
@@ -52,6 +61,7 @@ class System:
         held: (held,) the handles' vertices.
         anchors: (held, 3, batch) where they are tied at zero offset [m].
         effects: what else acts.
+        flows: what makes the wind differ from place to place, applied in order.
     """
 
     cloth: Cloth
@@ -62,6 +72,13 @@ class System:
     held: Tensor
     anchors: Tensor
     effects: tuple[Effect, ...] = ()
+    flows: tuple[Flow, ...] = ()
+
+    def local(self, wind: Tensor, time: float, position: Tensor) -> Tensor:
+        """Air at the vertices [m/s]: (vertex, 3, batch), or the wind (3, batch) itself where nothing disturbs it."""
+        for flow in self.flows:
+            wind = flow.field(time, position, wind)
+        return wind
 
     def internal(self, position: Tensor, velocity: Tensor) -> Tensor:
         """Membrane and bending, elastic and damping: (vertex, 3, batch) [N]."""
@@ -78,6 +95,7 @@ class System:
             air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
         """
         seen = position if air_position is None else air_position
+        wind = self.local(wind, time, seen)
         total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, seen, velocity, wind)
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
@@ -124,15 +142,20 @@ class System:
         return total.index_add(0, self.held, -self.handles.stiffness * stretch)
 
     @property
+    def plain_air(self) -> QuadraticNormal | None:
+        """The air's force where the compiled kernel knows it: quadratic-normal, in a wind that is uniform in space."""
+        return self.air if isinstance(self.air, QuadraticNormal) and not self.flows else None
+
+    @property
     def extra(self) -> bool:
         """Whether anything acts that the compiled kernel does not know."""
-        return bool(self.effects) or not isinstance(self.air, QuadraticNormal)
+        return bool(self.effects) or self.plain_air is None
 
     def extra_force(self, drive: Drive, share: float, time: float, position: Tensor, velocity: Tensor) -> Tensor:
         """What the compiled kernel does not know: effects, and other air forces: (vertex, 3, batch) [N]."""
-        wind = torch.lerp(*drive.wind, share)
+        wind = self.local(torch.lerp(*drive.wind, share), time, position)
         total = torch.zeros_like(position)
-        if not isinstance(self.air, QuadraticNormal):
+        if self.plain_air is None:
             total = total + self.air.force(self.cloth, position, velocity, wind)
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
@@ -141,7 +164,9 @@ class System:
     def tensors(self) -> tuple[Tensor, ...]:
         """The parameters that gradients may be wanted of."""
         cloth = self.cloth
-        return (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
+        own = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
+        parts = (self.wind, self.air, *self.effects, *self.flows)
+        return (*own, *(tensor for part in parts for tensor in _tensors_of(part)))
 
     def energies(self, state: State) -> dict[str, Tensor]:
         """Kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].
@@ -159,3 +184,15 @@ class System:
             stretch = state.position[self.held] - self.targets(state.time)
             result["handles"] = self.handles.stiffness * (stretch**2).sum((0, 1)) / 2
         return result
+
+
+def _tensors_of(part: object) -> Iterator[Tensor]:
+    """The tensors in the fields of a dataclass, and in those of the dataclasses it holds."""
+    if isinstance(part, Tensor):
+        yield part
+    elif isinstance(part, tuple):
+        for item in part:
+            yield from _tensors_of(item)
+    elif is_dataclass(part):
+        for entry in fields(part):
+            yield from _tensors_of(getattr(part, entry.name))

@@ -74,7 +74,7 @@ class Kernel:
         inverse_mass = 1 / cloth.mass
         if system.clamped:
             inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
-        air = system.air if isinstance(system.air, QuadraticNormal) else QuadraticNormal(density=0.0)
+        air = system.plain_air or QuadraticNormal(density=0.0)
 
         def block(tensor: Tensor) -> Tensor:
             return _to_blocks(tensor, lanes, blocks)
