@@ -1,0 +1,165 @@
+"""Parameters of effects: a value for all or for each member of a batch, with its unit, null value, prior and source.
+
+An effect is a frozen dataclass with fields such as
+
+    coefficient: Annotated[Value, strength(unit="1", prior=(0.0, 1.0), source="…")] = 0.0
+
+whose default is the null value.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
+from typing import Any, Self, TypeAlias, cast, get_type_hints
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from flagdata.errors import InputError, UsageError
+
+Value: TypeAlias = float | Tensor
+"""One number for the whole batch, or a tensor (batch,)."""
+EVERYTHING = (-math.inf, math.inf)
+NOT_NEGATIVE = (0.0, math.inf)
+
+
+class Role(StrEnum):
+    """What a parameter does."""
+
+    STRENGTH = "strength"
+    """At its null value the effect is not there, whatever its shapes are."""
+    SHAPE = "shape"
+    """Says how the effect looks where it is there; its null value is the usual one, where a search starts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Described:
+    """What is known of a parameter before any measurement.
+
+    Attributes:
+        role: strength or shape.
+        unit: SI.
+        prior: (low, high) of the values expected in the field.
+        admissible: (least, most) of the values that make sense at all; others are refused.
+        source: where the prior is from.
+    """
+
+    role: Role
+    unit: str
+    prior: tuple[float, float]
+    admissible: tuple[float, float]
+    source: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter(Described):
+    """A described parameter with its null value, in the same unit."""
+
+    null: float
+
+    def check(self, value: Value, *, where: str) -> None:
+        """Refuse what is not finite or not admissible.
+
+        Raises:
+            InputError: with what is admissible.
+        """
+        values = torch.as_tensor(value).detach()
+        if values.ndim > 1 or not values.numel():
+            raise InputError(f"a value of shape {tuple(values.shape)}", where=where, fix="give a number, or (batch,)")
+        lowest, highest = (float(v) for v in torch.aminmax(values))
+        least, most = self.admissible
+        if not (math.isfinite(lowest) and math.isfinite(highest) and least <= lowest and highest <= most):
+            shown = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
+            raise InputError(
+                f"{shown} {self.unit} is not admissible", where=where,
+                fix=f"give a value from {least:g} to {most:g}; expected are {self.prior[0]:g} to {self.prior[1]:g}",
+            )  # fmt: skip
+
+
+def strength(
+    *, unit: str, prior: tuple[float, float], source: str, admissible: tuple[float, float] = EVERYTHING
+) -> Described:
+    """Annotates a field at whose default the effect is not there."""
+    return Described(role=Role.STRENGTH, unit=unit, prior=prior, admissible=admissible, source=source)
+
+
+def shape(
+    *, unit: str, prior: tuple[float, float], source: str, admissible: tuple[float, float] = EVERYTHING
+) -> Described:
+    """Annotates a field that says how the effect looks."""
+    return Described(role=Role.SHAPE, unit=unit, prior=prior, admissible=admissible, source=source)
+
+
+class Parametrised:
+    """Base of all effects: checks and describes the fields annotated by `strength` and `shape`."""
+
+    def __post_init__(self) -> None:
+        for name, entry in self.parameters().items():
+            entry.check(getattr(self, name), where=f"{type(self).__name__}.{name}")
+
+    @classmethod
+    def parameters(cls) -> Mapping[str, Parameter]:
+        """Name → description, in the order of the fields."""
+        return _parameters(cls)
+
+    @classmethod
+    def strengths(cls) -> tuple[str, ...]:
+        """Names of the parameters that together switch the effect off."""
+        return tuple(name for name, entry in cls.parameters().items() if entry.role is Role.STRENGTH)
+
+    @property
+    def absent(self) -> bool:
+        """Whether every strength is at its null value, and no gradient of it is wanted."""
+        for name in self.strengths():
+            value = torch.as_tensor(getattr(self, name))
+            if value.requires_grad or bool((value != self.parameters()[name].null).any()):
+                return False
+        return True
+
+    def for_batch(self, batch: int, *, dtype: torch.dtype, device: torch.device) -> Self:
+        """This effect with its tensors on a batch's device and of its type.
+
+        Raises:
+            UsageError: values for another number of members.
+        """
+        moved: dict[str, Any] = {}
+        for entry in fields(self):  # pyright: ignore[reportArgumentType]  every subclass is a dataclass
+            value = getattr(self, entry.name)
+            if not isinstance(value, Tensor):
+                continue
+            if value.ndim and value.shape[-1] not in (1, batch):
+                raise UsageError(
+                    f"values for {value.shape[-1]} members in a batch of {batch}",
+                    where=f"{type(self).__name__}.{entry.name}", fix="give one value, or one for each member",
+                )  # fmt: skip
+            moved[entry.name] = value.to(dtype=dtype, device=device)
+        return replace(self, **moved) if moved else self  # pyright: ignore[reportArgumentType, reportReturnType]
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:
+        """One draw from the prior for each member of a batch: every parameter uniform in its range, float64."""
+        return cls(**draw(cls.parameters(), rng, batch=batch))
+
+
+def draw(parameters: Mapping[str, Parameter], rng: np.random.Generator, *, batch: int) -> dict[str, Tensor]:
+    """Values (batch,) float64 for each parameter, uniform in its prior range."""
+    return {name: torch.from_numpy(rng.uniform(*entry.prior, size=batch)) for name, entry in parameters.items()}
+
+
+@functools.cache
+def _parameters(cls: type[Any]) -> Mapping[str, Parameter]:
+    hints = get_type_hints(cls, include_extras=True)
+    found: dict[str, Parameter] = {}
+    for entry in fields(cls):
+        for note in getattr(hints[entry.name], "__metadata__", ()):
+            if isinstance(note, Described):
+                found[entry.name] = Parameter(
+                    role=note.role, unit=note.unit, prior=note.prior, admissible=note.admissible, source=note.source,
+                    null=cast("float", entry.default),
+                )  # fmt: skip
+    return found
