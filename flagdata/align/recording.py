@@ -254,6 +254,7 @@ def _write(
         for first in range(0, len(device), _FRAMES_AT_ONCE):
             count = min(_FRAMES_AT_ONCE, len(device) - first)
             exposed = clock.to_common(source.timestamps(first, count))
+            pictures = source.jpegs(first, count)
             if source.coding is Coding.JPEG:
                 images = [source.jpeg(index) for index in range(first, first + count)]
             else:

@@ -122,7 +122,7 @@ def ingest(
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
       flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png
-      flagdata ingest gill.csv --sensor gill-windsonic --zone +01:00 --session field-1
+      flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
     """
     given = frozenset(
         parameter for parameter in context.params

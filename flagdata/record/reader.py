@@ -143,14 +143,18 @@ class Record:
         return out[..., 0]
 
     def jpeg(self, index: int) -> bytes:
-        """One frame as JPEG: the stored bytes, or the decoded frame encoded anew where the record is H.264.
+        """One frame as JPEG, see `jpegs`."""
+        return self.jpegs(index, 1)[0]
+
+    def jpegs(self, first: int, count: int) -> list[bytes]:
+        """Consecutive frames as JPEG: the stored bytes, or the decoded frames encoded anew where the record is H.264.
 
         Raises:
-            NotFoundError: the record has no such frame.
+            NotFoundError: the record has no such frames.
         """
         if self.coding is Coding.H264:
-            return encode_jpeg(self._video_frames(index, 1)[0])
-        return bytes(self._payloads(index, 1)[0])
+            return [encode_jpeg(frame) for frame in self._video_frames(first, count)]
+        return [bytes(picture) for picture in self._payloads(first, count)]
 
     def timestamps(self, first: int, count: int) -> NDArray[np.int64]:
         """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages."""

@@ -34,6 +34,7 @@ def test_frames_equal_what_the_mcap_package_reads(sample: Path) -> None:
     record = Record.open(sample)
     assert record.frame_count == len(stored)
     assert [record.jpeg(k) for k in range(record.frame_count)] == stored
+    assert record.jpegs(5, 20) == stored[5:25]
     expected = np.stack([simplejpeg.decode_jpeg(data, colorspace="GRAY")[..., 0] for data in stored])
     for first, count in [(0, 60), (0, 1), (59, 1), (13, 30)]:
         np.testing.assert_array_equal(record.frames(first, count), expected[first : first + count])
@@ -173,6 +174,7 @@ def test_video_frames_are_the_same_from_any_start(tmp_path: Path, write: Callabl
     np.testing.assert_array_equal(record.frames(20, 30), whole[20:50])
     height, width, *_ = simplejpeg.decode_jpeg_header(record.jpeg(3))
     assert (height, width) == (48, 64)
+    assert record.jpegs(20, 30) == [record.jpeg(k) for k in range(20, 50)]
 
 
 def test_video_is_annex_b_with_parameter_sets_on_each_key_frame_and_no_b_frames(
