@@ -85,9 +85,17 @@ class HostStamped:
 
 
 def _shape(recipe: Recipe) -> re.Pattern[str]:
-    fields = max([int(c.column) for c in recipe.channels.values()] + [int(c) for c in recipe.time.columns])
+    """What a raw line of data looks like: numbers in the columns of channels and time, anything in others.
+
+    A recipe that uses every column up to its last takes lines of that many fields alone; one that leaves columns out
+    takes longer lines too.
+    """
+    numeric = {int(c.column) for c in recipe.channels.values()} | {int(c) for c in recipe.time.columns}
+    last = max(numeric | {int(c.column) for c in recipe.checks})
     between, one = re.escape(recipe.file.delimiter), _FIELD.format(mark=re.escape(recipe.file.decimal))
-    return re.compile(f"^{one}(?:{between}{one}){{{fields - 1}}}$")
+    fields = [one if column in numeric else f"[^{between}]*+" for column in range(1, last + 1)]
+    rest = "" if len(numeric) == last else f"(?:{between}.*)?"
+    return re.compile(f"^{between.join(fields)}{rest}$")
 
 
 def _payload(line: str, delimiter: str) -> tuple[str, str]:
@@ -103,6 +111,8 @@ def _in_range(recipe: Recipe, line: str) -> bool:
     if not _shape(recipe).match(raw):
         return False
     cells = raw.split(recipe.file.delimiter)
+    if not all(cells[int(check.column) - 1].strip() in check.values for check in recipe.checks):
+        return False
     for layout in recipe.channels.values():
         try:
             value = float(cells[int(layout.column) - 1].replace(",", "."))

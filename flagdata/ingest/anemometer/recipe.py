@@ -9,6 +9,7 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
     [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
                               accuracy-relative (all SI)
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
+    [[check]]                 column, values, about: cells that must be one of these texts, else the row is a fault
 """
 
 from __future__ import annotations
@@ -137,6 +138,27 @@ class ChannelLayout:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CheckLayout:
+    """A column of text, such as a status or a unit, that says whether a row can be trusted.
+
+    Attributes:
+        column: name or number (from 1) of the column.
+        values: texts of a row that is right; any other makes it a SENSOR_FAULT.
+        about: what the column is ("status", "unit").
+    """
+
+    column: str | int
+    values: tuple[str, ...]
+    about: str
+
+    def __post_init__(self) -> None:
+        if not self.values:
+            raise UsageError(
+                "a check without values", where=f"column {self.column}", fix="list the texts that are right"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
 class QualityRules:
     """What is known about the instrument's errors.
 
@@ -170,6 +192,7 @@ class Recipe:
     channels: Mapping[str, ChannelLayout]
     sensor: Sensor
     quality: QualityRules = field(default_factory=QualityRules)
+    checks: tuple[CheckLayout, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.time.columns and not self.file.host:
@@ -184,7 +207,7 @@ class Recipe:
                     f"channel {name} is measured in {CHANNELS[name].unit}, not in {layout.unit}",
                     where=self.name, fix="correct the unit or the channel",
                 )  # fmt: skip
-        named = [c.column for c in self.channels.values()] + list(self.time.columns)
+        named = [c.column for c in (*self.channels.values(), *self.checks)] + list(self.time.columns)
         if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in named):
             raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
 
@@ -247,7 +270,7 @@ class _Reader:
         self.where = where
 
     def recipe(self) -> Recipe:
-        self._known(self.data, "the recipe", "name about source file time channels sensor quality")
+        self._known(self.data, "the recipe", "name about source file time channels sensor quality check")
         text = {key: self._text(self.data, key, "the recipe") for key in ("name", "about", "source")}
         channels = self._table(self.data, "channels")
         return Recipe(
@@ -257,6 +280,7 @@ class _Reader:
             channels={name: self._channel(name, self._table(channels, name)) for name in channels},
             sensor=self._sensor(self._table(self.data, "sensor")),
             quality=self._quality(self._table(self.data, "quality")),
+            checks=tuple(self._check(table) for table in self._typed(self.data, "check", list, [])),
         )  # fmt: skip
 
     def _file(self, table: Mapping[str, Any]) -> FileLayout:
@@ -332,6 +356,19 @@ class _Reader:
             stale_after=self._number(table, "stale-after", None),
             frame_rate_of=tuple(lists["frame-rate-of"]),
             fault_where_zero=tuple(lists["fault-where-zero"]),
+        )
+
+    def _check(self, table: Mapping[str, Any]) -> CheckLayout:
+        where = "[[check]]"
+        if not isinstance(table, dict):
+            raise InputError("check is not a table", where=where, fix="write it as [[check]]")
+        self._known(table, where, "column values about")
+        if "column" not in table:
+            raise InputError("no column", where=where, fix="name the column or give its number (from 1)")
+        return CheckLayout(
+            column=self._column(table["column"], where),
+            values=tuple(str(value).strip() for value in self._typed(table, "values", list, [])),
+            about=self._text(table, "about", where),
         )
 
     def _known(self, table: Mapping[str, Any], where: str, known: str) -> None:

@@ -157,7 +157,8 @@ def _refuse_binary(head: bytes, where: str) -> None:
     if not text:
         raise InputError("the file holds nothing but NUL bytes", where=where, fix="copy it from the logger again")
     sample = np.frombuffer(text, dtype=np.uint8)
-    control = (sample < 32) & ~np.isin(sample, (9, 10, 12, 13))
+    # Tabs, line ends, form feeds, and the STX and ETX that serial instruments frame their lines with.
+    control = (sample < 32) & ~np.isin(sample, (2, 3, 9, 10, 12, 13))
     if float(control.mean()) > 0.05:
         raise InputError(
             "the file is binary, not a text log", where=where, fix="export it as text with the logger's own program"

@@ -13,7 +13,7 @@ from flagdata.errors import InputError, TimeError, UnknownNameError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
-from flagdata.ingest.anemometer.recipe import ChannelLayout, Recipe
+from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.stamps import Stamps
 from flagdata.ingest.anemometer.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.wall import to_utc
@@ -67,6 +67,24 @@ class _Column:
 
 
 @dataclass
+class _Check:
+    """Whether the cells of one column are among the right ones, as the blocks come in."""
+
+    layout: CheckLayout
+    index: int
+    right: list[NDArray[np.bool_]] = field(default_factory=list)
+
+    def faults(self, order: slice, line: NDArray[np.int64]) -> tuple[NDArray[np.bool_], tuple[Finding, ...]]:
+        fault = ~np.concatenate(self.right)[order]
+        if not fault.any():
+            return fault, ()
+        count, values = int(fault.sum()), ", ".join(self.layout.values)
+        what = f"{count} rows whose {self.layout.about} is not {values}; left out of averages"
+        where = f"line {line[fault][0]}"
+        return fault, (Finding(kind="sensor-fault", severity=Severity.WARNING, count=count, where=where, what=what),)
+
+
+@dataclass
 class _Clock:
     """One clock's stamps as their blocks come in."""
 
@@ -105,6 +123,7 @@ class _Gathered:
     host: _Clock | None
     channels: dict[str, _Column]
     extra: dict[str, _Column]
+    checks: list[_Check]
     lines: list[NDArray[np.int64]] = field(default_factory=list)
     bad_stamps: list[int] = field(default_factory=list)
 
@@ -113,7 +132,7 @@ class _Gathered:
 
     def width(self) -> int:
         """Cells a row must have."""
-        return 1 + max([*self.clock.columns, *(column.index for column in self.columns())])
+        return 1 + max([*self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
 
     def add(self, line: NDArray[np.int64], block: Sequence[Sequence[str]], recipe: Recipe) -> None:
         stamps = self.clock.parse(block)
@@ -130,6 +149,9 @@ class _Gathered:
             parsed = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing)
             column.values.append(parsed.value[keep])
             column.states.append(parsed.state[keep])
+        for check in self.checks:
+            right = np.array([row[check.index].strip() in check.layout.values for row in block], dtype=bool)
+            check.right.append(right[keep])
 
     def line(self) -> NDArray[np.int64]:
         return np.concatenate(self.lines) if self.lines else np.zeros(0, dtype=np.int64)
@@ -155,6 +177,7 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         host=host if own else None,
         channels={name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()},
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
+        checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
     )
     for line, block in rows.blocks(gathered.width()):
         gathered.add(line, block, recipe)
@@ -181,6 +204,10 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         findings.extend(found)
         if name in WIND_CHANNELS:
             flags |= channel_flags
+    for check in gathered.checks:
+        fault, found = check.faults(order, line)
+        flags[fault] |= SampleFlag.SENSOR_FAULT
+        findings.extend(found)
     reading = Reading(
         time=time, channels=channels, flags=flags, line=line, sensor=recipe.sensor, step=gathered.clock.step,
         rules=recipe.quality, host_time=host_time, findings=tuple(findings),

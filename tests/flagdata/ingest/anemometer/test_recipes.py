@@ -32,7 +32,7 @@ name = "mine"
 """
 
 
-def read(tmp_path: Path, recipe: str, text: str, **options: object) -> WindLog:
+def by_recipe(tmp_path: Path, recipe: str, text: str, **options: object) -> WindLog:
     (tmp_path / "r.toml").write_text(recipe)
     path = tmp_path / "log.txt"
     path.write_text(text)
@@ -53,14 +53,14 @@ def test_any_speed_unit_becomes_metres_a_second(tmp_path: Path, unit: str) -> No
     one = {"m/s": 1, "km/h": 3.6, "kn": 3600 / 1852, "mph": 1 / 0.44704, "ft/s": 1 / 0.3048, "ft/min": 60 / 0.3048}[
         unit
     ]
-    log = read(tmp_path, PLAIN.replace('"m/s"', f'"{unit}"'), f"t,v\n2026-05-01T12:00:00Z,{one!r}\n")
+    log = by_recipe(tmp_path, PLAIN.replace('"m/s"', f'"{unit}"'), f"t,v\n2026-05-01T12:00:00Z,{one!r}\n")
     assert log.series.channels["wind_speed"] == pytest.approx([1.0])
 
 
 def test_gain_and_offset_are_applied_in_the_files_unit(tmp_path: Path) -> None:
     # 2 V · 5 (km/h)/V + 1 km/h = 11 km/h
     recipe = PLAIN.replace('unit = "m/s"', 'unit = "km/h"\ngain = 5.0\noffset = 1')
-    log = read(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,2\n")
+    log = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,2\n")
     assert log.series.channels["wind_speed"] == pytest.approx([11 / 3.6])
 
 
@@ -70,20 +70,20 @@ def test_gain_and_offset_are_applied_in_the_files_unit(tmp_path: Path) -> None:
 )
 def test_directions_come_out_as_from_clockwise_from_north(tmp_path: Path, extra: str, expected: float) -> None:
     recipe = PLAIN.replace("[sensor]", f'[channels.wind_direction]\ncolumn = "d"\nunit = "deg"\n{extra}\n[sensor]')
-    log = read(tmp_path, recipe, "t,v,d\n2026-05-01T12:00:00Z,2,90\n")
+    log = by_recipe(tmp_path, recipe, "t,v,d\n2026-05-01T12:00:00Z,2,90\n")
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([expected])
 
 
 def test_missing_codes_are_missing_whatever_their_spelling(tmp_path: Path) -> None:
     recipe = PLAIN.replace("[time]", '[file]\nmissing = [-9999, "99.9", "ERR"]\n[time]')
     rows = ["-9999", "-9999.00", "99.9", "err", "3.5"]
-    log = read(tmp_path, recipe, "t,v\n" + "".join(f"2026-05-01T12:00:0{i}Z,{v}\n" for i, v in enumerate(rows)))
+    log = by_recipe(tmp_path, recipe, "t,v\n" + "".join(f"2026-05-01T12:00:0{i}Z,{v}\n" for i, v in enumerate(rows)))
     assert [bool(f & SampleFlag.MISSING) for f in log.series.flags] == [True, True, True, True, False]
 
 
 def test_a_range_is_in_the_files_unit(tmp_path: Path) -> None:
     recipe = PLAIN.replace('unit = "m/s"', 'unit = "km/h"\nrange = [0, 100]')
-    log = read(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,99\n2026-05-01T12:00:01Z,101\n")
+    log = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,99\n2026-05-01T12:00:01Z,101\n")
     assert log.series.flags.tolist() == [0, SampleFlag.OUT_OF_RANGE]
 
 
@@ -108,7 +108,7 @@ unit = "kt"
 name = "x"
 """
     text = "logger 5\n\n01.05.26  12:00:00.5   270  10\n# pause\n01.05.26  12:00:01.5   270  20\n"
-    log = read(tmp_path, recipe, text)
+    log = by_recipe(tmp_path, recipe, text)
     assert [iso(t) for t in log.series.time] == ["2026-05-01T11:00:00.500Z", "2026-05-01T11:00:01.500Z"]
     assert log.series.channels["wind_speed"] == pytest.approx([5.14444, 10.28889], abs=1e-5)
 
@@ -116,20 +116,20 @@ name = "x"
 def test_the_users_zone_goes_before_the_recipes(tmp_path: Path) -> None:
     recipe = PLAIN.replace('format = "iso"', 'format = "iso"\nzone = "Europe/Amsterdam"')
     text = "t,v\n2026-07-01 12:00:00,2\n"
-    assert iso(int(read(tmp_path, recipe, text).series.time[0])) == "2026-07-01T10:00:00Z"
-    assert iso(int(read(tmp_path, recipe, text, zone="UTC").series.time[0])) == "2026-07-01T12:00:00Z"
+    assert iso(int(by_recipe(tmp_path, recipe, text).series.time[0])) == "2026-07-01T10:00:00Z"
+    assert iso(int(by_recipe(tmp_path, recipe, text, zone="UTC").series.time[0])) == "2026-07-01T12:00:00Z"
 
 
 def test_a_zero_offset_of_the_recipe_is_subtracted_and_said(tmp_path: Path) -> None:
     recipe = PLAIN + "[quality]\nzero-offset = -0.35\n"
-    log = read(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,-0.35\n2026-05-01T12:00:01Z,4.65\n")
+    log = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,-0.35\n2026-05-01T12:00:01Z,4.65\n")
     assert log.series.channels["wind_speed"] == pytest.approx([0.0, 5.0])
     assert [f.value for f in log.findings if f.kind == "zero-offset-given"] == [-0.35]
 
 
 def test_sensor_facts_reach_the_series(tmp_path: Path) -> None:
     recipe = PLAIN + "height = 3.5\ndistance-constant = 2.7\naveraging = 1\nthreshold = 0.4\naccuracy-relative = 0.02\n"
-    sensor = read(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.sensor
+    sensor = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.sensor
     assert (sensor.height, sensor.distance_constant, sensor.averaging, sensor.threshold) == (3.5, 2.7, 1.0, 0.4)
     assert (sensor.accuracy, sensor.accuracy_relative) == (None, 0.02)
 
@@ -138,8 +138,8 @@ def test_an_optional_column_may_be_absent(tmp_path: Path) -> None:
     recipe = PLAIN.replace(
         "[sensor]", '[channels.air_temperature]\ncolumn = "T"\nunit = "degC"\noptional = true\n[sensor]'
     )
-    assert list(read(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.channels) == ["wind_speed"]
-    with_it = read(tmp_path, recipe, "t,v,T\n2026-05-01T12:00:00Z,3,20\n")
+    assert list(by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.channels) == ["wind_speed"]
+    with_it = by_recipe(tmp_path, recipe, "t,v,T\n2026-05-01T12:00:00Z,3,20\n")
     assert with_it.series.channels["air_temperature"] == pytest.approx([293.15])
 
 
@@ -172,12 +172,45 @@ def test_line_ends_of_any_kind_count_lines_alike(read: Read) -> None:
         assert [f.where for f in read(end.join([*rows, ""])).findings] == ["line 3"]
 
 
+GILL = "laptop_time,raw_line\n" + "".join(
+    f'2026-05-01T12:00:0{i}.25,"\x02Q,229,{speed},{unit},{status},\x0316"\n'
+    for i, (speed, unit, status) in enumerate(
+        [
+            ("002.74", "M", "00"),
+            ("003.00", "M", "00"),
+            ("003.10", "M", "04"),
+            ("005.83", "N", "00"),
+            ("002.50", "M", "00"),
+        ]
+    )
+)
+
+
+def test_a_sonics_own_status_and_unit_decide_what_is_used(read: Read) -> None:
+    log = read(GILL, zone="UTC")
+    assert "gill-windsonic" in log.reasons[2]
+    assert log.series.channels["wind_speed"][:2].tolist() == [2.74, 3.0]
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([229] * 5)
+    fault = SampleFlag.SENSOR_FAULT
+    assert log.series.flags.tolist() == [0, 0, fault, fault, 0]
+    assert sorted((f.count, f.where) for f in log.findings if f.kind == "sensor-fault") == [
+        (1, "line 4"),
+        (1, "line 5"),
+    ]
+
+
+def test_a_checked_column_of_a_table_flags_the_rows_it_rejects(tmp_path: Path) -> None:
+    recipe = PLAIN + '[[check]]\ncolumn = "ok"\nvalues = ["A"]\nabout = "status"\n'
+    log = by_recipe(tmp_path, recipe, "t,v,ok\n2026-05-01T12:00:00Z,3,A\n2026-05-01T12:00:01Z,4,V\n")
+    assert log.series.flags.tolist() == [0, SampleFlag.SENSOR_FAULT]
+
+
 def test_a_log_that_lists_the_newest_row_first_is_read_from_its_end(tmp_path: Path) -> None:
     # backwards through the hour that occurs twice: 03:00 CET, 02:59 … 02:00 CET, 02:59 … 02:00 CEST, 01:59 CEST
     hour = [f"2026-10-25 02:{m:02d}:00" for m in range(59, -1, -1)]
     walls = ["2026-10-25 03:00:00", *hour, *hour, "2026-10-25 01:59:00"]
     text = "t,v\n" + "".join(f"{w},{i}\n" for i, w in enumerate(walls))
-    log = read(tmp_path, PLAIN, text, zone="Europe/Amsterdam")
+    log = by_recipe(tmp_path, PLAIN, text, zone="Europe/Amsterdam")
     assert log.series.channels["wind_speed"].tolist() == list(range(121, -1, -1))
     assert set(np.diff(log.series.time)) == {60 * 10**9}
     assert iso(int(log.series.time[0])) == "2026-10-24T23:59:00Z"
@@ -215,6 +248,10 @@ BAD: list[tuple[str, str, str, str]] = [
     ("stale-after-zero", "[sensor]", "[quality]\nstale-after = 0\n[sensor]", "stale-after"),
     ("zero-offset-word", "[sensor]", '[quality]\nzero-offset = "guess"\n[sensor]', "zero offset"),
     ("frame-rate-of-unknown", "[sensor]", '[quality]\nframe-rate-of = ["fluter"]\n[sensor]', "unknown channel"),
+    ("check-without-values", "[sensor]", '[[check]]\ncolumn = 2\nabout = "x"\n[sensor]', "without values"),
+    ("check-without-column", "[sensor]", '[[check]]\nvalues = ["A"]\nabout = "x"\n[sensor]', "no column"),
+    ("check-key", "[sensor]", '[[check]]\ncolum = 2\n[sensor]', "did you mean 'column'"),
+    ("check-no-table", 'name = "mine"', 'check = [1]\nname = "mine"', "not a table"),
     ("not-toml", "[time]", "[time", "not valid TOML"),
     ("directive", '"iso"', '"%Y-%m-%d %Q"', "unknown directive"),
 ]  # fmt: skip
@@ -225,7 +262,7 @@ def test_a_wrong_recipe_is_refused_with_its_place(tmp_path: Path, old: str, new:
     at = PLAIN.rindex(old) if old == 'name = "mine"\n' else PLAIN.index(old)
     recipe = PLAIN[:at] + new + PLAIN[at + len(old) :]
     with pytest.raises(FlagdataError) as caught:
-        read(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n")
+        by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n")
     assert says in str(caught.value)
     assert caught.value.fix
     assert isinstance(caught.value, (InputError, UnknownNameError))
