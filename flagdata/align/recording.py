@@ -24,7 +24,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical, code_version, recipe_hash
-from flagdata.record import Coding, Record, RecordWriter
+from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
 from flagdata.schema import Kind
 from flagdata.signals import WindSeries
@@ -254,11 +254,7 @@ def _write(
         for first in range(0, len(device), _FRAMES_AT_ONCE):
             count = min(_FRAMES_AT_ONCE, len(device) - first)
             exposed = clock.to_common(source.timestamps(first, count))
-            pictures = source.jpegs(first, count)
-            if source.coding is Coding.JPEG:
-                images = [source.jpeg(index) for index in range(first, first + count)]
-            else:
-                images = list(source.frames(first, count))
+            images = source.jpegs(first, count)
             for index in range(first, first + count):
                 record.frame(
                     log_time=int(frames[index]),
