@@ -19,10 +19,11 @@ from flagdata.align.motion import MotionSeries
 from flagdata.align.recording import Alignment, Pair
 from flagdata.align.windbins import wind_bins
 from flagdata.errors import CorruptError, RefusedError, UsageError
-from flagdata.findings import Severity
+from flagdata.findings import Finding, Severity
 from flagdata.record.metadata import CAMERA
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
+from flagdata.timebase import NANOSECONDS
 
 Progress = Callable[[int], object]
 
@@ -151,7 +152,9 @@ def declared(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) ->
         clock = by_stamps(*names, start=start, end=end, sigma=math.hypot(options.offset_sigma, resolution))
     segment = clock.segments[0]
     details = {"method": clock.method, "offset": segment.offset, "sigma": segment.sigma_offset, "confidence": 1.0}
-    return Outcome(alignment=Alignment(clock=clock, recipe=recipe, details=details))
+    return Outcome(
+        alignment=Alignment(clock=clock, recipe=recipe, details=details, findings=_too_good(pair, segment.sigma_offset))
+    )
 
 
 def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = None) -> Evidence:
@@ -208,7 +211,7 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
     alignment = Alignment(
         clock=clock,
         recipe=recipe,
-        findings=estimate.findings,
+        findings=(*estimate.findings, *_too_good(pair, line.sigma_offset)),
         details={"method": "estimated", **summary(estimate), "drift": drift_summary(line)},
         curve=found.as_json(),
     )
@@ -239,6 +242,23 @@ def summary(estimate: LagEstimate) -> dict[str, Any]:
 def drift_summary(line: ClockLine) -> dict[str, Any]:
     """A recording's drift for JSON; `parts` is 0 where it is a prior's."""
     return {"value": line.drift, "sigma": line.sigma_drift, "parts": len(line.parts)}
+
+
+def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
+    """A warning where an offset is claimed to be known better than one frame."""
+    times = pair.camera_record.device_frame_times
+    period = float(np.median(np.diff(times))) / NANOSECONDS if len(times) > 1 else 0.0
+    if sigma >= period:
+        return ()
+    return (
+        Finding(
+            kind="sigma-below-frame",
+            severity=Severity.WARNING,
+            what=f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: hardly known that well",
+            value=sigma,
+            fix="state what a comparison of the two clocks can really tell",
+        ),
+    )
 
 
 def _start_sigma(pair: Pair) -> float:

@@ -131,7 +131,7 @@ def _change(before: NDArray[np.float32], after: NDArray[np.float32], block: int)
         [np.ones(before.size), (before - centre).ravel(), grad_x.ravel(), grad_y.ravel()], axis=1, dtype=np.float64
     )  # (blocks, 4)
     target = after.ravel().astype(np.float64) - centre
-    least = 0.3 / block  # the rounding of 8-bit pixels, averaged over a block
+    least = 1.0 / block  # a gray level a pixel: rounding and JPEG leave as much, in steps that hide σ
     still = target - columns[:, 1]
     starts = (_quiet(np.abs(still - np.median(still)), least)[0], np.ones(before.size, dtype=bool))
     residual, sigma, parameters = min(

@@ -20,6 +20,7 @@ from flagdata.timebase import NANOSECONDS
 
 SHORTEST = 1.0  # s, of a bin: gusts that flag and sensor share are slower
 _LONGEST = 60.0  # s
+_REACH = 20  # samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,13 +55,15 @@ def wind_bins(series: WindSeries) -> WindBins:
     time = series.time[usable]
     if len(time) < 2:
         raise InputError(f"{len(time)} usable wind samples", fix="check the log's report; give another log")
-    spacing = float(np.median(np.diff(time))) / NANOSECONDS
+    # Over several samples at a time, so that jitter averages out; their median, so that gaps do not count.
+    reach = min(_REACH, len(time) - 1)
+    spacing = float(np.median(time[reach:] - time[:-reach])) / reach / NANOSECONDS
     if spacing > _LONGEST:
         raise InputError(
             f"wind samples come every {spacing:.0f} s, too rarely to see gusts",
             fix="align by stamps or by a given offset",
         )
-    period = max(SHORTEST, round(spacing, 3))
+    period = max(SHORTEST, round(spacing, 2))
     length = round(period * NANOSECONDS)
     shift = _mid_bin_shift(time, length) if spacing > period / 4 else 0
     means = average(replace(series, time=series.time - shift), period)

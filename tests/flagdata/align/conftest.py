@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from flagdata.align.motion import MotionSeries
 from flagdata.rng import stream
@@ -57,23 +58,15 @@ def gusts(scene: Scene, generator: np.random.Generator, seconds: float) -> np.nd
 def lagged(series: np.ndarray, seconds: float) -> np.ndarray:
     """First-order lag with a time constant."""
     keep = np.exp(-1 / (FINE * seconds))
-    out = np.empty_like(series)
-    state = series[0]
-    for index, value in enumerate(series):
-        state = keep * state + (1 - keep) * value
-        out[index] = state
+    out, _ = lfilter([1 - keep], [1, -keep], series, zi=[keep * series[0]])
     return out
 
 
 def red_noise(generator: np.random.Generator, count: int, steps: float) -> np.ndarray:
     """Gauss–Markov noise of unit variance with a correlation length in samples."""
     keep = np.exp(-1 / steps)
-    kicks = generator.standard_normal(count) * np.sqrt(1 - keep**2)
-    out = np.empty(count)
-    state = generator.standard_normal()
-    for index, kick in enumerate(kicks):
-        state = keep * state + kick
-        out[index] = state
+    start = generator.standard_normal()
+    out, _ = lfilter([np.sqrt(1 - keep**2)], [1, -keep], generator.standard_normal(count), zi=[keep * start])
     return out
 
 
@@ -133,5 +126,15 @@ def scene() -> Callable[..., tuple[MotionSeries, WindAverage]]:
         *, gust: np.ndarray | None = None, other: np.ndarray | None = None, **changes: float
     ) -> tuple[MotionSeries, WindAverage]:
         return make(Scene(**changes), gust=gust, other=other)  # type: ignore[arg-type]
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def gusts_alone() -> Callable[[int, float], np.ndarray]:
+    """`gusts_alone(seed, seconds)`: gusts of unit variance of another day."""
+
+    def build(seed: int, seconds: float) -> np.ndarray:
+        return gusts(Scene(seed=seed), stream(seed, "another day"), seconds)
 
     return build

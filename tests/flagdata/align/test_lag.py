@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.stats import binom
 
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
+from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
 
 Scenes = Callable[..., tuple[MotionSeries, WindAverage]]
+SECOND = 1_000_000_000
 
 
 def estimate(pair: tuple[MotionSeries, WindAverage], **changes: float) -> LagEstimate:
@@ -30,7 +35,142 @@ def test_offset_of_a_gusty_ten_minutes_is_recovered_within_half_a_second(scene: 
     assert found.interval[0] <= offset <= found.interval[1]
 
 
+def test_intervals_of_two_hundred_field_recordings_cover_the_offset_at_their_level(scene: Scenes) -> None:
+    """Fields drawn at random: turbulence 10 to 25 %, length scales 50 to 100 m, flag 1 to 3 m from the sensor.
+
+    The flag's response is drawn with the mean and spread that the search assumes. Coverage is that of accepted
+    estimates, which is what a user gets.
+    """
+    errors, sigmas, covered = [], [], 0
+    for seed in range(200):
+        rng = stream(seed, "field")
+        response = max(0.05, rng.normal(0.4, 0.15))
+        offset = rng.uniform(-110, 110)
+        found = estimate(
+            scene(
+                seed=seed, offset=offset, mean=rng.uniform(4, 10), turbulence=rng.uniform(0.10, 0.25),
+                length=rng.uniform(50, 100), response=response, memory=response, apart=rng.uniform(1, 3),
+                flag_noise=rng.uniform(0.2, 0.5), exponent=rng.uniform(1, 2),
+            ),
+            surrogates=60,
+        )  # fmt: skip
+        if found.accepted:
+            errors.append(found.offset - offset)
+            sigmas.append(found.sigma)
+            covered += bool(found.interval[0] <= offset <= found.interval[1])
+    accepted = len(errors)
+    assert accepted >= 140  # two thirds: the rest is too noisy to tell and says so
+    # 90 % of n by the binomial distribution, at the 1 % and 99.9 % points: chance alone fails this once in a hundred.
+    assert binom.ppf(0.01, accepted, 0.9) <= covered
+    scores = np.array(errors) / np.array(sigmas)
+    # The σ are neither boasts nor excuses: their scores' standard deviation is 1 ± 0.06 by theory, heavy tails apart.
+    assert 0.75 < np.std(scores) < 1.2
+    assert np.median(np.abs(errors)) < 0.3
+    assert np.mean(np.abs(errors) < 0.5) > 0.85
+
+
+def test_the_offset_does_not_depend_on_the_generator(scene: Scenes) -> None:
+    pair = scene(seed=3, offset=5.0, apart=1.5)
+    found = [
+        estimate_offset(*pair, search=LagSearch(surrogates=60), generator=stream(seed, "chance")) for seed in (0, 1)
+    ]
+    assert found[0].offset == found[1].offset
+    assert found[0].sigma == found[1].sigma
+
+
+def test_a_monotone_transform_of_the_motion_does_not_move_the_offset_much(scene: Scenes) -> None:
+    """Ranks of bin means see the energy through an average, so not exactly nothing moves; well under σ."""
+    motion, wind = scene(seed=3, offset=5.0, apart=1.5)
+    plain = estimate((motion, wind), surrogates=60)
+    rooted = estimate((replace(motion, energy=np.sqrt(motion.energy)), wind), surrogates=60)
+    assert rooted.offset == pytest.approx(plain.offset, abs=plain.sigma)
+
+
+def test_shifting_the_cameras_clock_shifts_the_offset_by_as_much(scene: Scenes) -> None:
+    motion, wind = scene(seed=3, offset=5.0, apart=1.5)
+    plain = estimate((motion, wind), surrogates=60)
+    moved = estimate((replace(motion, time=motion.time - 20 * SECOND), wind), surrogates=60)
+    # A whole number of steps of the search: the same samples meet, but the ranks run over a few others at the ends.
+    assert moved.offset == pytest.approx(plain.offset + 20, abs=0.005)
+
+
+def test_one_missing_minute_of_either_side_leaves_the_offset_within_its_interval(scene: Scenes) -> None:
+    motion, wind = scene(seed=3, offset=5.0, apart=1.5)
+    frames = np.ones(len(motion), dtype=bool)
+    frames[4000:5500] = False
+    bins = np.ones(len(wind.time), dtype=bool)
+    bins[400:460] = False
+    holes = (
+        MotionSeries(time=motion.time[frames], energy=motion.energy[frames]),
+        replace(
+            wind, time=wind.time[bins], speed=wind.speed[bins], sigma=wind.sigma[bins],
+            direction=wind.direction[bins], count=wind.count[bins],
+        ),
+    )  # fmt: skip
+    found = estimate(holes, surrogates=60)
+    assert found.accepted, found.reasons
+    assert found.interval[0] <= 5.0 <= found.interval[1]
+
+
 def test_steady_wind_is_refused(scene: Scenes) -> None:
     found = estimate(scene(seed=4, turbulence=0.005))
     assert not found.accepted
     assert refusals(found) == {"steady-wind"}
+
+
+@pytest.mark.parametrize("period", [7.0, 20.0, 60.0])
+def test_periodic_wind_is_refused_as_ambiguous(scene: Scenes, period: float) -> None:
+    time = np.arange(900 * 20) / 20
+    found = estimate(scene(seed=5, offset=20.0, gust=np.sqrt(2) * np.sin(2 * np.pi * time / period)))
+    assert "ambiguous-offset" in refusals(found)
+
+
+def test_unrelated_wind_is_accepted_no_more_often_than_stated(
+    scene: Scenes, gusts_alone: Callable[..., np.ndarray]
+) -> None:
+    """150 films of one gusty day against the wind of another; the stated chance is 1 %."""
+    accepted = 0
+    for seed in range(150):
+        found = estimate(scene(seed=seed, other=gusts_alone(seed + 10_000, 900.0)), surrogates=60, sigma=10.0)
+        accepted += found.accepted
+    assert accepted <= binom.ppf(0.999, 150, 0.01)
+
+
+def test_too_short_an_overlap_is_refused(scene: Scenes) -> None:
+    motion, wind = scene(seed=3, duration=100.0)
+    assert refusals(estimate((motion, wind))) == {"short-overlap"}
+
+
+def test_a_peak_at_the_edge_of_the_search_is_refused(scene: Scenes) -> None:
+    found = estimate(scene(seed=3, offset=30.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
+    assert "offset-at-edge" in refusals(found)
+
+
+def test_an_offset_beyond_the_search_is_refused(scene: Scenes) -> None:
+    found = estimate(scene(seed=3, offset=60.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
+    assert not found.accepted
+
+
+def test_a_still_film_is_refused(scene: Scenes) -> None:
+    motion, wind = scene(seed=3)
+    found = estimate((replace(motion, energy=np.zeros(len(motion))), wind))
+    assert not found.accepted
+
+
+def test_wind_and_film_of_different_days_say_so(scene: Scenes) -> None:
+    motion, wind = scene(seed=3)
+    with pytest.raises(InputError, match="do not overlap"):
+        estimate((replace(motion, time=motion.time + 86_400 * SECOND), wind))
+
+
+def test_frames_slower_than_the_bins_say_so(scene: Scenes) -> None:
+    motion, wind = scene(seed=3)
+    with pytest.raises(InputError, match="too slow"):
+        estimate((MotionSeries(time=motion.time[::20], energy=motion.energy[::20]), wind))
+
+
+def test_bins_off_their_grid_say_so(scene: Scenes) -> None:
+    motion, wind = scene(seed=3)
+    jitter = stream(1, "jitter").integers(-300_000_000, 300_000_000, len(wind.time))
+    with pytest.raises(InputError, match="regular grid"):
+        estimate((motion, replace(wind, time=wind.time + jitter)))

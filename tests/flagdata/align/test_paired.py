@@ -1,0 +1,165 @@
+"""Two clocks that stamped the same samples: the lower envelope, its drift, its jumps."""
+
+from __future__ import annotations
+
+import csv
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.align.paired import host_clock, nominal_times, pair_clocks
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import from_datetime
+
+SECOND = 1_000_000_000
+START = 1_780_000_000 * SECOND
+
+
+def clocks(
+    seed: int,
+    *,
+    offset: float = 12.5,
+    drift: float = 4e-5,
+    seconds: float = 600.0,
+    rate: float = 20.0,
+    steps: tuple[tuple[float, float], ...] = (),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Device and host stamps with delays in bursts: exponential of 4 ms, and for two seconds in twenty, 80 ms more."""
+    rng = stream(seed, "clocks")
+    time = np.arange(round(seconds * rate)) / rate
+    delay = rng.exponential(0.004, len(time)) + np.where(time % 20 < 2, rng.exponential(0.08, len(time)), 0.0)
+    late = offset + drift * (time - seconds / 2) + delay
+    for at, size in steps:
+        late = late + np.where(time >= at, size, 0.0)
+    device = START + np.round(time * SECOND).astype(np.int64)
+    return device, device + np.round(late * SECOND).astype(np.int64)
+
+
+def test_offset_and_drift_are_those_of_the_lower_envelope() -> None:
+    device, host = clocks(1)
+    paired = pair_clocks(device, host)
+    (segment,) = paired.model.segments
+    middle = np.array([(device[0] + device[-1]) // 2])
+    # The least of 20 exponential delays of 4 ms is 0.2 ms on average.
+    assert (paired.model.to_common(middle) - middle)[0] / SECOND == pytest.approx(12.5, abs=0.001)
+    assert segment.drift == pytest.approx(4e-5, abs=1e-6)
+    assert paired.delay == pytest.approx(0.004, abs=0.002)
+    assert paired.worst_delay > 0.2
+
+
+def test_two_sigma_hold_offset_and_drift_in_nineteen_of_twenty_logs() -> None:
+    good = 0
+    for seed in range(60):
+        device, host = clocks(seed, seconds=120)
+        model = pair_clocks(device, host).model
+        at = np.array([device[0] + 60 * SECOND])
+        good += bool(abs((model.to_common(at) - at)[0] / SECOND - 12.5) < 2 * model.sigma(at)[0])
+        good += bool(abs(model.segments[0].drift - 4e-5) < 2 * model.segments[0].sigma_drift)
+    assert good >= 0.9 * 120  # the median delay, a systematic allowance, makes the offsets' σ generous
+
+
+@pytest.mark.parametrize("size", [-0.7, 0.25, 3600.0])
+def test_a_clock_that_was_set_gets_another_segment_at_the_sample(size: float) -> None:
+    device, host = clocks(2, steps=((271.35, size),))
+    paired = pair_clocks(device, host)
+    first, second = paired.model.segments
+    # A jump down is seen at once; one up is seen by the first sample that is not merely late.
+    assert (second.start - START) / SECOND == pytest.approx(271.35, abs=1.0)
+    assert second.offset - first.offset == pytest.approx(size + 4e-5 * 300, abs=0.005)
+    jump = [finding for finding in paired.findings if finding.kind == "clock-jump"]
+    assert len(jump) == 1
+    assert jump[0].value == pytest.approx(size, abs=0.005)
+
+
+def test_two_jumps_make_three_segments() -> None:
+    device, host = clocks(3, steps=((150.0, 1.0), (400.0, -0.5)))
+    assert len(pair_clocks(device, host).model.segments) == 3
+
+
+def test_one_wrong_stamp_is_no_jump() -> None:
+    device, host = clocks(4)
+    host = host.copy()
+    host[5000] -= 3 * SECOND
+    paired = pair_clocks(device, host)
+    assert len(paired.model.segments) == 1
+    assert paired.model.segments[0].offset == pytest.approx(12.5, abs=0.01)
+
+
+def test_a_few_seconds_leave_the_drift_to_its_prior() -> None:
+    device, host = clocks(5, seconds=4)
+    (segment,) = pair_clocks(device, host).model.segments
+    assert segment.drift == 0.0
+    assert segment.sigma_drift == 1e-4
+
+
+def test_the_delay_of_the_fastest_sample_is_taken_off_and_its_uncertainty_added() -> None:
+    device, host = clocks(6)
+    bare = pair_clocks(device, host, least_delay_sigma=0.0)
+    told = pair_clocks(device, host, least_delay=0.03, least_delay_sigma=0.01)
+    (a,), (b,) = bare.model.segments, told.model.segments
+    assert b.offset == pytest.approx(a.offset - 0.03, abs=1e-12)
+    assert b.sigma_offset == pytest.approx(np.hypot(a.sigma_offset, 0.01))
+
+
+def test_an_unset_device_clock_decades_off_keeps_nanoseconds() -> None:
+    device, host = clocks(7, drift=0.0)
+    paired = pair_clocks(device - START, host)
+    at = np.array([300 * SECOND])
+    # An offset in float64 seconds, 1.8e9 of them, resolves 0.24 µs.
+    assert (paired.model.to_common(at) - at - START)[0] / SECOND == pytest.approx(12.5, abs=0.001)
+
+
+def test_a_counted_clock_shows_lost_samples_as_steps() -> None:
+    rng = stream(8, "count")
+    time = np.arange(6000) * 0.005
+    time[2500:] += 0.433
+    host = START + np.round((time + rng.exponential(0.002, len(time))) * SECOND).astype(np.int64)
+    device = nominal_times(host)
+    assert np.median(np.diff(device)) / SECOND == pytest.approx(0.005, rel=1e-3)
+    _, second = pair_clocks(device, host).model.segments
+    assert np.searchsorted(device, second.start) == pytest.approx(2500, abs=5)
+
+
+@pytest.mark.parametrize(
+    ("device", "host", "what"),
+    [
+        ([0], [0], "one sample"),
+        ([0, 1], [0], "two stamps"),
+        ([1, 1], [0, 1], "do not increase"),
+    ],
+)
+def test_stamps_that_make_no_clock_are_refused(device: list[int], host: list[int], what: str) -> None:
+    with pytest.raises(InputError, match=what):
+        pair_clocks(np.array(device, dtype=np.int64), np.array(host, dtype=np.int64))
+
+
+def test_a_log_with_one_kind_of_stamp_has_no_host_clock() -> None:
+    series = WindSeries(
+        time=np.arange(3, dtype=np.int64), channels={"wind_speed": np.ones(3)}, flags=np.zeros(3, dtype=np.uint16),
+        sensor=Sensor(name="cup"),
+    )  # fmt: skip
+    assert host_clock(series) is None
+
+
+@pytest.mark.reference
+def test_the_tunnels_camera_clock_runs_sixty_milliseconds_ahead_of_the_laptop(reference_data: Path) -> None:
+    """The least of laptop − device in the file is near −64 ms; the device writes whole milliseconds."""
+    device, host = [], []
+    with (reference_data / "wind" / "flag-camera-tunnel" / "pi_log.csv").open(newline="") as lines:
+        for stamp, raw in csv.reader(lines):
+            fields = raw.split(",")
+            if len(fields) == 7:
+                seconds, milliseconds = fields[0].split(".")
+                device.append(int(seconds) * SECOND + int(milliseconds) * 1_000_000)
+                host.append(from_datetime(datetime.fromisoformat(stamp).replace(tzinfo=UTC)))
+    paired = pair_clocks(np.array(device), np.array(host))
+    (segment,) = paired.model.segments
+    least = min(h - d for d, h in zip(device, host, strict=True)) / SECOND
+    assert segment.offset == pytest.approx(least, abs=0.002)
+    assert 0.0003 < segment.sigma_offset < 0.01
+    assert abs(segment.drift) < 1e-4
+    assert paired.worst_delay < 0.05
