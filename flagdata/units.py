@@ -64,6 +64,7 @@ UNITS: dict[str, Unit] = {
 # purpose: it is an interval scale of classes, not a unit.
 SPELLINGS: dict[str, str] = {
     "mps": "m/s", "ms-1": "m/s", "m.s-1": "m/s", "meters/sec": "m/s", "meter/sec": "m/s",
+    "meters/second": "m/s", "meter/second": "m/s",
     "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h",
     "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn",
     "mi/h": "mph", "miles/hour": "mph",
