@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -47,8 +48,11 @@ def _reading(path: Path) -> Iterator[None]:
 
 def _advice(path: Path) -> str:
     """What to do about a file that will not open; an unfinished MP4 is the common case."""
-    with path.open("rb") as stream:
-        head = stream.read(12)
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(12)
+    except OSError:
+        return "check that the file is still there and readable"
     if head[4:8] in (b"ftyp", b"mdat", b"wide", b"free"):
         return (
             "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair it with a "
@@ -80,8 +84,13 @@ def check_file(path: Path, limits: Limits) -> None:
     check_path(path)
     if not path.is_file():
         raise InputError("it is neither a file nor a folder", where=str(path), fix="give a video file")
-    with path.open("rb") as stream:
-        head = stream.read(24)
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(24)
+    except OSError as error:
+        raise InputError(
+            f"the file cannot be read ({error.strerror})", where=str(path), fix="check its rights"
+        ) from error
     if not head:
         raise InputError("the file is empty", where=str(path), fix="copy it from the camera again")
     size = (0, 0)
@@ -186,7 +195,7 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
 class _Tally:
     """Stamps of a stream's packets in ticks, how many packets have none, and how many an edit list discards."""
 
-    stamps: list[int] = field(default_factory=list)
+    stamps: array[int] = field(default_factory=lambda: array("q"))
     missing: int = 0
     discarded: int = 0
     unreadable: Finding | None = None
@@ -246,4 +255,6 @@ def _timing(
         )  # fmt: skip
     tick = stream.time_base or Fraction(1, 1000)
     rate = stream.average_rate or stream.guessed_rate
-    return survey(np.array(tally.stamps, dtype=np.int64), tick=tick, missing=tally.missing, fallback_rate=rate or None)
+    return survey(
+        np.frombuffer(tally.stamps, dtype=np.int64), tick=tick, missing=tally.missing, fallback_rate=rate or None
+    )

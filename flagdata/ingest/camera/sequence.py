@@ -43,7 +43,11 @@ class SequenceSource:
     def __init__(self, folder: Path, options: CameraOptions) -> None:
         self._limits = options.limits
         self._where = str(folder)
-        paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
+        try:
+            paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
+        except OSError as error:
+            what = f"the folder cannot be read ({error.strerror})"
+            raise InputError(what, where=self._where, fix="check its rights") from error
         if not paths:
             raise InputError(
                 "the folder holds no PNG, JPEG, TIFF or BMP image", where=self._where, fix="give the folder"

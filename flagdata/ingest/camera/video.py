@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from contextlib import suppress
 from fractions import Fraction
 from functools import partial
 from itertools import islice
@@ -143,17 +144,18 @@ class VideoSource:
             for run in range(runs):
                 target = self._timing.origin + self._timing.span * run // runs
                 pictures: list[Picture] = []
-                try:
-                    container.seek(target, stream=stream)
+                # A raw stream cannot seek: its runs follow one another.
+                if not self.facts.sequence:
+                    with suppress(av.error.FFmpegError):
+                        container.seek(target, stream=stream)
+                # A spot that cannot be decoded is no loss to a sample; what came before it counts.
+                with suppress(av.error.FFmpegError):
                     for frame in _run(container.decode(stream), keys, target=target, stride=stride):
                         if (frame.width, frame.height) == (self.facts.width, self.facts.height):
                             luma = partial(luma_of_frame, frame, codec=self.facts.codec)
                             pictures.append(Picture(stamp=frame.pts, luma=luma))
                         if len(pictures) == count:
                             break
-                except av.error.FFmpegError:
-                    # A spot that cannot be decoded is no loss to a sample; what came before it counts.
-                    pass
                 if pictures:
                     yield pictures
 

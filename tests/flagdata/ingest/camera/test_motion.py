@@ -123,3 +123,23 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
 def test_a_single_frame_shows_no_motion(film: Callable[..., Path]) -> None:
     with pytest.raises(RefusedError, match="too few"):
         propose_crop(film("one.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=1))
+
+
+def test_a_stream_that_cannot_seek_is_sampled_from_its_beginning(
+    tmp_path: Path, write_video: Callable[..., Path]
+) -> None:
+    flag = (200, 60, 80)
+    path = write_video(
+        tmp_path / "raw.h264", range(60), tick=Fraction(1, 25), container="h264",
+        picture=lambda n: scene(n, flag=flag),
+    )  # fmt: skip
+    proposal = propose_crop(path, CameraOptions(sequence_fps=25.0))
+    assert covers(proposal.box.as_tuple(), flag)
+
+
+def test_a_folder_of_images_gets_a_proposal_too(tmp_path: Path) -> None:
+    flag = (200, 60, 80)
+    for number in range(40):
+        Image.fromarray(scene(number, flag=flag)).save(tmp_path / f"{number}.png")
+    proposal = propose_crop(tmp_path, CameraOptions(sequence_fps=25.0))
+    assert covers(proposal.box.as_tuple(), flag)

@@ -534,3 +534,19 @@ def test_a_small_crop_is_enlarged_and_says_so(cfr60: Path, plain: CameraOptions)
     _, frames, found = read(cfr60, replace(plain, crop=CropBox(x=0, y=0, width=32, height=32)))
     assert frames[0].image.shape == (96, 96)
     assert (found["enlarged"].severity, found["enlarged"].value) == (Severity.WARNING, 3.0)
+
+
+def test_a_camcorders_m2ts_with_time_codes_between_packets_is_whole(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int]
+) -> None:
+    path = write_video(
+        tmp_path / "cam.mts", range(20), tick=Fraction(1, 25), container="mpegts", muxer={"mpegts_m2ts_mode": "1"}
+    )
+    assert path.read_bytes()[4:5] == b"\x47"
+    _, frames, found = read(path, plain)
+    assert [number_of(f.image) for f in frames] == list(range(20))
+    assert "truncated" not in found
+    cut = tmp_path / "cut.mts"
+    cut.write_bytes(path.read_bytes()[:-50])
+    _, _, found = read(cut, plain)
+    assert found["truncated"].severity is Severity.WARNING
