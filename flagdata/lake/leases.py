@@ -53,7 +53,7 @@ class Lease:
                 fcntl.flock(self._file, fcntl.LOCK_EX)
                 self._line(json.dumps(owner))
             except OSError:
-                self.close()
+                self._remove()
                 raise
 
     def hold(self, object_name: str) -> None:
@@ -67,7 +67,11 @@ class Lease:
             yield
 
     def close(self) -> None:
-        """Give everything up and remove the folder."""
+        """Give everything up and remove the folder; what cannot be removed is left to a collection."""
+        with keeping_collectors_out(self.folder.parent):  # none sees the folder half removed
+            self._remove()
+
+    def _remove(self) -> None:
         shutil.rmtree(self.folder, ignore_errors=True)
         self._file.close()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 
 _WORKER = Path(__file__).with_name("ingest_worker.py")
+_ENDS = {"done", "failed", "killed"}
 
 
 @pytest.fixture
@@ -61,27 +63,34 @@ class Worker:
 
     def kill(self) -> None:
         os.kill(int(self.lines()[0]), signal.SIGKILL)
+        with self.said.open("a") as file:
+            file.write("\nkilled\n")
 
     def is_running(self) -> bool:
-        return "done" not in self.lines()
+        return _ENDS.isdisjoint(self.lines())
 
     def acknowledged(self) -> set[str]:
         """Ids of the artifacts whose with-block it had left."""
-        return {line for line in self.lines()[2:] if line not in ("done", "failed")}
+        return {line for line in self.lines()[2:] if re.fullmatch(r"[0-9a-f]{32}", line)}
 
 
 @pytest.fixture
 def start_worker(lake: Lake, tmp_path: Path) -> Iterator[Callable[..., Worker]]:
     """Starts a process that ingests, given its name and how many sources of its own and shared ones."""
+    workers: list[Worker] = []
     command = [sys.executable, str(_WORKER), str(lake.path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as server:
         assert server.stdin is not None
 
         def start(prefix: str, *, count: int, shared: int = 0) -> Worker:
             worker = Worker(said=tmp_path / f"said-{prefix}")
+            workers.append(worker)
             server.stdin.write(f"{prefix} {count} {shared} {worker.said}\n")
             server.stdin.flush()
             return worker
 
         yield start
         server.stdin.close()
+        for worker in workers:  # of a test that failed
+            if worker.is_running() and worker.lines():
+                worker.kill()
