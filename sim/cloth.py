@@ -41,6 +41,7 @@ class Cloth:
         damping: (batch,) d [s].
         face_slots: (vertex, k) rows of the stacked corner forces (3·face, …) to sum at each vertex, padded with 3·face.
         hinge_slots: the same for (4·hinge, …), padded with 4·hinge.
+        stiffening: (hinge, batch) bending stiffness on top, as a share of the table's; None where there is none.
     """
 
     mesh: Mesh
@@ -61,6 +62,7 @@ class Cloth:
     damping: Tensor
     face_slots: Tensor
     hinge_slots: Tensor
+    stiffening: Tensor | None = None
 
     @classmethod
     def build(

@@ -10,11 +10,15 @@ from torch import Tensor
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """Positions and velocities (vertex, 3, batch) [m, m/s] at one time [s] since the start of the run."""
+    """Positions and velocities (vertex, 3, batch) [m, m/s] at one time [s] since the start of the run.
+
+    `memory` holds what the system's hysteretic forces remember, in their order (see `System.frictions`).
+    """
 
     position: Tensor
     velocity: Tensor
     time: float = 0.0
+    memory: tuple[Tensor, ...] = ()
 
     def healthy(self, *, speed_limit: float = 300.0) -> Tensor:
         """(batch,) bool: finite, and no vertex faster than the limit [m/s], which only divergence reaches."""

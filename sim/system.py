@@ -9,7 +9,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from sim import bending, membrane
+from flagdata.errors import UsageError
+from sim import bending, inertia, membrane
 from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
 from sim.handles import Handles
@@ -30,6 +31,46 @@ class Flow(Protocol):
 
     def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
         """The air at the vertices, (vertex, 3, batch) [m/s], for a wind (3, batch) or (vertex, 3, batch) so far."""
+        ...
+
+
+class Load(Protocol):
+    """Mass of air that the cloth takes along."""
+
+    def added_mass(self, cloth: Cloth) -> Tensor:
+        """(vertex, batch) [kg], for motion along the normals (see `sim.inertia`)."""
+        ...
+
+
+class Tie(Protocol):
+    """An attachment beside the handles. Where it loosens them its force and stiffness make up the difference."""
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N]."""
+        ...
+
+    def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
+        """(vertex, batch) the same on each axis [N/m]."""
+        ...
+
+    def stiffest(self, cloth: Cloth) -> Tensor:
+        """(vertex, batch) an upper bound of it at any time and shape, at least 0 [N/m]."""
+        ...
+
+
+class Friction(Protocol):
+    """A force that depends on the shapes gone through: it remembers (see `State.memory`), in steps of any size."""
+
+    def start(self, cloth: Cloth, position: Tensor) -> Tensor:
+        """What is remembered when nothing has happened."""
+        ...
+
+    def update(self, cloth: Cloth, memory: Tensor, before: Tensor, after: Tensor) -> Tensor:
+        """What is remembered after a step between two positions (vertex, 3, batch) [m]."""
+        ...
+
+    def force(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N]."""
         ...
 
 
@@ -62,6 +103,9 @@ class System:
         anchors: (held, 3, batch) where they are tied at zero offset [m].
         effects: what else acts.
         flows: what makes the wind differ from place to place, applied in order.
+        loads: air that moves with the cloth.
+        ties: attachments beside the handles.
+        frictions: forces that remember.
     """
 
     cloth: Cloth
@@ -73,6 +117,45 @@ class System:
     anchors: Tensor
     effects: tuple[Effect, ...] = ()
     flows: tuple[Flow, ...] = ()
+    loads: tuple[Load, ...] = ()
+    ties: tuple[Tie, ...] = ()
+    frictions: tuple[Friction, ...] = ()
+
+    def effective(self, position: Tensor, force: Tensor) -> Tensor:
+        """The force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch) [N]."""
+        if not self.loads:
+            return force
+        normals = inertia.vertex_normals(self.cloth, position)
+        return inertia.effective(force, mass=self.cloth.mass, added=self.added_mass, normals=normals)
+
+    @property
+    def added_mass(self) -> Tensor:
+        """(vertex, batch) of the air that moves with the cloth [kg]."""
+        total = torch.zeros_like(self.cloth.mass)
+        for load in self.loads:
+            total = total + load.added_mass(self.cloth)
+        return total
+
+    def tied(self, time: float, position: Tensor) -> Tensor | None:
+        """(vertex, 1, batch) stiffness of the ties [N/m]; None where there are none."""
+        if not self.ties:
+            return None
+        return torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties]).sum(0).unsqueeze(1)
+
+    def remembered(self, memory: tuple[Tensor, ...], before: Tensor, after: Tensor) -> tuple[Tensor, ...]:
+        """What the frictions remember after a step between two positions (vertex, 3, batch) [m]."""
+        return tuple(
+            friction.update(self.cloth, past, before, after)
+            for friction, past in zip(self.frictions, self._memory(memory), strict=True)
+        )
+
+    def _memory(self, memory: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
+        if len(memory) != len(self.frictions):
+            raise UsageError(
+                f"a state with {len(memory)} memories for {len(self.frictions)} frictions",
+                where="system", fix="start from the state that `sim.effects.apply` returns with the system",
+            )  # fmt: skip
+        return memory
 
     def local(self, wind: Tensor, time: float, position: Tensor) -> Tensor:
         """Air at the vertices [m/s]: (vertex, 3, batch), or the wind (3, batch) itself where nothing disturbs it."""
@@ -85,20 +168,37 @@ class System:
         return membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
 
     def external(
-        self, wind: Tensor, time: float, position: Tensor, velocity: Tensor, *, air_position: Tensor | None = None
+        self,
+        wind: Tensor,
+        time: float,
+        position: Tensor,
+        velocity: Tensor,
+        *,
+        memory: tuple[Tensor, ...] = (),
+        air_position: Tensor | None = None,
     ) -> Tensor:
-        """Gravity, air and effects: (vertex, 3, batch) [N].
+        """Gravity, air, effects, ties and frictions: (vertex, 3, batch) [N].
 
         Args:
             wind: (3, batch) [m/s].
             time: of the effects [s].
+            memory: of the frictions.
             air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
         """
         seen = position if air_position is None else air_position
         wind = self.local(wind, time, seen)
         total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, seen, velocity, wind)
+        return self._with_added(total, wind, time, position, velocity, memory)
+
+    def _with_added(
+        self, total: Tensor, wind: Tensor, time: float, position: Tensor, velocity: Tensor, memory: tuple[Tensor, ...]
+    ) -> Tensor:
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
+        for tie in self.ties:
+            total = total + tie.force(self.cloth, time, position, velocity)
+        for friction, past in zip(self.frictions, self._memory(memory), strict=True):
+            total = total + friction.force(self.cloth, past, position)
         return total
 
     def targets(self, time: float) -> Tensor:
@@ -125,16 +225,26 @@ class System:
         """Whether any vertex is held rigidly."""
         return bool(self.handles.vertices) and self.handles.rigid
 
-    def force(self, drive: Drive, share: float, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+    def force(
+        self,
+        drive: Drive,
+        share: float,
+        time: float,
+        position: Tensor,
+        velocity: Tensor,
+        *,
+        memory: tuple[Tensor, ...] = (),
+    ) -> Tensor:
         """All forces: (vertex, 3, batch) [N]. Rigid handles add none.
 
         Args:
             drive: wind and handles.
             share: where between its start (0) and its end (1).
             time: of the effects [s].
+            memory: of the frictions.
         """
         wind = torch.lerp(*drive.wind, share)
-        total = self.internal(position, velocity) + self.external(wind, time, position, velocity)
+        total = self.internal(position, velocity) + self.external(wind, time, position, velocity, memory=memory)
         if not self.sprung:
             return total
         stretch = position[self.held] - torch.lerp(*drive.targets, share)
@@ -149,23 +259,35 @@ class System:
     @property
     def extra(self) -> bool:
         """Whether anything acts that the compiled kernel does not know."""
-        return bool(self.effects) or self.plain_air is None
+        added = (*self.effects, *self.loads, *self.ties, *self.frictions)
+        return bool(added) or self.plain_air is None or self.cloth.stiffening is not None
 
-    def extra_force(self, drive: Drive, share: float, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """What the compiled kernel does not know: effects, and other air forces: (vertex, 3, batch) [N]."""
+    def extra_force(
+        self,
+        drive: Drive,
+        share: float,
+        time: float,
+        position: Tensor,
+        velocity: Tensor,
+        *,
+        memory: tuple[Tensor, ...] = (),
+    ) -> Tensor:
+        """The part of `force` that the compiled kernel does not know: (vertex, 3, batch) [N]."""
         wind = self.local(torch.lerp(*drive.wind, share), time, position)
         total = torch.zeros_like(position)
         if self.plain_air is None:
             total = total + self.air.force(self.cloth, position, velocity, wind)
-        for effect in self.effects:
-            total = total + effect.force(self.cloth, time, position, velocity, wind)
-        return total
+        if self.cloth.stiffening is not None:
+            total = total + bending.added_force(self.cloth, position, velocity)
+        return self._with_added(total, wind, time, position, velocity, memory)
 
     def tensors(self) -> tuple[Tensor, ...]:
         """The parameters that gradients may be wanted of."""
         cloth = self.cloth
         own = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
-        parts = (self.wind, self.air, *self.effects, *self.flows)
+        parts = (
+            cloth.stiffening, self.wind, self.air, *self.effects, *self.flows, *self.loads, *self.ties, *self.frictions,
+        )  # fmt: skip
         return (*own, *(tensor for part in parts for tensor in _tensors_of(part)))
 
     def energies(self, state: State) -> dict[str, Tensor]:

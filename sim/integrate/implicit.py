@@ -22,6 +22,7 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from sim import bending, membrane
 from sim.cloth import gather_sum
+from sim.inertia import vertex_normals
 from sim.state import State
 from sim.system import System
 
@@ -76,6 +77,9 @@ class BackwardEuler:
         folds = bending.Linearised.at(cloth, x) if len(cloth.hinges) else None
         drive = system.drive(time, time + h)
         factor = h * (h + cloth.damping)
+        tied = system.tied(time, x)
+        normals = vertex_normals(cloth, x) if system.loads else None
+        added = system.added_mass.unsqueeze(1)
 
         def stiffness(field: Tensor) -> Tensor:
             product = gather_sum(faces.corner_products(field), cloth.face_slots)
@@ -83,11 +87,20 @@ class BackwardEuler:
                 product = product + gather_sum(folds.corner_products(field), cloth.hinge_slots)
             if system.sprung:
                 product = product.index_add(0, system.held, system.handles.stiffness * field[system.held])
+            if tied is not None:
+                product = product + tied * field
+            return product
+
+        def inertia(field: Tensor) -> Tensor:
+            product = mass * field
+            if normals is not None:
+                product = product + added * (normals * field).sum(1, keepdim=True) * normals
             return product
 
         # The method's own update makes x − h v the positions one step ago.
         seen = x - h * v if self.air_shape is AirShape.PREVIOUS else x
-        force = faces.force() + system.external(drive.wind[0], time, x, v, air_position=seen)
+        external = system.external(drive.wind[0], time, x, v, memory=state.memory, air_position=seen)
+        force = faces.force() + external
         diagonal = gather_sum(faces.diagonal(), cloth.face_slots)
         if folds is not None:
             force = force + folds.force()
@@ -107,14 +120,20 @@ class BackwardEuler:
             free[system.held] = 0
 
         def operator(field: Tensor) -> Tensor:
-            return free * (mass * field + factor * stiffness(field))
+            return free * (inertia(field) + factor * stiffness(field))
 
+        weight = mass
+        if tied is not None:
+            diagonal = diagonal + tied
+        if normals is not None:
+            weight = weight + added * normals**2
         right = free * (h * force - factor * stiffness(v))
         change = conjugate_gradients(
-            operator, right, mass + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
+            operator, right, weight + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
         )
         v = v + change
-        return State(position=x + h * v, velocity=v, time=time + h)
+        memory = system.remembered(state.memory, x, x + h * v)
+        return State(position=x + h * v, velocity=v, time=time + h, memory=memory)
 
 
 def conjugate_gradients(

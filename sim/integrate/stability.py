@@ -43,6 +43,7 @@ def stiffest(system: System) -> Tensor:
     )
     folds = bending.Linearised.at(cloth, position)
     bend = torch.tensor([float(m.bending.max()) for m in cloth.materials], dtype=cloth.dtype, device=cloth.device)
+    bend = bend if cloth.stiffening is None else bend * (1 + cloth.stiffening)
     folds = replace(folds, k=(cloth.hinge_shape[:, None] / 2 * bend).expand_as(folds.k))
     free = _free(system)
 
@@ -52,6 +53,8 @@ def stiffest(system: System) -> Tensor:
             product = product + gather_sum(folds.corner_products(field), cloth.hinge_slots)
         if system.sprung:
             product = product.index_add(0, system.held, system.handles.stiffness * field[system.held])
+        for tie in system.ties:
+            product = product + tie.stiffest(cloth).unsqueeze(1) * field
         return product / cloth.mass.unsqueeze(1) * free
 
     # A fixed start that has a part along every mode: no generator is needed, and results repeat.

@@ -83,17 +83,20 @@ def advance(system: System, state: State, duration: float, *, steps: int, backen
     inverse_mass = 1 / system.cloth.mass.unsqueeze(1)
     if system.clamped:
         inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
+    memory = state.memory
     for index in range(steps + 1):
         share = index / steps
         time = state.time + share * duration
         if kernel is None:
-            force = system.force(drive, share, time, x, v)
+            force = system.force(drive, share, time, x, v, memory=memory)
         else:
-            force = kernel.forces(drive, share, x, v) + system.extra_force(drive, share, time, x, v)
-        v = v + (h / 2 if index in (0, steps) else h) * inverse_mass * force
+            extra = system.extra_force(drive, share, time, x, v, memory=memory)
+            force = kernel.forces(drive, share, x, v) + extra
+        v = v + (h / 2 if index in (0, steps) else h) * inverse_mass * system.effective(x, force)
         if index < steps:
-            x = x + h * v
-    return State(position=x, velocity=v, time=state.time + duration)
+            before, x = x, x + h * v
+            memory = system.remembered(memory, before, x)
+    return State(position=x, velocity=v, time=state.time + duration, memory=memory)
 
 
 def _kernel(system: System, state: State, backend: Backend) -> Kernel | None:
