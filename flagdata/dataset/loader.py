@@ -44,14 +44,16 @@ class PairLoader:
             "forkserver", are for callers that hold that lock themselves most of the time.
         order: "shuffled" anew each epoch, or as "stored": by recording and frame.
         last: whether to "keep" or "drop" the last batch when it is not full.
-        memory: "pinned" copies batches to page-locked memory for transfer to a GPU.
+        memory: "pinned" copies batches to page-locked memory for transfer to an accelerator.
+        share: (index, count) of this process among those that train together; each takes every `count`-th batch of one
+            common order, all equally many, so that up to `count` - 1 batches of an epoch are in no share.
 
     Attributes:
         epoch: number of the epoch that the next batch belongs to, from 0.
         cursor: batches of it that were handed out.
 
     Raises:
-        UsageError: sizes that cannot be, or an unknown option.
+        UsageError: sizes that cannot be, an unknown option, or pinned memory where there is no accelerator.
     """
 
     def __init__(
@@ -64,9 +66,12 @@ class PairLoader:
         order: Order = "shuffled",
         last: Last = "keep",
         memory: Memory = "pageable",
+        share: tuple[int, int] = (0, 1),
     ) -> None:
         if batch_size < 1 or workers < 0:
             raise UsageError(f"batches of {batch_size} with {workers} workers", fix="give at least 1 and 0")
+        if not 0 <= share[0] < share[1]:
+            raise UsageError(f"share {share[0]} of {share[1]}", fix="give (index, count) with 0 <= index < count")
         for option, value, known in (
             ("order", order, ("shuffled", "stored")),
             ("last", last, ("keep", "drop")),
@@ -75,16 +80,20 @@ class PairLoader:
         ):
             if value not in known:
                 raise UsageError(f"{option} {value!r}", fix=f"give {' or '.join(map(repr, known))}")
-        if last == "drop" and len(pairs) < batch_size:
-            raise UsageError(
-                f"{len(pairs)} pairs do not fill one batch of {batch_size}", fix="give a smaller batch, or last='keep'"
-            )
+        if memory == "pinned" and not torch.accelerator.is_available():
+            raise UsageError("pinned memory without an accelerator", fix="leave memory at 'pageable'")
         self.pairs = pairs
         self.epoch = 0
         self.cursor = 0
         self._batch_size = batch_size
         self._order: Order = order
         self._last: Last = last
+        self._share = share
+        if not len(self):
+            raise UsageError(
+                f"{len(pairs)} pairs do not make a batch of {batch_size} for each of {share[1]} shares",
+                fix="give a smaller batch, fewer shares, or last='keep'",
+            )
         self._memory: Memory = memory
         self._threads = workers if run_in == "threads" else 0
         self._todo = _Todo()
@@ -103,16 +112,18 @@ class PairLoader:
             )
 
     def __len__(self) -> int:
-        """Batches in a whole epoch."""
+        """Batches of this share in a whole epoch."""
         whole, rest = divmod(len(self.pairs), self._batch_size)
-        return whole + (rest > 0 and self._last == "keep")
+        return (whole + (rest > 0 and self._last == "keep")) // self._share[1]
 
     def batches(self, epoch: int) -> list[list[int]]:
-        """Indices of the pairs in each batch of an epoch, in order."""
+        """Indices of the pairs in each batch of this share in an epoch, in order."""
         n, size = len(self.pairs), self._batch_size
         shuffled = self._order == "shuffled"
         order = stream(self.pairs.seed, "pairs", "order", epoch).permutation(n) if shuffled else np.arange(n)
-        return [order[k * size : (k + 1) * size].tolist() for k in range(len(self))]
+        index, count = self._share
+        numbers = range(index, len(self) * count, count)
+        return [order[k * size : (k + 1) * size].tolist() for k in numbers]
 
     def __iter__(self) -> Iterator[Batch]:
         """The batches of the epoch that are left.
@@ -161,6 +172,7 @@ class PairLoader:
             "batch_size": self._batch_size,
             "order": self._order,
             "last": self._last,
+            "share": f"{self._share[0]} of {self._share[1]}",
             "epoch": self.epoch,
             "cursor": self.cursor,
         }

@@ -110,6 +110,7 @@ class Pairs(Dataset[Sample]):
         order: Order = "shuffled",
         last: Last = "keep",
         memory: Memory = "pageable",
+        share: tuple[int, int] = (0, 1),
     ) -> PairLoader:
         """Batches in a deterministic order that can be saved and taken up again; see `PairLoader`."""
         return PairLoader(
@@ -120,6 +121,7 @@ class Pairs(Dataset[Sample]):
             order=order,
             last=last,
             memory=memory,
+            share=share,
         )
 
     def _clip(self, index: int) -> torch.Tensor:

@@ -130,6 +130,39 @@ def test_an_iteration_left_early_is_taken_up_where_it_stopped(pairs, expected, w
     assert epoch(loader) == expected[0][4:]
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_a_loader_in_use_can_be_set_back(pairs, expected, way):
+    loader = pairs.loader(7, **way)
+    begin = loader.state_dict()
+    for _, _ in zip(loader, range(3), strict=False):
+        pass
+    loader.load_state_dict(begin)
+    assert epoch(loader) == expected[0]
+
+
+def test_shares_of_processes_that_train_together_are_equal_and_disjoint(pairs, expected):
+    shares = [epoch(pairs.loader(7, share=(index, 3), workers=2)) for index in range(3)]
+    assert [len(share) for share in shares] == [2, 2, 2]  # of 7 batches; the seventh is in no share
+    assert [batch for turn in zip(*shares, strict=True) for batch in turn] == expected[0][:6]
+    alone = pairs.loader(7, share=(0, 3)).state_dict()
+    with pytest.raises(RefusedError, match="share was '0 of 3', is '1 of 3'"):
+        pairs.loader(7, share=(1, 3)).load_state_dict(alone)
+
+
+@pytest.mark.skipif(torch.accelerator.is_available(), reason="there is an accelerator")
+def test_pinned_memory_without_an_accelerator_is_an_error(pairs):
+    with pytest.raises(UsageError, match="without an accelerator"):
+        pairs.loader(7, memory="pinned")
+
+
+@pytest.mark.skipif(not torch.accelerator.is_available(), reason="there is no accelerator")
+@pytest.mark.parametrize("way", WAYS)
+def test_pinned_batches_are_the_same_and_pinned(pairs, expected, way):
+    batches = list(pairs.loader(7, memory="pinned", **way))
+    assert all(batch.clip.is_pinned() and batch.wind.is_pinned() for batch in batches)
+    assert [contents(batch) for batch in batches] == expected[0]
+
+
 def test_a_state_of_other_data_or_options_is_refused_by_name(field_lake, pairs):
     state = pairs.loader(7).state_dict()
     with pytest.raises(RefusedError, match="batch_size was 7, is 8"):
@@ -164,11 +197,12 @@ def test_loading_draws_nothing_from_the_global_random_stream(pairs):
     assert torch.equal(torch.rand(3), expected)
 
 
-def test_batches_from_the_decoded_cache_are_the_same(field_lake, expected, tmp_path):
+@pytest.mark.parametrize("run_in", ["threads", "fork"])
+def test_batches_from_the_decoded_cache_are_the_same(field_lake, expected, tmp_path, run_in):
     cache = DecodedCache(tmp_path / "cache", limit=10**8)
     cached = flagdata.open(field_lake.path).pairs(at="v1", seed=11, cache=cache)
-    loader = cached.loader(7, workers=2, run_in="fork")
-    assert epoch(loader) == expected[0]  # filled by two processes at once
+    loader = cached.loader(7, workers=2, run_in=run_in)
+    assert epoch(loader) == expected[0]  # filled by two workers at once
     assert epoch(loader) == expected[1]  # read back
     assert cache.size() > 48 * 30 * 32 * 32
 
@@ -212,6 +246,8 @@ def test_worker_processes_end_with_their_loader(pairs):
         {"batch_size": 1, "memory": "fast"},
         {"batch_size": 1, "run_in": "fibres"},
         {"batch_size": 49, "last": "drop"},
+        {"batch_size": 30, "share": (0, 3)},
+        {"batch_size": 1, "share": (2, 2)},
     ],
 )
 def test_options_that_cannot_be_are_usage_errors(pairs, options):
