@@ -109,11 +109,8 @@ class Catalog:
         self._files: dict[str, pa.Table] = {}
         self._rows: tuple[int, pa.Table] | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["path"])
+    def __reduce__(self) -> tuple[type[Catalog], tuple[Path]]:
+        return (Catalog, (self.path,))
 
     @_one_at_a_time
     def create(self, info: Mapping[str, str]) -> None:

@@ -59,19 +59,18 @@ class Lake:
                     f"there is {what} already", where=str(lake.path), fix="choose an empty or new folder"
                 )
             lake.path.mkdir(parents=True, exist_ok=True)
-            for store in STORES:
-                (lake.path / store).mkdir()
-            lake.staging.mkdir()
-            lake.refs.make_folders()
-            lake.catalog.create({"message": "create the lake", "code_version": provenance.code_version()})
-            marker = {
-                "schema": _MARKER_SCHEMA,
-                "format_version": FORMAT_VERSION,
-                "lake": uuid.uuid4().hex,
-                "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            }
-            if not put_if_absent(lake.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode()):
-                raise ConflictError("another process made a lake there", where=str(lake.path), fix="open that one")
+            try:
+                lake.staging.mkdir()  # whoever makes it, makes the lake
+            except FileExistsError:
+                raise ConflictError(
+                    "another process is making a lake there", where=str(lake.path), fix="open that one"
+                ) from None
+            try:
+                lake._fill()
+            except BaseException:
+                for entry in lake.path.iterdir():
+                    Objects.remove(entry)
+                raise
         return lake
 
     @classmethod
@@ -100,6 +99,19 @@ class Lake:
         if version > FORMAT_VERSION:
             raise newer(f"it has format {version}", lake.path)
         return lake
+
+    def _fill(self) -> None:
+        for store in STORES:
+            (self.path / store).mkdir()
+        self.refs.make_folders()
+        self.catalog.create({"message": "create the lake", "code_version": provenance.code_version()})
+        marker = {
+            "schema": _MARKER_SCHEMA,
+            "format_version": FORMAT_VERSION,
+            "lake": uuid.uuid4().hex,
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        put_if_absent(self.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode())
 
     @contextmanager
     def transaction(self, message: str, *, branch: str = MAIN) -> Iterator[Transaction]:

@@ -210,6 +210,26 @@ def test_a_lake_is_not_made_where_something_is(lake: Lake, tmp_path: Path) -> No
         Lake.create(tmp_path / "other" / "file")
 
 
+def test_a_lake_that_could_not_be_made_leaves_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(FlagdataError, match="creating a lake failed"):
+            Lake.create(tmp_path / "lake")
+    assert list((tmp_path / "lake").iterdir()) == []
+    assert Lake.create(tmp_path / "lake").rows().num_rows == 0
+
+
+def test_of_several_processes_that_make_a_lake_at_once_one_does(tmp_path: Path) -> None:
+    code = "import sys; from flagdata.cli import main; main(['init', sys.argv[1]])"
+    command = [sys.executable, "-c", code, str(tmp_path / "lake")]
+    started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for _ in range(4)]
+    assert sorted(process.wait(timeout=60) for process in started) == [0, 1, 1, 1]
+    assert doctor(Lake.open(tmp_path / "lake"), grace=NOW) == ()
+
+
 def test_a_folder_without_a_lake_is_told_with_the_fix(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match="flagdata init"):
         Lake.open(tmp_path)
