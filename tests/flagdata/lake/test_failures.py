@@ -91,10 +91,11 @@ def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_s
     assert lake.rows()["name"].to_pylist() == ["before", *(f"step {i}" for i in range(step + 1))]
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_that_may_not_be_written_is_a_clear_error(lake: Lake, put_text: Put) -> None:
     store = lake.path / "mcap"
     store.chmod(0o555)
+    if os.access(store, os.W_OK):
+        pytest.skip("this user may write everywhere")
     try:
         with pytest.raises(FlagdataError, match="write permission"):
             put_text(lake, "a")
