@@ -13,7 +13,7 @@ import pytest
 import torch
 
 import flagdata
-from flagdata.dataset import DecodedCache
+from flagdata.dataset import DecodedCache, collate
 from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.lake import Lake
 
@@ -269,3 +269,9 @@ def test_a_record_that_is_open_may_be_read_after_a_fork(pairs):
     child.join()
     assert child.exitcode == 0
     assert np.array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_torchs_own_loader_works_too(pairs, workers):
+    loader = torch.utils.data.DataLoader(pairs, batch_size=16, num_workers=workers, collate_fn=collate)
+    assert [a for batch in loader for a in batch.artifact] == pairs.table.artifact.tolist()
