@@ -89,9 +89,7 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
         return
     for column, value in row.items():
         if value is not None and value != [] and column not in ("parents", "report"):
-            click.echo(
-                f"{column:<15} {json.dumps(value, ensure_ascii=False) if isinstance(value, dict | list) else value}"
-            )
+            click.echo(f"{column:<15} {_said(column, value)}")
     if path is not None:
         click.echo(f"{'path':<15} {path}")
     for label, relatives in (("made from", parents), ("made into", children)):
@@ -256,6 +254,19 @@ def _line(row: Mapping[str, Any]) -> list[object]:
         size_text(row["object_bytes"]),
         ",".join(row["quality"]),
     ]
+
+
+def _said(column: str, value: object) -> str:
+    """A value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
+    from flagdata.schema import CATALOG
+    from flagdata.timebase import iso
+
+    unit = CATALOG[column].unit
+    if unit == "ns" and isinstance(value, int):
+        return iso(value)
+    if isinstance(value, dict | list):
+        return json.dumps(value, ensure_ascii=False)
+    return f"{value} {unit}" if unit not in ("", "1") else str(value)
 
 
 def _relative(row: Mapping[str, Any]) -> dict[str, str]:

@@ -84,6 +84,7 @@ def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake:
     assert [relative["name"] for relative in shown["parents"]] == ["parent"]
     assert Path(shown["path"]).read_text() == "child"
     assert f"made into       {child.id[:12]} wind child" in run("show", parent.id).out.splitlines()
+    assert "object_bytes    5 B" in run("show", child.id).out.splitlines()
     assert run("show", "nothing").code == 1
     assert run("ls", "--kind", "clip", "--json").document["artifacts"] == []
     misspelt = run("ls", "--kind", "widn")
