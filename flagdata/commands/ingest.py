@@ -410,4 +410,5 @@ def _guess(guess: Guess) -> dict[str, Any]:
         "score": guess.score,
         "reasons": list(guess.reasons),
         "fix": guess.fix,
+        "draft": guess.draft,
     }

@@ -62,6 +62,9 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
             click.echo(f"    to do: {guess['fix']}")
+        if guess["draft"]:
+            click.echo("    a draft of a recipe, to complete and name by --recipe FILE.toml:")
+            click.echo("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
     if "problem" in entry:
         click.echo(f"  {entry['problem']['what']}: {entry['problem']['fix']}")
     if "camera" in entry:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.draft import draft
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
@@ -21,13 +22,24 @@ class Delimited:
     uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """The recipe whose columns the header names, if one does; the one with most columns in common."""
+        """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
         best: Guess | None = None
         for name in recipes.names():
             guess = _match(recipes.load(name), name, head)
             if guess and (best is None or guess.score > best.score):
                 best = guess
-        return best
+        if best is not None:
+            return best
+        proposal = draft(head.lines)
+        if proposal is None:
+            return None
+        return Guess(
+            format="delimited",
+            score=0.3,
+            reasons=("no recipe of the catalog names these columns", *proposal.reasons),
+            fix="save the draft that --sniff prints, complete it, and name it: --recipe FILE.toml",
+            draft=proposal.toml,
+        )
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a file by the recipe in `options`."""

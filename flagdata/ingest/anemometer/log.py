@@ -85,7 +85,8 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         seen = "; ".join(reason for guess in guesses for reason in guess.reasons)
         raise InputError(
             f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),
-            fix="describe it by a recipe (--recipe FILE.toml) or name its --format",
+            fix=(guesses[0].fix if guesses else None)
+            or "describe it by a recipe (--recipe FILE.toml) or name its --format",
         )  # fmt: skip
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons

@@ -19,6 +19,7 @@ class Guess:
         kind: which ingest it belongs to.
         recipe: the sensor recipe, for the format "delimited" and "host-stamped".
         fix: what to do next, where that is not to ingest it.
+        draft: a recipe to complete (TOML), for a table that no recipe describes.
     """
 
     format: str
@@ -27,6 +28,7 @@ class Guess:
     kind: GuessKind = "anemometer"
     recipe: str | None = None
     fix: str | None = None
+    draft: str | None = None
 
 
 SURE = 0.5
