@@ -51,8 +51,9 @@ class LagSearch:
     Attributes:
         centre: offset around which to search [s]: what the stamps say, 0 if they are believed.
         window: the search goes from centre − window to centre + window [s].
-        response: time by which the flag's motion follows the wind at the anemometer [s]: about L/U for the flag itself,
-            less the delay of the sensor (distance constant / U), plus the way between the two.
+        response: time by which the flag's motion follows the wind that the bins report [s]: about L/U for a flag of
+            length L, and d/U where the sensor stands d upwind of it. The sensor's own lag is not part of it: see
+            `flagdata.align.windbins`.
         response_sigma: its standard uncertainty [s]. It bounds from below what this method can know.
         stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut to whole seconds.
         overlap: least time both must cover [s].
@@ -65,7 +66,7 @@ class LagSearch:
 
     centre: float = 0.0
     window: float = 120.0
-    response: float = 0.4
+    response: float = 0.3
     response_sigma: float = 0.15
     stamp_sigma: float = 0.0
     overlap: float = 120.0

@@ -2,7 +2,8 @@
 
 A bin's stamp is easily half a sample off: a reading stamped t may be of that instant or the mean of the time since the
 reading before. For clips that is nothing; for a clock offset it is the error. So each bin's instant is set by its
-samples' own stamps and by how long the instrument averages, and what is not known of that goes into σ.
+samples' own stamps, by how long the instrument averages and by how late it follows, and what is not known of that goes
+into σ.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer.averaging import average
 from flagdata.schema import UNUSABLE
-from flagdata.signals import WindAverage, WindSeries
+from flagdata.signals import Sensor, WindAverage, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 SHORTEST = 1.0  # s, of a bin: gusts that flag and sensor share are slower
 _LONGEST = 60.0  # s
 _REACH = 20  # samples
+_HEAVIEST = 3.0  # m, distance constant of heavy cups
+_TRUST = 0.2  # of a stated distance constant: U varies, and makers measure it in steady wind
+_SLOWEST = 0.5  # m/s, below which rotating sensors hardly turn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +33,8 @@ class WindBins:
 
     Attributes:
         average: the bins.
-        sigma: standard uncertainty of all their instants together [s]: what is not known of the instrument's averaging.
+        sigma: standard uncertainty of all their instants together [s]: what is not known of the
+            instrument's averaging and lag.
     """
 
     average: WindAverage
@@ -39,8 +44,10 @@ class WindBins:
 def wind_bins(series: WindSeries) -> WindBins:
     """Bins of 1 s, or of the time between samples where that is longer.
 
-    With c the time by which a sample's air precedes its stamp: half the sensor's averaging where its recipe states it;
-    else anything from 0 (a reading of the instant) to half the time between samples, so its middle ± 1/√12 of it.
+    A sample's air precedes its stamp by the sum of two times. Half the sensor's averaging, where its recipe states it;
+    else anything from 0 (a reading of the instant) to half the time between samples. And ℓ/U, the lag of a rotating
+    sensor of distance constant ℓ in a mean wind U (Kristensen, 1998); where the recipe states no ℓ, anything from 0 (a
+    sonic) to 3 m (a heavy cup). A range counts as its middle ± 1/√12 of its width; a stated ℓ is trusted to 20 %.
 
     Raises:
         InputError: no wind speed, fewer than two usable samples, or samples more than a minute apart.
@@ -74,13 +81,25 @@ def wind_bins(series: WindSeries) -> WindBins:
     origin = int(shifted[0])
     stamps = np.add.reduceat((shifted - origin).astype(np.float64), starts) / counts
     middles = (means.time - origin).astype(np.float64) - length / 2
-    stated = series.sensor.averaging
-    lead = stated / 2 if stated is not None else spacing / 4
+    lead, sigma = _lead(series.sensor, spacing, float(np.mean(series.channels["wind_speed"][usable])))
     move = float(np.median(stamps - middles)) - lead * NANOSECONDS
-    return WindBins(
-        average=replace(means, time=means.time + shift + round(move)),
-        sigma=0.0 if stated is not None else spacing / (4 * math.sqrt(3)),
-    )
+    return WindBins(average=replace(means, time=means.time + shift + round(move)), sigma=sigma)
+
+
+def _lead(sensor: Sensor, spacing: float, speed: float) -> tuple[float, float]:
+    """By how much a sample's air precedes its stamp, and its standard uncertainty [s]."""
+    rectangle = 1 / math.sqrt(12)
+    if sensor.averaging is not None:
+        averaging, averaging_sigma = sensor.averaging / 2, 0.0
+    else:
+        averaging, averaging_sigma = spacing / 4, rectangle * spacing / 2
+    wind = max(speed, _SLOWEST)
+    if sensor.distance_constant is not None:
+        lag = sensor.distance_constant / wind
+        lag_sigma = _TRUST * lag
+    else:
+        lag, lag_sigma = _HEAVIEST / 2 / wind, rectangle * _HEAVIEST / wind
+    return averaging + lag, math.hypot(averaging_sigma, lag_sigma)
 
 
 def _mid_bin_shift(time: np.ndarray, length: int) -> int:

@@ -39,7 +39,7 @@ def _clock_options(command: F) -> F:
             click.option("--window", type=float, metavar="S", help="Search this far either side; 120 by default."),
             click.option(
                 "--response", type=float, metavar="S",
-                help="By how much the flag's motion follows the wind at the anemometer; 0.4 by default.",
+                help="By how much the flag's motion follows the wind at the anemometer; 0.3 by default.",
             ),
             click.option("--response-sigma", type=float, metavar="S", help="Its uncertainty; 0.15 by default."),
             click.option(

@@ -35,8 +35,8 @@ class Scene:
     sensor_noise: float = 0.1
     flag_noise: float = 0.35
     exponent: float = 1.6
-    response: float = 0.4
-    memory: float = 0.5
+    response: float = 0.3
+    memory: float = 0.3
     apart: float = 3.0
     drift: float = 0.0
     period: float = 1.0

@@ -44,7 +44,7 @@ def test_intervals_of_two_hundred_field_recordings_cover_the_offset_at_their_lev
     errors, sigmas, covered = [], [], 0
     for seed in range(200):
         rng = stream(seed, "field")
-        response = max(0.05, rng.normal(0.4, 0.15))
+        response = max(0.05, rng.normal(0.3, 0.15))
         offset = rng.uniform(-110, 110)
         found = estimate(
             scene(
@@ -78,12 +78,12 @@ def test_the_offset_does_not_depend_on_the_generator(scene: Scenes) -> None:
     assert found[0].sigma == found[1].sigma
 
 
-def test_a_monotone_transform_of_the_motion_does_not_move_the_offset_much(scene: Scenes) -> None:
-    """Ranks of bin means see the energy through an average, so not exactly nothing moves; well under σ."""
+def test_a_monotone_transform_of_the_wind_moves_nothing(scene: Scenes) -> None:
     motion, wind = scene(seed=3, offset=5.0, apart=1.5)
     plain = estimate((motion, wind), surrogates=60)
-    rooted = estimate((replace(motion, energy=np.sqrt(motion.energy)), wind), surrogates=60)
-    assert rooted.offset == pytest.approx(plain.offset, abs=plain.sigma)
+    squared = estimate((motion, replace(wind, speed=wind.speed**2)), surrogates=60)
+    assert squared.offset == plain.offset
+    assert squared.sigma == plain.sigma
 
 
 def test_shifting_the_cameras_clock_shifts_the_offset_by_as_much(scene: Scenes) -> None:

@@ -68,7 +68,7 @@ def fill(lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | 
             time=START + stamps.astype(np.int64) * SECOND,
             channels={"wind_speed": speed},
             flags=np.zeros(len(stamps), dtype=np.uint16),
-            sensor=Sensor(name="cup", averaging=1.0),
+            sensor=Sensor(name="sonic", averaging=1.0, distance_constant=0.0),
         )
         with RecordWriter(path, metadata={}) as record:
             record.wind(series)

@@ -34,7 +34,7 @@ def ramp_log(
         time=START + np.round(stamp * SECOND).astype(np.int64),
         channels={"wind_speed": speed},
         flags=np.zeros(count, dtype=np.uint16),
-        sensor=Sensor(name="ramp", averaging=stated),
+        sensor=Sensor(name="ramp", averaging=stated, distance_constant=0.0),
     )
 
 
@@ -101,3 +101,28 @@ def test_logs_that_cannot_show_gusts_say_so() -> None:
     other = WindSeries(time=one.time, channels={"air_temperature": np.ones(1)}, flags=one.flags, sensor=one.sensor)
     with pytest.raises(InputError, match="no channel wind_speed"):
         wind_bins(other)
+
+
+def slow_sensor(distance_constant: float | None) -> WindSeries:
+    """A steady 5 m/s, one instant a second."""
+    return WindSeries(
+        time=START + np.arange(60, dtype=np.int64) * SECOND,
+        channels={"wind_speed": np.full(60, 5.0)},
+        flags=np.zeros(60, dtype=np.uint16),
+        sensor=Sensor(name="cup", averaging=0.0, distance_constant=distance_constant),
+    )
+
+
+def test_a_rotating_sensor_reports_air_that_passed_its_distance_constant_over_the_speed_ago() -> None:
+    quick, slow = wind_bins(slow_sensor(0.0)), wind_bins(slow_sensor(2.5))
+    # 2.5 m at 5 m/s: half a second, trusted to 20 %.
+    assert (quick.average.time - slow.average.time == SECOND // 2).all()
+    assert slow.sigma == pytest.approx(0.1)
+    assert quick.sigma == 0.0
+
+
+def test_an_unknown_sensor_may_be_a_sonic_or_a_heavy_cup() -> None:
+    quick, unknown = wind_bins(slow_sensor(0.0)), wind_bins(slow_sensor(None))
+    # 0 to 3 m at 5 m/s: 0.3 s ± 0.6/√12.
+    assert (quick.average.time - unknown.average.time == 3 * SECOND // 10).all()
+    assert unknown.sigma == pytest.approx(0.6 / np.sqrt(12))
