@@ -18,7 +18,7 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from flagdata.errors import InputError, LimitError, NotFoundError, TimeError, UsageError
-from flagdata.findings import Finding
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.stamps import Timing, survey
 from flagdata.ingest.camera.truncation import cut_off, truncation
@@ -163,11 +163,12 @@ def _choose(container: InputContainer, path: Path) -> VideoStream:
 def packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Packet]:
     """Packets of the stream, the empty one that flushes the decoder last; damage of the container ends them.
 
-    `survey_file` reports such damage.
+    `survey_file` reports such damage. PyAV's IndexError comes in place of the flushing packet when a stream appeared in
+    the middle of the file.
     """
     try:
         yield from container.demux(stream)
-    except av.error.FFmpegError:
+    except (av.error.FFmpegError, IndexError):
         flush = av.Packet()
         flush.stream = stream
         yield flush
@@ -186,8 +187,8 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
     with container:
         tally = _tally(container, stream, path, options.limits)
         timing = _timing(path, options, container, stream, tally)
-        if tally.unreadable is not None:
-            return timing, [tally.unreadable]
+        if tally.problem is not None:
+            return timing, [tally.problem]
         return timing, truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
 
 
@@ -198,7 +199,7 @@ class _Tally:
     stamps: array[int] = field(default_factory=lambda: array("q"))
     missing: int = 0
     discarded: int = 0
-    unreadable: Finding | None = None
+    problem: Finding | None = None
 
     @property
     def frames(self) -> int:
@@ -228,7 +229,12 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
                 )  # fmt: skip
     except av.error.FFmpegError as error:
         what = f"the container cannot be read any further ({error.strerror})"
-        tally.unreadable = cut_off(what, tally.frames, 1)
+        tally.problem = cut_off(what, tally.frames, 1)
+    except IndexError:
+        tally.problem = Finding(
+            kind="stream-appeared", severity=Severity.WARNING,
+            what="another stream appears in the middle of the file, which is damaged or was joined from several",
+        )  # fmt: skip
     return tally
 
 

@@ -269,16 +269,13 @@ def test_black_and_white_of_both_ranges_come_out_as_0_and_255(
         assert np.abs(middles).max() <= 3, name
 
 
-def test_sound_beside_the_video_changes_nothing(
-    tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
-) -> None:
-    path = tmp_path / "sound.mp4"
-    with av.open(str(path), "w") as out:
+def write_with_sound(path: Path, numbers: range, numbered: Callable[..., np.ndarray]) -> Path:
+    with av.open(str(path), "w", options={"mpegts_copyts": "1"} if path.suffix == ".ts" else {}) as out:
         video = out.add_stream("libx264", rate=25, options={"preset": "ultrafast", "crf": "12"})
         video.width = video.height = 96
         video.pix_fmt = "yuv420p"
         sound = out.add_stream("aac", rate=48_000)
-        for i in range(10):
+        for i in numbers:
             frame = av.VideoFrame.from_ndarray(numbered(i), format="gray").reformat(format="yuv420p", threads=1)
             frame.pts, frame.time_base = i, Fraction(1, 25)
             out.mux(video.encode(frame))
@@ -287,8 +284,35 @@ def test_sound_beside_the_video_changes_nothing(
             out.mux(sound.encode(noise))
         out.mux(video.encode())
         out.mux(sound.encode())
-    _, frames, _ = read(path, plain)
+    return path
+
+
+def test_sound_beside_the_video_changes_nothing(
+    tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
+) -> None:
+    _, frames, _ = read(write_with_sound(tmp_path / "sound.mp4", range(10), numbered), plain)
     assert [number_of(f.image) for f in frames] == list(range(10))
+
+
+def test_a_stream_that_appears_in_the_middle_is_noticed_and_costs_no_frame(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, numbered: Callable[..., np.ndarray],
+    number_of: Callable[..., int],
+) -> None:  # fmt: skip
+    # Long enough that the opening does not read as far as the second part.
+    noise = np.random.default_rng(1)
+    silent = write_video(
+        tmp_path / "a.ts", range(150), tick=Fraction(1, 25), muxer={"mpegts_copyts": "1"},
+        encoder={"preset": "ultrafast", "qp": "0", "bf": "0"},
+        picture=lambda n: np.clip(numbered(n).astype(int) + noise.integers(-9, 10, (96, 96)), 0, 255).astype(np.uint8),
+    )  # fmt: skip
+    both = tmp_path / "both.ts"
+    sound = write_with_sound(tmp_path / "b.ts", range(150, 160), numbered)
+    both.write_bytes(silent.read_bytes() + sound.read_bytes())
+    _, frames, found = read(both, plain)
+    numbers = [number_of(f.image) for f in frames]
+    # Those at the seam may be doubtful.
+    assert set(range(148)) <= set(numbers)
+    assert found["stream-appeared"].severity is Severity.WARNING
 
 
 def test_a_raw_stream_needs_a_rate_and_then_keeps_its_frames(
