@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import av
+import av.error
 import numpy as np
 import pytest
+from av.container import InputContainer
+from av.video.stream import VideoStream
 
 from flagdata.errors import InputError, NotFoundError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, probe
+from flagdata.ingest.camera.container import packets
 from flagdata.signals import CameraInfo, Frame
 
 MS = 1_000_000
@@ -294,25 +298,24 @@ def test_sound_beside_the_video_changes_nothing(
     assert [number_of(f.image) for f in frames] == list(range(10))
 
 
-def test_a_stream_that_appears_in_the_middle_is_noticed_and_costs_no_frame(
-    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int],
-) -> None:  # fmt: skip
-    # Long enough that the opening does not read as far as the second part.
-    noise = np.random.default_rng(1)
-    silent = write_video(
-        tmp_path / "a.ts", range(150), tick=Fraction(1, 25), muxer={"mpegts_copyts": "1"},
-        encoder={"preset": "ultrafast", "qp": "0", "bf": "0"},
-        picture=lambda n: np.clip(numbered(n).astype(int) + noise.integers(-9, 10, (96, 96)), 0, 255).astype(np.uint8),
-    )  # fmt: skip
-    both = tmp_path / "both.ts"
-    sound = write_with_sound(tmp_path / "b.ts", range(150, 160), numbered)
-    both.write_bytes(silent.read_bytes() + sound.read_bytes())
-    _, frames, found = read(both, plain)
-    numbers = [number_of(f.image) for f in frames]
-    # Those at the seam may be doubtful.
-    assert set(range(148)) <= set(numbers)
-    assert found["stream-appeared"].severity is Severity.WARNING
+def test_a_container_that_breaks_off_still_flushes_the_decoder(cfr60: Path) -> None:
+    # A stream that appears in the middle of a damaged transport stream makes PyAV raise IndexError at the end.
+    class Torn:
+        def __init__(self, whole: InputContainer, error: Exception) -> None:
+            self.whole, self.error = whole, error
+
+        def demux(self, stream: VideoStream) -> Iterator[av.Packet]:
+            for packet in self.whole.demux(stream):
+                if packet.size == 0:
+                    raise self.error
+                yield packet
+
+    for error in (IndexError("list index out of range"), av.error.InvalidDataError(1, "torn")):
+        with av.open(str(cfr60)) as whole:
+            stream = whole.streams.video[0]
+            given = list(packets(Torn(whole, error), stream))
+            assert [p.size == 0 for p in given] == [False] * 120 + [True]
+            assert sum(len(p.decode()) for p in given) == 120
 
 
 def test_a_raw_stream_needs_a_rate_and_then_keeps_its_frames(
