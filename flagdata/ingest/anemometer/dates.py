@@ -74,7 +74,7 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
         reason = f"{days_first or days_second} of the first {len(parts)} dates have a {number} number above 12"
         if told is not None and told != order:
             raise TimeError(
-                f"dates are not {told}: {reason}", where=where, fix=f"leave the date order out, it is {order}"
+                f"dates are not {told}: {reason}", where=where, fix=f"leave out --date-order, it is {order}"
             )
         return Decision(order=order, separator=separator, long_year=long_year, reason=reason)
     if told is not None:
@@ -88,7 +88,7 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
         return Decision(order=smooth[0], separator=separator, long_year=long_year, reason=reason)
     raise TimeError(
         f"{dated[0].strip()[:10]} may be day/month or month/day, and nothing in the log tells", where=where,
-        fix="give the date order: dmy or mdy",
+        fix="give --date-order dmy or mdy",
     )  # fmt: skip
 
 

@@ -48,7 +48,9 @@ class Delimited:
         recipe = recipes.load(options.recipe)
         if recipe.file.host:
             raise UsageError(
-                f"the recipe {recipe.name} is for host-stamped lines", where=str(source.path), fix="use that format"
+                f"the recipe {recipe.name} is for host-stamped lines",
+                where=str(source.path),
+                fix="use --as host-stamped",
             )
         rows = RowReader(source, recipe.file)
         return read_table(rows, recipe, where=str(source.path), zone_name=options.zone).reading

@@ -73,12 +73,14 @@ class HostStamped:
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a file by the recipe in `options`."""
         if options.recipe is None:
-            raise UsageError("the format host-stamped needs a recipe", where=str(source.path), fix="give --recipe")
+            raise UsageError(
+                "the format host-stamped needs a recipe", where=str(source.path), fix="name one by --recipe"
+            )
         recipe = recipes.load(options.recipe)
         if not recipe.file.host:
             raise UsageError(
                 f"the recipe {recipe.name} says nothing of a host's stamp", where=str(source.path),
-                fix="add host = \"iso\" to its [file], or use the format delimited",
+                fix="add host = \"iso\" to its [file], or use --as delimited",
             )  # fmt: skip
         rows = HostRows(source, recipe)
         return read_table(rows, recipe, where=str(source.path), zone_name=options.zone).reading

@@ -86,7 +86,7 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         raise InputError(
             f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),
             fix=(guesses[0].fix if guesses else None)
-            or "describe it by a recipe (--recipe FILE.toml) or name its --format",
+            or "describe it by a recipe (--recipe FILE.toml) or name its format (--as)",
         )  # fmt: skip
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons

@@ -80,7 +80,9 @@ class TimeLine:
         found: list[Finding] = []
         if kind == "TAG":
             if date is not None:
-                raise UsageError("a date was given, but TAG blocks carry their own", where=where, fix="leave it out")
+                raise UsageError(
+                    "a date was given, but TAG blocks carry their own", where=where, fix="leave out --date"
+                )
             day = np.zeros(len(clock), dtype=np.int64)
             start = 0
         else:
@@ -146,7 +148,7 @@ class TimeLine:
         if date is not None and date.toordinal() - epoch != start:
             raise UsageError(
                 f"the date {date} was given, but the stream begins on {dt.date.fromordinal(start + epoch)}",
-                where=where, fix="leave the date out",
+                where=where, fix="leave out --date",
             )  # fmt: skip
         return start
 

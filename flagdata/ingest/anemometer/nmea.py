@@ -106,7 +106,7 @@ class Nmea:
         if len(stream.talkers) > 1:
             raise InputError(
                 f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments",
-                where=where, fix=f"choose one by talker, e.g. {min(stream.talkers)}",
+                where=where, fix=f"choose one, e.g. --talker {min(stream.talkers)}",
             )  # fmt: skip
         line = np.array(stream.line, dtype=np.int64)
         placed = stream.times.place(line, date=options.date, where=where)
@@ -213,12 +213,12 @@ def _platform(
         if moving is not None and moving > MOVING:
             raise InputError(
                 f"the platform was said to be fixed, but moves at {moving:.1f} kn over ground in the median",
-                where=where, fix="leave out the platform",
+                where=where, fix="leave out --platform",
             )  # fmt: skip
         return _fixed(channels, options)
     if options.azimuth is not None:
         raise UsageError(
-            "an azimuth belongs to a fixed platform", where=where, fix="say platform fixed, or leave it out"
+            "an azimuth belongs to a fixed platform", where=where, fix="add --platform fixed, or leave it out"
         )
     if "wind_speed" in channels:
         text = "wind over ground (MWD) was computed by the instrument from a moving platform's heading and speed"
@@ -226,7 +226,7 @@ def _platform(
     known = (
         f"a platform that moves at {moving:.1f} kn" if moving and moving > MOVING else "a platform of unknown motion"
     )
-    fix = None if moving and moving > MOVING else "if the sensor stands on a mast, say so: platform fixed"
+    fix = None if moving and moving > MOVING else "if the sensor stands on a mast, say so: --platform fixed"
     return channels, (
         Finding(
             kind="apparent-wind-only", severity=Severity.WARNING, value=moving,

@@ -87,7 +87,7 @@ def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]
                     kind="negative-speed", severity=Severity.WARNING, count=count, value=lowest,
                     where=f"line {reading.line[below][0]}",
                     what=f"{count} negative values of {name}, down to {lowest:.3g} m/s; left out of averages",
-                    fix="if calm air reads below zero, give the zero offset",
+                    fix="if calm air reads below zero, give --zero-offset",
                 )
             )  # fmt: skip
     return flags, tuple(found)

@@ -127,7 +127,9 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
     size = path.stat().st_size
     if size > limits.size:
         raise LimitError(
-            f"the file has {size} bytes, more than {limits.size}", where=where, fix="split it, or raise the size limit"
+            f"the file has {size} bytes, more than {limits.size}",
+            where=where,
+            fix="split it, or give read_log wider limits",
         )
     other = signature(head)
     if other:
@@ -135,7 +137,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
     codec = encoding or next((name for bom, name in _BOMS if head.startswith(bom)), None)
     if codec is None and _looks_utf16(head):
         raise InputError(
-            "this looks like UTF-16 without a byte-order mark", where=where, fix="name the encoding: utf-16-le"
+            "this looks like UTF-16 without a byte-order mark", where=where, fix="name it: --encoding utf-16-le"
         )
     if codec is None or not codec.startswith(("utf-16", "utf-32")):
         _refuse_binary(head, where)
@@ -189,13 +191,13 @@ def _settle(path: Path, codec: str | None) -> tuple[str, tuple[Finding, ...]]:
             if codec is not None:
                 raise InputError(
                     f"not valid {codec}: {error.__class__.__name__}",
-                    where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. cp1252",
+                    where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. --encoding cp1252",
                 ) from None  # fmt: skip
             return "latin-1", (
                 Finding(
                     kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
                     what="not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
-                    fix="name the encoding, e.g. cp1252",
+                    fix="name the encoding, e.g. --encoding cp1252",
                 ),
             )  # fmt: skip
     return codec or "utf-8", ()
@@ -222,14 +224,14 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
             tail = int(spans[-1]) - 1
             if lines > limits.rows:
                 raise LimitError(
-                    f"more than {limits.rows} lines", where=where, fix="split the file, or raise the rows limit"
+                    f"more than {limits.rows} lines", where=where, fix="split the file, or give read_log wider limits"
                 )
             if int(spans.max()) > limits.line:
                 at = int(np.append(ends, len(data))[int(np.argmax(spans))])
                 number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
                 raise LimitError(
                     f"a line longer than {limits.line} bytes", where=f"{where}, line {number}",
-                    fix="check that this is the log, or raise the line limit",
+                    fix="check that this is the log, or give read_log wider limits",
                 )  # fmt: skip
             before = lines
             last = chunk[-1:]

@@ -100,7 +100,9 @@ class Toa5:
             )  # fmt: skip
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines)]
         if len(rows) < 4 or not rows[0] or rows[0][0].lstrip("\ufeff") != "TOA5":
-            raise InputError("line 1 does not begin with TOA5", where=f"{where}, line 1", fix="name another --format")
+            raise InputError(
+                "line 1 does not begin with TOA5", where=f"{where}, line 1", fix="name another format by --as"
+            )
         if "TIMESTAMP" not in rows[1] or len(rows[2]) != len(rows[1]):
             raise InputError(
                 "lines 2 and 3 do not name TIMESTAMP and a unit for each column", where=f"{where}, line 2",

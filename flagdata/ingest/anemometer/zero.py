@@ -106,7 +106,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         if zero is None:
             raise RefusedError(
                 f"no zero offset can be estimated: the reading is nowhere idle for {SHORTEST:g} s",
-                fix="give the reading in calm air in m/s, or leave the offset as it is with report",
+                fix="give the reading in calm air: --zero-offset M/S, or leave it as it is: --zero-offset report",
             )
         shift = zero.offset
     elif choice != "report":
@@ -134,7 +134,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
 
 def _report(reading: Reading, zero: Zero, choice: ZeroOffset) -> list[Finding]:
     done = "subtracted" if choice == "estimate" else "not subtracted"
-    fix = None if choice == "estimate" else f"give the zero offset, estimate or {zero.offset:.3g}, to subtract it"
+    fix = None if choice == "estimate" else f"subtract it: --zero-offset estimate, or --zero-offset {zero.offset:.3g}"
     first = f"line {reading.line[np.argmax(zero.idle)]}"
     found = [
         Finding(
