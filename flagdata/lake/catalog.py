@@ -37,8 +37,9 @@ from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_CONFIGURATION = {
+_CONFIGURATION = {  # neither this package nor another's VACUUM may take what an old version is made of
     "delta.enableExpiredLogCleanup": "false",
+    "delta.deletedFileRetentionDuration": "interval 36500 days",
     "delta.logRetentionDuration": "interval 36500 days",
 }
 _INFO_PREFIX = "flagdata."
@@ -242,7 +243,8 @@ class Catalog:
     ) -> None:
         version = table.version() + 1
         path = self.path / f"{uuid.uuid4().hex}.parquet"
-        pq.write_table(rows, path, compression="zstd")
+        # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
+        pq.write_table(rows, path, compression="zstd", store_schema=False, use_dictionary=False)
         flush_file(path)
         flush_folder(self.path)
         now = time.time_ns() // 1_000_000

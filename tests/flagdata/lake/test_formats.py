@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import polars as pl
 import pytest
+from deltalake import DeltaTable
 
 from flagdata.errors import CorruptError, UsageError
 from flagdata.lake import Artifact, Lake
@@ -119,3 +122,23 @@ def test_a_damaged_log_entry_is_told_by_its_name(lake: Lake, put_text: Put) -> N
     findings = doctor(fresh)
     assert {"ref-unreadable", "log-damaged"} <= {f.kind for f in findings}
     assert any(f.where == str(entry) for f in findings)
+
+
+def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    month = 30 * 86_400 * 10**9  # ns; Delta's default is to keep replaced files for a week
+    now = time.time_ns
+    monkeypatch.setattr(time, "time_ns", lambda: now() - month)
+    for i in range(40):
+        put_text(lake, f"{i}")
+        if i == 5:
+            lake.tag("v1")
+    monkeypatch.undo()
+    for path in (lake.path / "catalog").glob("*.parquet"):
+        os.utime(path, ns=(now() - month, now() - month))
+    table = DeltaTable(str(lake.path / "catalog"))
+    assert len(table.file_uris()) < 20  # the small files have been merged, so the first ones are not the head's
+    assert table.vacuum(dry_run=False) == []
+    assert Lake.open(lake.path).rows(at="v1").num_rows == 6
+    assert doctor(lake) == ()
