@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flagdata.dataset.clips import clip_rows
     from flagdata.dataset.loader import PairLoader
     from flagdata.dataset.pairs import Pairs
+    from flagdata.dataset.resolve import SideSize
     from flagdata.dataset.sample import Batch, Sample, collate
     from flagdata.dataset.source import Source
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
@@ -36,6 +37,7 @@ __all__ = [
     "Pairs",
     "Refusal",
     "Sample",
+    "SideSize",
     "Source",
     "Tolerance",
     "TruthSeries",
@@ -53,6 +55,7 @@ _PLACES = {
     "Pairs": "pairs",
     "Refusal": "tolerance",
     "Sample": "sample",
+    "SideSize": "resolve",
     "Source": "source",
     "Tolerance": "tolerance",
     "TruthSeries": "truth",

@@ -33,6 +33,37 @@ class Resolved:
     refused: tuple[Refusal, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class SideSize:
+    """How much one side of a split holds: clips, recordings, and independent groups of recordings."""
+
+    clips: int
+    recordings: int
+    groups: int
+
+
+def side_sizes(
+    lake: Lake, *, where: str | None, at: str | None, split_by: HashedSplit | ExplicitSplit
+) -> dict[str, SideSize]:
+    """Sizes of all sides; arguments as in `Source.sides`, which see for what it raises."""
+    catalog = lake.table(lake.view(at))
+    everything = _clips(catalog, None, _ORIGIN)
+    origins = origins_of(catalog, everything)
+    labels = dict(zip([origin.recording for origin in origins], groups(origins).tolist(), strict=True))
+    chosen = _clips(catalog, where, _ORIGIN)
+    recording_of = dict(zip(chosen["artifact"].to_pylist(), chosen["recording"].to_pylist(), strict=True))
+    sizes: dict[str, SideSize] = {}
+    for side in split_by.sides:
+        held = clips_on_side(catalog, side, split_by) & recording_of.keys()
+        recordings = {recording_of[clip] for clip in held}
+        sizes[side] = SideSize(
+            clips=len(held),
+            recordings=len(recordings),
+            groups=len({labels[recording] for recording in recordings}),
+        )
+    return sizes
+
+
 def resolve(
     lake: Lake,
     *,

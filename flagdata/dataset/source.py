@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.pairs import Pairs
-from flagdata.dataset.resolve import resolve
+from flagdata.dataset.resolve import SideSize, resolve, side_sizes
 from flagdata.dataset.splits import ExplicitSplit, HashedSplit
 from flagdata.dataset.tolerance import Tolerance
 from flagdata.lake import Lake
@@ -75,3 +75,25 @@ class Source:
         )
         paths = tuple(self.lake.object_path(str(name)) for name in resolved.table.objects)
         return Pairs(resolved.table, paths=paths, refused=resolved.refused, at=at, seed=seed, cache=cache)
+
+    def sides(
+        self,
+        where: str | None = None,
+        *,
+        at: str | None = None,
+        split_by: HashedSplit | ExplicitSplit | None = None,
+    ) -> dict[str, SideSize]:
+        """How many clips, recordings and independent groups each side of a split holds, before any tolerance.
+
+        Whole groups go to one side, so that with few of them the shares can be far from the fractions asked for: look
+        here before training.
+
+        Args:
+            where, at, split_by: as in `pairs`.
+
+        Raises:
+            RefusedError: an explicit split leaks.
+            UnknownNameError: no such ref or column.
+            UsageError: a filter that is not SQL.
+        """
+        return side_sizes(self.lake, where=where, at=at, split_by=split_by or HashedSplit())

@@ -3,6 +3,7 @@
 Two recordings that share a session, a day, a seed, a camera file or a mesh sequence are connected, and what is
 connected, through however many recordings, stays on one side. (An anemometer log alone does not connect: two clips an
 hour apart share no pixel and no minute of it.) A simulated recording has no day: its start is a matter of convention.
+It should not be given a session either, unless all that share one are meant to stay together.
 """
 
 from __future__ import annotations

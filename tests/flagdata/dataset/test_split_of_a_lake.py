@@ -110,3 +110,21 @@ def test_every_clip_is_on_exactly_one_side(tangled):
     together = list(itertools.chain(*sides))
     assert len(together) == len(set(together))
     assert len(set(together) | refused) == 240
+
+
+def test_sizes_of_the_sides_are_those_of_their_pairs(tangled):
+    lake, _ = tangled
+    source = flagdata.open(lake.path)
+    split_by = HashedSplit(fractions={"train": 0.4, "validation": 0.3, "test": 0.3})
+    for where in (None, "seed is not null"):
+        sizes = source.sides(where, split_by=split_by)
+        assert list(sizes) == list(SIDES)
+        assert sum(size.clips for size in sizes.values()) == (240 if where is None else 81)
+        for side, size in sizes.items():
+            if size.clips:
+                pairs = source.pairs(where, split=side, split_by=split_by)
+                assert len(pairs) + len(pairs.refused) == size.clips
+            assert size.groups <= size.recordings <= size.clips
+    # A seed is rendered by several recordings, and those are one group: as many groups as seeds.
+    seeds = set(source.pairs("seed is not null").table.seed.tolist())
+    assert sum(size.groups for size in source.sides("seed is not null", split_by=split_by).values()) == len(seeds)
