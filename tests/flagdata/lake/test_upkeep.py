@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 import time
 from collections.abc import Callable
 from datetime import timedelta
@@ -17,6 +18,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect, garbage
 from flagdata.lake.difference import difference
 from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify
+from flagdata.lake.leases import collecting, leases
 from flagdata.schema import Kind
 
 NOW = timedelta(0)
@@ -172,16 +174,37 @@ def test_collection_spares_an_old_orphan_that_a_running_transaction_has_found_ag
     assert lake.object_path(name).read_text() == "again"
 
 
+def test_a_transaction_ends_only_when_no_collector_can_see_it_half_gone(lake: Lake) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with lake.transaction("held open"):
+            begun.set()
+            go_on.wait(60)
+
+    holder = threading.Thread(target=hold)
+    holder.start()
+    assert begun.wait(60)
+    with collecting(lake.staging):
+        go_on.set()
+        holder.join(0.3)  # it wants to end, and may not yet
+        assert [state.alive for state in leases(lake.staging)] == [True]
+    holder.join(60)
+    assert leases(lake.staging) == []
+
+
 def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(
     lake: Lake, put_text: Put
 ) -> None:
-    tagged, untagged = put_text(lake, "tagged"), None
+    tagged = put_text(lake, "tagged")
     lake.tag("v1")
     untagged = put_text(lake, "untagged")
     lake.withdraw([tagged.id, untagged.id], "a person asked for it")
     assert lake.rows().num_rows == 0
     assert lake.rows(at="v1")["name"].to_pylist() == ["tagged"]
-    assert collect(lake, grace=DAY).objects == ()
+    for artifact in (tagged, untagged):
+        age(object_of(lake, artifact), timedelta(days=30))
+    assert collect(lake, grace=DAY).objects == ()  # old, but withdrawn only now
     time.sleep(0.01)  # so that the withdrawal is older than no time at all
     assert collect(lake, grace=NOW).objects == (untagged.object,)
     assert object_of(lake, tagged).read_text() == "tagged"
@@ -218,6 +241,7 @@ def test_a_difference_names_rows_and_objects_both_ways(lake: Lake, put_text: Put
 
 def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
+    orphan = abandon(lake, "orphan")
     left = [
         lake.path / "catalog" / "0123.parquet",
         lake.path / "catalog" / "_delta_log" / "00000000000000000009.json#1",
@@ -228,11 +252,13 @@ def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake
     dead = lake.staging / "0123"
     dead.mkdir()
     owner = {"pid": 1, "host": "here", "since": "then"}
-    (dead / "lease").write_text(json.dumps(owner) + "\n")
+    (dead / "lease").write_text(f"{json.dumps(owner)}\n{orphan}\n")
     findings = doctor(lake, grace=NOW)
-    assert sorted(kinds(findings)) == ["staging-left", "write-left", "write-left", "write-left"]
+    assert sorted(kinds(findings)) == ["orphan", "staging-left", "write-left", "write-left", "write-left"]
     assert "process 1 on here" in next(f.what for f in findings if f.kind == "staging-left")
-    assert set(collect(lake, grace=NOW).leftovers) == {*left, dead}
+    collected = collect(lake, grace=NOW)
+    assert set(collected.leftovers) == {*left, dead}
+    assert collected.objects == (orphan,)  # the dead hold nothing
     assert doctor(lake, grace=NOW) == ()
     assert lake.rows().num_rows == 1
 
