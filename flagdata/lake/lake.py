@@ -294,7 +294,7 @@ class Lake:
 
 
 def _usable(path: Path | str) -> Path:
-    whole = Path(path).absolute()
+    whole = Path(path).resolve()
     if unquote(str(whole)) != str(whole):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
         raise UsageError(
             "the path of a lake cannot have a percent sign before two hexadecimal digits",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
@@ -20,7 +21,7 @@ class Marked:
     Attributes:
         refs: each ref (main, branches, tags) → its rows, in the catalog's schema.
         objects: names of all objects that a row of a ref, or one withdrawn within the grace period, points to.
-        findings: refs that cannot be read; while there are any, nothing may be collected.
+        findings: refs that cannot be read or are lost; while there are any, nothing may be collected.
     """
 
     refs: dict[str, pa.Table]
@@ -43,11 +44,28 @@ def mark(lake: Lake, *, grace: timedelta) -> Marked:
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
+        findings += _lost(lake.catalog.rows(lake.catalog.head()), names)
         recent = [lake.catalog.rows(v - 1) for v in _withdrawals(lake, datetime.now(UTC) - grace)]
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
     objects = {name for table in (*refs.values(), *recent) for name in table["object"].drop_null().to_pylist()}
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
+
+
+def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
+    rows = Counter(head["branch"].to_pylist())
+    return [
+        Finding(
+            kind="branch-lost",
+            severity=Severity.ERROR,
+            what=f"{count} rows are on branch {name!r}, which is not among the refs: no ref shows them",
+            where=f"ref {name}",
+            count=count,
+            fix=f"restore refs/branches/{name}.json from a copy",
+        )
+        for name, count in sorted(rows.items())
+        if name not in known
+    ]
 
 
 def _withdrawals(lake: Lake, since: datetime) -> list[int]:

@@ -123,6 +123,16 @@ def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, 
     assert lake.object_path(name).exists()
 
 
+def test_a_branch_whose_ref_is_lost_is_told_and_its_objects_are_not_collected(lake: Lake, put_text: Put) -> None:
+    lake.branch("try")
+    artifact = put_text(lake, "a", branch="try")
+    (lake.path / "refs" / "branches" / "try.json").unlink()
+    assert kinds(doctor(lake, grace=NOW)) == ["branch-lost"]
+    with pytest.raises(CorruptError, match="try"):
+        collect(lake, grace=NOW)
+    assert object_of(lake, artifact).exists()
+
+
 def test_files_that_are_no_objects_are_strays_and_are_not_deleted(lake: Lake) -> None:
     stray = lake.path / "mcap" / "holiday.mcap"
     stray.write_text("mine")
