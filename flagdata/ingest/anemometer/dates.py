@@ -55,6 +55,8 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
     year_first = [text.strip() for text in dated if _ISO.match(text)]
     if len(year_first) * 2 > len(dated):
         first = year_first[0]
+        if told is not None:
+            raise TimeError(f"dates are not {told}, but {first[:10]}", where=where, fix="leave out --date-order")
         return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
     parts = [match for text in dated if (match := _PARTS.match(text))]
     if len(parts) * 2 <= len(dated) or not parts:

@@ -10,6 +10,7 @@ from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
 
@@ -19,7 +20,7 @@ class Delimited:
 
     name = "delimited"
     about = "delimited text described by a sensor recipe"
-    uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
+    uses = frozenset({"zone", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
         """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
@@ -53,7 +54,9 @@ class Delimited:
                 fix="use --as host-stamped",
             )
         rows = RowReader(source, recipe.file)
-        return read_table(rows, recipe, where=str(source.path), zone_name=options.zone).reading
+        where = str(source.path)
+        reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
+        return with_horizontal(reading, options.azimuth, where=where)
 
 
 def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:

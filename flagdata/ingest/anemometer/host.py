@@ -15,6 +15,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
 
@@ -34,7 +35,7 @@ class HostStamped:
 
     name = "host-stamped"
     about = "raw serial lines, each after the stamp of the computer that logged it"
-    uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
+    uses = frozenset({"zone", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
         """The recipe whose fields most lines after the stamp have, within its ranges.
@@ -83,7 +84,9 @@ class HostStamped:
                 fix="add host = \"iso\" to its [file], or use --as delimited",
             )  # fmt: skip
         rows = HostRows(source, recipe)
-        return read_table(rows, recipe, where=str(source.path), zone_name=options.zone).reading
+        where = str(source.path)
+        reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
+        return with_horizontal(reading, options.azimuth, where=where)
 
 
 def _shape(recipe: Recipe) -> re.Pattern[str]:

@@ -73,7 +73,7 @@ class Kestrel:
 
     name = "kestrel"
     about = "Kestrel weather meter export (CSV)"
-    uses = frozenset({"zone", "encoding", "date_order", "zero_offset"})
+    uses = frozenset({"zone", "date_order"})
 
     def recognise(self, head: Head) -> Guess | None:
         """The device lines and a header with a date-time and a wind speed."""

@@ -66,7 +66,7 @@ class Nmea:
 
     name = "nmea"
     about = "NMEA 0183 sentences MWV and MWD"
-    uses = frozenset({"date", "encoding", "platform", "azimuth", "talker", "zero_offset"})
+    uses = frozenset({"date", "platform", "azimuth", "talker"})
 
     def recognise(self, head: Head) -> Guess | None:
         """Lines that are sentences, most of them with a right checksum, some of them of wind."""
@@ -215,7 +215,7 @@ def _platform(
                 f"the platform was said to be fixed, but moves at {moving:.1f} kn over ground in the median",
                 where=where, fix="leave out --platform",
             )  # fmt: skip
-        return _fixed(channels, options)
+        return _fixed(channels, options, where)
     if options.azimuth is not None:
         raise UsageError(
             "an azimuth belongs to a fixed platform", where=where, fix="add --platform fixed, or leave it out"
@@ -223,10 +223,14 @@ def _platform(
     if "wind_speed" in channels:
         text = "wind over ground (MWD) was computed by the instrument from a moving platform's heading and speed"
         return channels, (Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),)
-    known = (
-        f"a platform that moves at {moving:.1f} kn" if moving and moving > MOVING else "a platform of unknown motion"
-    )
-    fix = None if moving and moving > MOVING else "if the sensor stands on a mast, say so: --platform fixed"
+    fix = None
+    if moving and moving > MOVING:
+        known = f"a platform that moves at {moving:.1f} kn"
+    elif options.platform == "moving":
+        known = "a moving platform, as told"
+    else:
+        known = "a platform of unknown motion"
+        fix = "if the sensor stands on a mast, say so: --platform fixed"
     return channels, (
         Finding(
             kind="apparent-wind-only", severity=Severity.WARNING, value=moving,
@@ -235,14 +239,20 @@ def _platform(
     )  # fmt: skip
 
 
-def _fixed(channels: dict[str, np.ndarray], options: WindOptions) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
+def _fixed(
+    channels: dict[str, np.ndarray], options: WindOptions, where: str
+) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
     kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
+    speed, angle = f"{kind}_wind_speed", f"{kind}_wind_direction"
     out = dict(channels)
-    if "wind_speed" not in out and f"{kind}_wind_speed" in out:
-        out["wind_speed"] = out.pop(f"{kind}_wind_speed")
-        angle = f"{kind}_wind_direction"
-        if options.azimuth is not None and angle in out:
-            out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
+    stated = "wind_speed" in out
+    if not stated and speed in out:
+        out["wind_speed"] = out.pop(speed)
+    if options.azimuth is not None:
+        if stated or angle not in out:
+            what = "the stream states wind over ground itself" if stated else "the stream has no directions"
+            raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
+        out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
     text = f"fixed platform, as told: {kind} wind is wind over ground"
     return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
 

@@ -75,8 +75,11 @@ class WindOptions:
         check_zero_offset(self.zero_offset, where="zero_offset")
 
     def given(self) -> frozenset[str]:
-        """Names of the options that say something about the file; limits and the choice of reader do not."""
-        apart = {"format", "recipe", "limits"}
+        """Names of the options that a format has to heed.
+
+        Limits and encoding are settled before it, the zero offset after it, for every format alike.
+        """
+        apart = {"format", "recipe", "limits", "encoding", "zero_offset"}
         return frozenset(f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) is not None)
 
     def as_dict(self) -> Mapping[str, Any]:

@@ -12,6 +12,7 @@ Rules, in order:
 from __future__ import annotations
 
 from bisect import bisect_right
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,10 +159,7 @@ def _spread(reading: Reading, again: NDArray[np.bool_]) -> Reading:
         what=f"stamps to {reading.step / NANOSECONDS:g} s for about {usual} rows each: spread evenly within the step, "
         f"so each time is unsure by up to that much",
     )  # fmt: skip
-    spread = Reading(
-        time=time, channels=reading.channels, flags=moved, line=reading.line, sensor=reading.sensor, step=reading.step,
-        rules=reading.rules, host_time=reading.host_time, findings=(*reading.findings, finding),
-    )  # fmt: skip
+    spread = replace(reading, time=time).with_findings((finding,), flags=moved)
     rising = np.concatenate(([True], np.diff(time) > 0))
     if rising.all():
         return spread

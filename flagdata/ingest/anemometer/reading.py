@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,22 +58,17 @@ class Reading:
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Reading:
         """The rows chosen, in the order given."""
-        return Reading(
+        return replace(
+            self,
             time=self.time[rows],
             channels={name: values[rows] for name, values in self.channels.items()},
             flags=self.flags[rows],
             line=self.line[rows],
-            sensor=self.sensor,
-            step=self.step,
-            rules=self.rules,
             host_time=None if self.host_time is None else self.host_time[rows],
-            findings=self.findings,
         )
 
     def with_findings(self, found: tuple[Finding, ...], *, flags: NDArray[np.uint16] | None = None) -> Reading:
         """The same rows with findings added, and other flags."""
-        return Reading(
-            time=self.time, channels=self.channels, flags=self.flags if flags is None else flags, line=self.line,
-            sensor=self.sensor, step=self.step, rules=self.rules, host_time=self.host_time,
-            findings=(*self.findings, *found),
-        )  # fmt: skip
+        return replace(
+            self, findings=(*self.findings, *found), flags=self.flags if flags is None else flags.astype(np.uint16)
+        )

@@ -1,7 +1,7 @@
 """NMEA 0183 sentences: taken apart, checksums verified, and what MWV, MWD and the time sentences say.
 
 Source: NMEA 0183 4.10 as described in E. S. Raymond, "NMEA Revealed" (gpsd project), sections MWV, MWD, ZDA, RMC, GGA,
-GLL, VTG; IEC 61162-1 annex for TAG blocks.
+GLL, VTG; IEC 61162-450 for TAG blocks.
 """
 
 from __future__ import annotations

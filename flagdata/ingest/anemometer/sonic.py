@@ -26,10 +26,10 @@ def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> R
     """
     channels = reading.channels
     if not {"wind_x", "wind_y"} <= set(channels) or "wind_speed" in channels:
-        if azimuth is not None and "apparent_wind_direction" not in channels and "wind_direction" not in channels:
+        if azimuth is not None:
             raise UsageError(
-                "an azimuth was given, but the log has neither components nor directions", where=where,
-                fix="leave it out",
+                "an azimuth was given, but the log has no wind components", where=where,
+                fix="leave out --azimuth; a turned vane is a rotation in the recipe",
             )  # fmt: skip
         return reading
     x, y = channels["wind_x"], channels["wind_y"]

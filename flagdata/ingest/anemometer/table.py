@@ -102,6 +102,10 @@ class _Clock:
         self.utc.append(stamps.utc[keep])
         self.step = min(self.step, stamps.step)
 
+    def stated(self) -> bool:
+        """Whether every stamp states its zone, as Unix times do."""
+        return all(bool(utc.all()) for utc in self.utc)
+
     def order(self) -> slice:
         """The rows from the oldest on, for logs that list the newest first."""
         steps = np.diff(np.concatenate(self.ns))
@@ -187,6 +191,9 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
     if order.step == -1:
         text = "the newest row comes first: read from the end"
         findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))
+    if zone_name is not None and gathered.host is None and gathered.clock.stated():
+        text = f"the stamps state their own zone: {zone_name} is not used"
+        findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
     zone_name = zone_name or recipe.time.zone
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where)
     findings.extend(found)

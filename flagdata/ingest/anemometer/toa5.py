@@ -20,6 +20,7 @@ from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
 from flagdata.schema import CHANNELS, SampleFlag
@@ -49,7 +50,7 @@ class Toa5:
 
     name = "toa5"
     about = "Campbell Scientific TOA5 table"
-    uses = frozenset({"zone", "encoding", "zero_offset", "azimuth"})
+    uses = frozenset({"zone", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
         """A first line that begins with "TOA5"."""
@@ -88,7 +89,8 @@ class Toa5:
         reading = table.reading.with_findings(tuple(found), flags=flags)
         wind = next(layout.column for name, layout in recipe.channels.items() if name.startswith("wind_"))
         processing = dict(zip(names, header[3], strict=False)).get(str(wind), "")
-        return replace(reading, sensor=replace(reading.sensor, averaging=_averaging(processing, reading.time)))
+        reading = replace(reading, sensor=replace(reading.sensor, averaging=_averaging(processing, reading.time)))
+        return with_horizontal(reading, options.azimuth, where=str(source.path))
 
     def _header(self, source: TextFile) -> list[list[str]]:
         lines = source.head(4)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import RefusedError
+from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import ZeroOffset
 from flagdata.ingest.anemometer.reading import Reading
@@ -88,6 +88,25 @@ def estimate(time: NDArray[np.int64], speed: NDArray[np.float64]) -> Zero | None
     )  # fmt: skip
 
 
+def check(reading: Reading, asked: ZeroOffset | None, *, where: str) -> None:
+    """Refuse to subtract a zero offset where there is no speed it belongs to.
+
+    Raises:
+        UsageError: an offset, or its estimate, was asked for a log of components or without wind speed.
+    """
+    if asked is None or asked == "report":
+        return
+    if "wind_x" in reading.channels:
+        raise UsageError(
+            "a zero offset was asked for, but the log has wind components, each with a zero of its own", where=where,
+            fix="give each column its offset in a recipe",
+        )  # fmt: skip
+    if "wind_speed" not in reading.channels:
+        raise UsageError(
+            "a zero offset was asked for, but the log has no wind speed", where=where, fix="leave out --zero-offset"
+        )
+
+
 def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     """Report the zero offset of `wind_speed`, and subtract it where `choice` says so.
 
@@ -95,7 +114,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         RefusedError: an estimate was asked for and the log has no idle stretch.
     """
     speed = reading.channels.get("wind_speed")
-    if speed is None:
+    if speed is None or "wind_x" in reading.channels:
         return reading
     zero = estimate(reading.time, speed)
     shift = 0.0
@@ -126,10 +145,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         calm = (corrected < 0) & (np.abs(corrected) <= max(BAND, 4 * resolution(speed)))
         flags = np.where(calm, flags | SampleFlag.DEAD_ZONE, flags).astype(np.uint16)
     channels = {**reading.channels, "wind_speed": corrected}
-    return Reading(
-        time=reading.time, channels=channels, flags=flags, line=reading.line, sensor=reading.sensor, step=reading.step,
-        rules=reading.rules, host_time=reading.host_time, findings=(*reading.findings, *found),
-    )  # fmt: skip
+    return replace(reading, channels=channels).with_findings(tuple(found), flags=flags)
 
 
 def _report(reading: Reading, zero: Zero, choice: ZeroOffset) -> list[Finding]:

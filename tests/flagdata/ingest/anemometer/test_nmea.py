@@ -10,6 +10,7 @@ from operator import xor
 import numpy as np
 import pytest
 
+from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.sentences import ChecksumError, checksum, clock, split, tag_time
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
@@ -158,6 +159,21 @@ def test_a_fixed_mast_measures_wind_over_ground(read: Read) -> None:
 def test_a_fixed_mast_of_unknown_azimuth_keeps_its_own_direction(read: Read) -> None:
     log = read(times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed")
     assert sorted(log.series.channels) == ["apparent_wind_direction", "wind_speed"]
+
+
+def test_an_azimuth_without_directions_is_refused(read: Read) -> None:
+    with pytest.raises(UsageError, match="no directions"):
+        read(times("WIMWV,,R,5,M,A", "WIMWV,,R,6,M,A"), platform="fixed", azimuth=0.5)
+
+
+def test_an_azimuth_beside_wind_over_ground_is_refused(read: Read) -> None:
+    with pytest.raises(UsageError, match="over ground itself"):
+        read(times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWV,1,R,6,M,A"), platform="fixed", azimuth=0.5)
+
+
+def test_a_platform_said_to_move_is_believed(read: Read) -> None:
+    log = read(times("WIMWV,1,R,5,M,A", "WIMWV,1,R,6,M,A"), platform="moving")
+    assert next(f for f in log.findings if f.kind == "apparent-wind-only").fix is None
 
 
 def test_one_talker_of_several_can_be_chosen(read: Read) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import quality, zero
 from flagdata.ingest.anemometer.order import in_order
 from flagdata.ingest.anemometer.reading import Reading
@@ -184,6 +185,25 @@ def test_the_fewest_possible_rows_are_left_out_for_wild_stamps() -> None:
     log = in_order(reading(time, wind_speed=np.arange(100.0)), where="x")
     assert sorted(set(range(100)) - set(log.channels["wind_speed"].astype(int))) == [20, 50, 51]
     assert [f.count for f in log.findings if f.kind == "time-backwards"] == [3]
+
+
+@pytest.mark.parametrize("offset", [0.1, "estimate"])
+def test_a_zero_offset_of_what_has_no_speed_is_refused(read: Read, offset: float | str) -> None:
+    head = '"TOA5","a"\r\n"TIMESTAMP","Ux","Uy"\r\n"TS","m/s","m/s"\r\n"","",""\r\n'
+    with pytest.raises(UsageError, match="components"):
+        read(head + '"2026-05-01 12:00:00",3,4\r\n', zone="UTC", zero_offset=offset)
+
+
+def test_an_azimuth_for_a_vane_is_refused(read: Read) -> None:
+    text = "time,wind_speed,wind_direction\n2026-05-01T12:00:00Z,3,90\n"
+    with pytest.raises(UsageError, match="rotation"):
+        read(text, azimuth=1.0)
+
+
+def test_a_zone_that_the_stamps_do_not_need_is_said(read: Read) -> None:
+    log = read("time,wind_speed\n2026-05-01T12:00:00Z,3\n", zone="+02:00")
+    assert [f.kind for f in log.findings] == ["zone-not-needed"]
+    assert log.series.time.tolist() == [T0]
 
 
 def test_sonic_components_give_speed_and_direction(read: Read) -> None:

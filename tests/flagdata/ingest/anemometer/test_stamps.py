@@ -163,6 +163,11 @@ def test_the_order_of_a_date_is_decided_by_evidence(texts: list[str], order: str
     assert decide(texts, told=None, where="x").order == order
 
 
+def test_a_told_order_for_dates_that_begin_with_the_year_is_refused() -> None:
+    with pytest.raises(TimeError, match="2026-06-01"):
+        decide(["2026-06-01 10:00"], told="dmy", where="x")
+
+
 def test_an_order_without_evidence_is_refused_unless_told() -> None:
     with pytest.raises(TimeError):
         decide(["5/6/2026 10:00"], told=None, where="x")
