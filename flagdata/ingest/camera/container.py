@@ -261,6 +261,5 @@ def _timing(
         )  # fmt: skip
     tick = stream.time_base or Fraction(1, 1000)
     rate = stream.average_rate or stream.guessed_rate
-    return survey(
-        np.frombuffer(tally.stamps, dtype=np.int64), tick=tick, missing=tally.missing, fallback_rate=rate or None
-    )
+    stamps = np.frombuffer(tally.stamps, dtype=np.int64)
+    return survey(stamps, tick=tick, missing=tally.missing, fallback_rate=rate or None, where=str(path))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from flagdata.errors import UsageError
 from flagdata.timebase import NANOSECONDS
@@ -60,6 +60,51 @@ class GridReport:
     def unused(self) -> int:
         """Source frames that no output frame shows."""
         return self.sources - self.used
+
+
+class Sampler(Protocol[T]):
+    """Turns source frames, offered in order of their stamps, into output frames."""
+
+    report: GridReport
+
+    def push(self, stamp: int, source: T) -> Iterator[Pick[T]]: ...
+
+    def finish(self) -> Iterator[Pick[T]]: ...
+
+
+class EveryFrame(Generic[T]):
+    """Each source frame at its own stamp; counts what is missing between them.
+
+    Args:
+        period: expected step [ns].
+        slack: steps up to `slack` periods are no gap: 1.5 where the rate is constant.
+    """
+
+    def __init__(self, *, period: int, slack: float) -> None:
+        self._period = period
+        self._slack = slack
+        self._last: int | None = None
+        self.report = GridReport()
+
+    def push(self, stamp: int, source: T) -> Iterator[Pick[T]]:
+        """The source frame itself."""
+        report = self.report
+        step = 0 if self._last is None else stamp - self._last
+        if step > self._slack * self._period:
+            if report.first_left_out is None:
+                report.first_left_out = report.sources
+            report.left_out += max(1, round(step / self._period) - 1)
+            report.gaps += 1
+            report.longest_gap = max(report.longest_gap, step)
+        self._last = stamp
+        report.sources += 1
+        report.used += 1
+        report.picks += 1
+        yield Pick(time=stamp, source=source, error=0)
+
+    def finish(self) -> Iterator[Pick[T]]:
+        """Nothing is held back."""
+        yield from ()
 
 
 class Resampler(Generic[T]):

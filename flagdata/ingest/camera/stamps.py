@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.timebase import NANOSECONDS
 
@@ -55,19 +56,33 @@ class Timing:
         return float(self.span * self.tick)
 
 
-def survey(stamps: NDArray[np.int64], *, tick: Fraction, missing: int, fallback_rate: Fraction | None) -> Timing:
+def survey(
+    stamps: NDArray[np.int64],
+    *,
+    tick: Fraction,
+    missing: int,
+    fallback_rate: Fraction | None,
+    where: str | None = None,
+) -> Timing:
     """What the stamps say, (n,) in the order of the file.
 
-    The period of a constant-rate file is the mean step, with steps over missing frames counted as the whole number of
-    periods they are: exact where the median step is rounded to the container's ticks (33 or 34 ms in Matroska).
+    The period of a constant-rate file is the mean step, steps over missing frames left aside: exact where single steps
+    are rounded to the container's ticks (33 or 34 ms in Matroska).
 
     Args:
-        fallback_rate: frames a second where there are fewer than two stamps.
+        fallback_rate: frames a second where there are fewer than two different stamps.
+
+    Raises:
+        InputError: fewer than two different stamps and no `fallback_rate`.
     """
     ordered = np.unique(stamps)
     steps = np.diff(ordered)
     if len(steps) == 0:
-        period = 1 / (fallback_rate * tick) if fallback_rate else Fraction(1) / (25 * tick)
+        if fallback_rate is None:
+            raise InputError(
+                "there are not two time stamps to tell a frame rate by", where=where, fix="give a longer recording"
+            )
+        period = 1 / (fallback_rate * tick)
         origin = int(ordered[0]) if len(ordered) else 0
         return Timing(
             tick=tick, origin=origin, period=period, variable=False, span=0, shortest=0, longest=0,
@@ -75,8 +90,7 @@ def survey(stamps: NDArray[np.int64], *, tick: Fraction, missing: int, fallback_
         )  # fmt: skip
     median = float(np.median(steps))
     whole = np.maximum(np.rint(steps / median), 1)
-    near = whole <= 1000
-    mean = Fraction(int(steps[near].sum()), int(whole[near].sum()))
+    mean = Fraction(int(steps[whole == 1].sum()), int((whole == 1).sum()))
     off = np.abs(steps - np.rint(steps / float(mean)) * float(mean))
     # Two stamps, each rounded to a tick, put a step off by less than a whole one.
     allowed = max(1.0, 0.01 * float(mean))

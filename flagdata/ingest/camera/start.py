@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from flagdata.errors import TimeError
@@ -28,6 +28,7 @@ class Start:
     findings: tuple[Finding, ...] = ()
 
 
+_RECORDED = "recording time in the video"
 _WHOLE_SECOND = 1 / 12**0.5  # σ of an instant cut to whole seconds
 _EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock (epochs of 1904, 1970 and 1980)
 
@@ -58,33 +59,31 @@ def find_start(
     """
     if option is not None:
         return Start(instant=option, source="option", sigma=None)
-    passed_over: list[Finding] = []
     default = zone(place, where="zone") if place else None
-
-    apple = metadata.get("com.apple.quicktime.creationdate")
-    if apple:
+    passed_over: list[Finding] = []
+    for key, text in (
+        ("com.apple.quicktime.creationdate", metadata.get("com.apple.quicktime.creationdate")),
+        (_RECORDED, recorded),
+        ("creation_time", metadata.get("creation_time")),
+    ):
+        if not text:
+            continue
         try:
-            return _checked(
-                parse(apple, default=default, where=where), "com.apple.quicktime.creationdate", _WHOLE_SECOND
-            )
+            if key == "creation_time":
+                found = _from_creation_time(text, place=place, duration=duration, where=where)
+            else:
+                found = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
-            passed_over.append(_passed("com.apple.quicktime.creationdate", apple, error))
-    if recorded:
-        try:
-            return _checked(parse(recorded, default=default, where=where), "recording time in the video", _WHOLE_SECOND)
-        except TimeError as error:
-            passed_over.append(_passed("recording time in the video", recorded, error))
-    created = metadata.get("creation_time")
-    if created:
-        try:
-            return _from_creation_time(created, place=place, duration=duration, where=where)
-        except TimeError as error:
-            passed_over.append(_passed("creation_time", created, error))
-    tried = "; ".join(f.what for f in passed_over) or "its metadata name none"
+            what = f"{key} {text!r} is unusable ({error.what})"
+            passed_over.append(Finding(kind="start-passed-over", severity=Severity.NOTE, what=what))
+            continue
+        return replace(found, findings=(*passed_over, *found.findings))
+    tried = "; ".join(finding.what for finding in passed_over) or "its metadata name none"
     raise TimeError(
         f"nothing says when the recording began: {tried}",
         where=where,
-        fix="give --start with a zone, e.g. --start 2026-05-01T12:00:00+02:00",
+        fix="give --start with a zone, e.g. --start 2026-05-01T12:00:00+02:00"
+        + (", or --zone, the zone of the camera's clock" if recorded and place is None else ""),
     )
 
 
@@ -105,15 +104,10 @@ def _from_creation_time(text: str, *, place: str | None, duration: float, where:
         value=sigma,
         fix="give --start with a zone, or align the recording by its contents",
     )
-    start = _checked(instant, "creation_time", sigma)
-    return Start(instant=start.instant, source=start.source, sigma=sigma, findings=(finding,))
+    return replace(_checked(instant, "creation_time", sigma), findings=(finding,))
 
 
 def _checked(instant: int, key: str, sigma: float) -> Start:
     if instant < _EARLIEST:
         raise TimeError(f"{iso(instant)} is an unset clock", fix="give --start")
     return Start(instant=instant, source=f"metadata: {key}", sigma=sigma)
-
-
-def _passed(key: str, text: str, error: TimeError) -> Finding:
-    return Finding(kind="start-passed-over", severity=Severity.NOTE, what=f"{key} {text!r} is unusable ({error.what})")

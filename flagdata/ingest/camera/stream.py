@@ -11,7 +11,7 @@ from flagdata.errors import LimitError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.container import check_path
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
-from flagdata.ingest.camera.grid import GridReport, Resampler
+from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
 from flagdata.ingest.camera.motion import CropProposal, propose
 from flagdata.ingest.camera.options import CameraOptions, exact
 from flagdata.ingest.camera.sequence import SequenceSource
@@ -105,26 +105,23 @@ class CameraStream:
 
     def _frames(self) -> Iterator[Frame]:
         repair: StampRepair[Picture] = StampRepair(period=self._period)
-        if self._options.rate == "native":
-            report = GridReport()
-            for stamp, picture in self._repaired(repair):
-                report.sources += 1
-                report.picks += 1
-                report.used += 1
-                yield self._frame(self.info.start + stamp, picture, error=0)
-        else:
-            grid = self._grid(exact(self._options.rate))
-            report = grid.report
-            for stamp, picture in self._repaired(repair):
-                for pick in grid.push(stamp, picture):
-                    yield self._frame(self.info.start + pick.time, pick.source, error=pick.error)
-            for pick in grid.finish():
-                yield self._frame(self.info.start + pick.time, pick.source, error=pick.error)
-            self._closing += _grid_findings(report, float(grid.rate))
+        sampler = self._sampler()
+        for stamp, picture in self._repaired(repair):
+            for pick in sampler.push(stamp, picture):
+                yield self._frame(pick)
+        for pick in sampler.finish():
+            yield self._frame(pick)
+        if self._options.rate != "native":
+            self._closing += _grid_findings(sampler.report, self._options.rate)
+        self._closing += _gap_findings(sampler.report)
         self._closing += repair.findings()
         self._closing += self._source.damage()
 
-    def _grid(self, rate: Fraction) -> Resampler[Picture]:
+    def _sampler(self) -> Sampler[Picture]:
+        if self._options.rate == "native":
+            # Half a period of jitter is no gap; a variable rate doubles its step without losing a frame.
+            return EveryFrame(period=self._period, slack=2.5 if self.info.variable_rate else 1.5)
+        rate = exact(self._options.rate)
         grid_period = Fraction(NANOSECONDS) / rate
         # A source slower than a quarter of the grid is a series of stills: most instants have no frame.
         period = min(Fraction(self._period), 4 * grid_period)
@@ -142,10 +139,11 @@ class CameraStream:
             yield from repair.push(stamp, picture)
         yield from repair.finish()
 
-    def _frame(self, time: int, picture: Picture, *, error: int) -> Frame:
-        luma = picture.luma()
+    def _frame(self, pick: Pick[Picture]) -> Frame:
+        luma = pick.source.luma()
         image = self._geometry.render(luma.image, black=luma.black, white=luma.white)
-        return Frame(time=time + self._shift, image=image, stamp_error=error / NANOSECONDS)
+        time = self.info.start + pick.time + self._shift
+        return Frame(time=time, image=image, stamp_error=pick.error / NANOSECONDS)
 
     def _standing_findings(self) -> list[Finding]:
         found = []
@@ -223,16 +221,6 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
             count=report.picks, value=report.worst_error / NANOSECONDS,
         )
     ]  # fmt: skip
-    if report.left_out:
-        found.append(
-            Finding(
-                kind="frames-missing", severity=Severity.WARNING,
-                what=f"{report.left_out} of the instants have no source frame near and were left out, in {report.gaps} "
-                f"gaps of up to {report.longest_gap / NANOSECONDS:.3f} s",
-                where=f"grid frame {report.first_left_out}", count=report.left_out,
-                value=report.longest_gap / NANOSECONDS,
-            )
-        )  # fmt: skip
     if report.repeats:
         found.append(
             Finding(
@@ -252,6 +240,19 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
             )
         )  # fmt: skip
     return found
+
+
+def _gap_findings(report: GridReport) -> list[Finding]:
+    if not report.left_out:
+        return []
+    return [
+        Finding(
+            kind="frames-missing", severity=Severity.WARNING,
+            what=f"{report.left_out} frames are missing, in {report.gaps} gaps of up to "
+            f"{report.longest_gap / NANOSECONDS:.3f} s; none was made up",
+            where=f"frame {report.first_left_out}", count=report.left_out, value=report.longest_gap / NANOSECONDS,
+        )
+    ]  # fmt: skip
 
 
 def open_camera(path: Path | str, options: CameraOptions | None = None) -> CameraStream:

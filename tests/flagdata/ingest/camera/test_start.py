@@ -52,6 +52,12 @@ def test_the_streams_own_wall_clock_is_read_in_the_given_zone() -> None:
     assert (start.instant, start.source) == (TEN, "metadata: recording time in the video")
 
 
+def test_an_unusable_time_is_passed_over_and_mentioned() -> None:
+    start = find({"com.apple.quicktime.creationdate": "soon", "creation_time": "2026-05-01T10:00:00Z"})
+    assert start.instant == TEN
+    assert [f.kind for f in start.findings] == ["start-passed-over", "start-unsure"]
+
+
 @pytest.mark.parametrize(
     "metadata",
     [

@@ -109,6 +109,17 @@ def test_missing_frames_leave_holes_in_the_grid(
     assert (found["frames-missing"].count, found["frames-missing"].value) == (5, pytest.approx(6 * 0.04))
 
 
+def test_the_native_rate_counts_missing_frames_too(
+    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, start: int
+) -> None:
+    stamps = [*range(10), *range(15, 20), *range(22, 25)]
+    path = write_video(tmp_path / "gap.mp4", stamps, tick=Fraction(1, 50))
+    _, frames, found = read(path, replace(plain, rate="native"))
+    assert [(f.time - start) // (20 * MS) for f in frames] == stamps
+    assert (found["frames-missing"].count, found["frames-missing"].where) == (5 + 2, "frame 10")
+    assert found["frames-missing"].value == pytest.approx(6 * 0.02)
+
+
 def test_a_tolerance_wide_enough_bridges_a_gap_by_repeating(
     tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int]
 ) -> None:
