@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flagdata.align.bins import normal_scores
+from flagdata.align.drift import ClockLine
+from flagdata.align.lag import LagEstimate
 from flagdata.align.methods import Evidence
 from flagdata.errors import InputError
+from flagdata.signals import Series
 from flagdata.timebase import NANOSECONDS, iso
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_NINETY = 1.6448536269514722  # two-sided 90 % of a normal distribution
+_MARGIN = 30.0  # s of wind shown either side of the film
 _MOTION, _WIND, _MARK = "#b5541c", "#1f5f8b", "#444444"
 
 
@@ -19,7 +29,8 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
 
     Above: motion energy, in bins like the wind's and shifted by the estimate, and the wind, both as normal scores.
     Below left: the evidence at every offset tried, and the band that unrelated winds seldom leave. Below right: the
-    score around the peak, and the 90 % interval.
+    score around the peak, and the 90 % interval. At the bottom, where the drift was measured: the offsets of the parts
+    with their 90 % intervals, and the line through them.
 
     Raises:
         InputError: a suffix that cannot be drawn, or a folder that cannot be written.
@@ -27,59 +38,81 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    estimate = evidence.estimate
-    figure = Figure(figsize=(10, 6.4), layout="constrained")
+    line = evidence.line if evidence.line is not None and evidence.line.parts else None
+    figure = Figure(figsize=(10, 6.4 if line is None else 8.8), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, 2, width_ratios=(2, 1))
-    series, search, near = (
-        figure.add_subplot(grid[0, :]),
-        figure.add_subplot(grid[1, 0]),
-        figure.add_subplot(grid[1, 1]),
-    )
-
-    origin = int(evidence.wind.time[0])
-    wind_time = (evidence.wind.time - origin) / NANOSECONDS - evidence.wind.period / 2
-    shift = estimate.offset - evidence.response if np.isfinite(estimate.offset) else 0.0
-    motion_time = (evidence.motion.time - origin) / NANOSECONDS + shift
-    middles, energy = _binned(motion_time, evidence.motion.energy, evidence.wind.period)
-    near_film = (wind_time >= middles[0] - 30) & (wind_time <= middles[-1] + 30) if len(middles) else wind_time > -1
-    series.plot(*_broken(wind_time[near_film], normal_scores(evidence.wind.speed[near_film]), evidence.wind.period),
-                color=_WIND, lw=1.1, label="wind speed")  # fmt: skip
-    series.plot(middles, normal_scores(energy), color=_MOTION, lw=1.1, label="motion of the flag")
-    series.set(xlabel=f"time on the wind's clock [s since {iso(origin)}]", ylabel="normal score")
-    series.legend(loc="upper right", framealpha=0.85, edgecolor="none", ncols=2)
+    grid = figure.add_gridspec(2 if line is None else 3, 2, width_ratios=(2, 1))
     verdict = "refused: " + "; ".join(evidence.reasons) if evidence.reasons else "accepted"
-    series.set_title(f"{title}: {verdict}", loc="left", fontsize=10, wrap=True)
-
-    curve = estimate.curve
-    for axes in (search, near):
-        axes.plot(curve.offset, curve.evidence if axes is search else curve.score, color=_MARK, lw=1)
-        if np.isfinite(estimate.offset):
-            axes.axvspan(*estimate.interval, color=_MOTION, alpha=0.25, lw=0)
-            axes.axvline(estimate.offset, color=_MOTION, lw=1)
-        axes.set_xlabel("offset added to the camera's clock [s]")
-    if not np.any(np.isfinite(curve.score)):
-        for axes in (search, near):
-            axes.set(xticks=[], yticks=[])
-            axes.text(0.5, 0.5, "nothing was searched", ha="center", va="center", transform=axes.transAxes)
-    if np.isfinite(curve.chance_score):
-        search.axhline(curve.chance_score, color=_MARK, ls=":", lw=1)
-        search.axhspan(-curve.chance_score, curve.chance_score, color=_MARK, alpha=0.07, lw=0)
-    search.set_ylabel("evidence z")
-    near.set_ylabel("score z")
-    search.set_title("all offsets tried; unrelated winds stay within the gray", loc="left", fontsize=9)
-    if np.isfinite(estimate.offset):
-        half = max(10.0, 6 * min(estimate.sigma, 5.0))
-        near.set_xlim(estimate.offset - half, estimate.offset + half)
-        low, high = estimate.interval
-        near.set_title(f"{estimate.offset:+.2f} s [{low:.2f}, {high:.2f}] 90 %", loc="left", fontsize=9)
+    figure.suptitle(f"{title}: {verdict}", x=0.01, ha="left", fontsize=10, wrap=True)
+    _draw_series(figure.add_subplot(grid[0, :]), evidence)
+    _draw_search(figure.add_subplot(grid[1, 0]), evidence.estimate)
+    _draw_peak(figure.add_subplot(grid[1, 1]), evidence.estimate)
+    if line is not None:
+        _draw_parts(figure.add_subplot(grid[2, :]), line)
     try:
         figure.savefig(path, dpi=120)
     except (OSError, ValueError) as error:
         raise InputError(f"the plot cannot be written: {error}", where=str(path), fix="name a .png file") from None
 
 
-def _binned(time: np.ndarray, values: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+def _draw_series(axes: Axes, evidence: Evidence) -> None:
+    wind, motion, offset = evidence.wind, evidence.motion, evidence.estimate.offset
+    origin = int(wind.time[0]) // NANOSECONDS * NANOSECONDS
+    wind_time = (wind.time - origin) / NANOSECONDS - wind.period / 2
+    shift = offset - evidence.response if math.isfinite(offset) else 0.0
+    middles, energy = _binned((motion.time - origin) / NANOSECONDS + shift, motion.energy, wind.period)
+    if len(middles):
+        near = (wind_time >= middles[0] - _MARGIN) & (wind_time <= middles[-1] + _MARGIN)
+        x, y = _broken(wind_time[near], normal_scores(wind.speed[near]), wind.period)
+        axes.plot(x, y, color=_WIND, lw=1.1, label="wind speed")
+        axes.plot(middles, normal_scores(energy), color=_MOTION, lw=1.1, label="motion of the flag")
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), frameon=False, ncols=2)
+    axes.set(xlabel=f"time on the wind's clock [s since {iso(origin)}]", ylabel="normal score")
+
+
+def _draw_search(axes: Axes, estimate: LagEstimate) -> None:
+    curve = estimate.curve
+    _draw_curve(axes, estimate, curve.evidence, label="evidence z")
+    if math.isfinite(curve.chance_score):
+        axes.axhline(curve.chance_score, color=_MARK, ls=":", lw=1)
+        axes.axhspan(-curve.chance_score, curve.chance_score, color=_MARK, alpha=0.07, lw=0)
+    axes.set_title("all offsets tried; unrelated winds stay within the gray", loc="left", fontsize=9)
+
+
+def _draw_peak(axes: Axes, estimate: LagEstimate) -> None:
+    _draw_curve(axes, estimate, estimate.curve.score, label="score z")
+    if math.isfinite(estimate.offset):
+        half = max(10.0, 6 * min(estimate.sigma, 5.0))
+        low, high = estimate.interval
+        axes.set_xlim(estimate.offset - half, estimate.offset + half)
+        axes.set_title(f"{estimate.offset:+.2f} s [{low:.2f}, {high:.2f}] 90 %", loc="left", fontsize=9)
+
+
+def _draw_curve(axes: Axes, estimate: LagEstimate, values: Series, *, label: str) -> None:
+    axes.set(xlabel="offset added to the camera's clock [s]", ylabel=label)
+    if not np.any(np.isfinite(values)):
+        axes.set(xticks=[], yticks=[])
+        axes.text(0.5, 0.5, "nothing was searched", ha="center", va="center", transform=axes.transAxes)
+        return
+    axes.plot(estimate.curve.offset, values, color=_MARK, lw=1)
+    if math.isfinite(estimate.offset):
+        if all(map(math.isfinite, estimate.interval)):
+            axes.axvspan(*estimate.interval, color=_MOTION, alpha=0.25, lw=0)
+        axes.axvline(estimate.offset, color=_MOTION, lw=1)
+
+
+def _draw_parts(axes: Axes, line: ClockLine) -> None:
+    at = np.array([(part.at - line.origin) / NANOSECONDS / 60 for part in line.parts])
+    offset = np.array([part.offset for part in line.parts])
+    half = np.array([_NINETY * part.sigma_statistical for part in line.parts])
+    axes.errorbar(at, offset, yerr=half, fmt="o", color=_MOTION, lw=1, ms=4)
+    ends = np.array([at.min(), at.max()])
+    axes.plot(ends, line.offset + line.drift * 60 * ends, color=_MARK, lw=1)
+    axes.set(xlabel=f"time on the camera's clock [min from {iso(line.origin)[:19]}Z]", ylabel="offset [s]")
+    axes.set_title(f"drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm", loc="left", fontsize=9)
+
+
+def _binned(time: Series, values: Series, period: float) -> tuple[Series, Series]:
     """Middles [s] and means of bins of `period` [s]; bins without a value are left out."""
     finite = np.isfinite(values)
     index = np.floor(time[finite] / period).astype(np.int64)
@@ -90,7 +123,7 @@ def _binned(time: np.ndarray, values: np.ndarray, period: float) -> tuple[np.nda
     return (there + first + 0.5) * period, total[there] / count[there]
 
 
-def _broken(time: np.ndarray, values: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+def _broken(time: Series, values: Series, period: float) -> tuple[Series, Series]:
     """The same line with NaN where bins are missing, so that gaps show."""
     gaps = np.flatnonzero(np.diff(time) > 1.5 * period) + 1
     return np.insert(time, gaps, np.nan), np.insert(values, gaps, np.nan)

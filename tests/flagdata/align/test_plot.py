@@ -1,0 +1,54 @@
+"""The picture of an alignment: drawn for what was accepted and for what was refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flagdata.align.drift import clock_line
+from flagdata.align.lag import LagSearch, estimate_offset
+from flagdata.align.methods import Evidence
+from flagdata.align.motion import MotionSeries
+from flagdata.align.plot import draw
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from flagdata.signals import WindAverage
+
+Scenes = Callable[..., tuple[MotionSeries, WindAverage]]
+
+
+def evidence(pair: tuple[MotionSeries, WindAverage]) -> Evidence:
+    search, generator = LagSearch(surrogates=60), stream(0, "chance")
+    motion, wind = pair
+    estimate = estimate_offset(motion, wind, search=search, generator=generator)
+    line = clock_line(motion, wind, estimate, search=search, generator=generator) if estimate.accepted else None
+    return Evidence(motion=motion, wind=wind, estimate=estimate, line=line, response=search.response)
+
+
+def size(path: Path) -> tuple[int, int]:
+    with Image.open(path) as image:
+        # Something was drawn: more than background and text.
+        assert len(np.unique(np.asarray(image.convert("L")))) > 20
+        return image.size
+
+
+def test_an_accepted_and_a_refused_estimate_are_drawn(scene: Scenes, tmp_path: Path) -> None:
+    draw(evidence(scene(seed=3, offset=9.0, apart=1.5, flag_noise=0.3)), tmp_path / "good.png", title="cam and mast")
+    draw(evidence(scene(seed=3, turbulence=0.005)), tmp_path / "steady.png", title="cam and mast")
+    draw(evidence(scene(seed=3, duration=90.0)), tmp_path / "short.png", title="cam and mast")
+    assert size(tmp_path / "good.png") == size(tmp_path / "steady.png") == size(tmp_path / "short.png") == (1200, 768)
+
+
+def test_a_measured_drift_adds_its_own_panel(scene: Scenes, tmp_path: Path) -> None:
+    draw(evidence(scene(seed=11, duration=5400.0, apart=1.5, flag_noise=0.3)), tmp_path / "long.png", title="long")
+    assert size(tmp_path / "long.png") == (1200, 1056)
+
+
+@pytest.mark.parametrize("name", ["lag.xyz", "nowhere/lag.png"])
+def test_files_that_cannot_be_drawn_say_so(scene: Scenes, tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        draw(evidence(scene(seed=3, turbulence=0.005)), tmp_path / name, title="steady")
