@@ -136,7 +136,7 @@ class PairLoader:
 
     def _run(self, iteration: int) -> Iterator[Batch]:
         self._todo.batches = self.batches(self.epoch)[self.cursor :]
-        for batch in self._processes or self._in_this_process():
+        for batch in self._in_this_process() if self._processes is None else self._processes:
             if iteration != self._iteration:
                 raise UsageError("another iteration of this loader has begun", fix="use one loader for each iteration")
             self.cursor += 1

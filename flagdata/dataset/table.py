@@ -101,9 +101,13 @@ class PairTable:
         )
 
     def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
-        """The pairs at `index`, in its order."""
+        """The pairs at `index`, in its order, with the objects and parameter names that they use."""
         shared = ("objects", "names")
-        return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared})
+        taken = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared}
+        used, taken["object"] = np.unique(taken["object"], return_inverse=True)
+        known = ~np.all(np.isnan(taken["parameters"]), axis=0)
+        taken["parameters"] = taken["parameters"][:, known]
+        return replace(self, **taken, objects=self.objects[used], names=self.names[known])
 
     def parameters_of(self, index: int) -> dict[str, float]:
         """The parameters that pair `index` has."""
@@ -111,15 +115,14 @@ class PairTable:
         return {str(self.names[k]): float(values[k]) for k in np.nonzero(~np.isnan(values))[0]}
 
     def fingerprint(self) -> str:
-        """SHA-256 of every pair's identity, place and ground truth, in order: equal means the same data."""
+        """SHA-256 of every pair's identity, place and ground truth, in order: equal means the same data, by whatever
+        query it was found."""
         digest = hashlib.sha256()
         for field in fields(self):
-            values = getattr(self, field.name)
-            if field.name in ("object", "objects"):
-                continue
-            digest.update(f"{field.name} {values.dtype.str} {values.shape}\n".encode())
-            digest.update(np.ascontiguousarray(values).tobytes())
-        digest.update("\n".join(self.objects[self.object].tolist()).encode())
+            values: NDArray[Any] = getattr(self, field.name)
+            digest.update(f"{field.name} {values.shape}\n".encode())
+            text = values.dtype.kind == "U"
+            digest.update("\n".join(values.tolist()).encode() if text else np.ascontiguousarray(values).tobytes())
         return digest.hexdigest()
 
 

@@ -67,6 +67,17 @@ def test_a_tag_gives_the_same_pairs_after_later_commits(lake, add_recording, mad
     assert len(flagdata.open(lake.path).pairs()) == len(before) + 3
 
 
+def test_the_fingerprint_is_of_the_pairs_and_not_of_the_query(source):
+    filtered = source.pairs("session = 'site0'", at="v1")
+    split_by = ExplicitSplit(where={"train": "session = 'site0'", "test": "session <> 'site0'"})
+    side = source.pairs(at="v1", split="train", split_by=split_by)
+    assert len(filtered) == 6
+    assert filtered.fingerprint == side.fingerprint
+    assert side.table.objects.tolist() == filtered.table.objects.tolist()
+    assert side.table.names.tolist() == []
+    assert source.pairs("session = 'site1'", at="v1").fingerprint != filtered.fingerprint
+
+
 def test_order_does_not_depend_on_the_order_of_commits(tmp_path, add_recording, made):
     fingerprints = []
     for numbers in ((1, 2, 3), (3, 1, 2)):
