@@ -66,7 +66,7 @@ class HostStamped:
                         if headed
                         else "no header says what the lines are",
                         f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
-                        f"{share:.0%} of them go on with the fields of recipe {name}",
+                        f"{share:.0%} of them go on with the fields of recipe {name}: {recipe.about}",
                     ),
                 )
         return best

@@ -125,8 +125,9 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     Were repeats independent with probability p, n rows would hold a run of L or more repeats with probability at most
     n p^L (Feller, An Introduction to Probability Theory I, XIII.7). A run is stale from the L on at which that is
     `STALE_CHANCE`, if it lasts `STALE_SECONDS`. p is the share of repeats in the log, taken again without the runs
-    found (three passes), and never below 5 %. Readings of a calm (0, or dead zone) are no repeats. A recipe's
-    `stale_after` replaces the rule.
+    found (three passes), and never below 5 %. It must be so with the p of the rows around the run too, since a night's
+    light wind repeats more than a day's. A sensor that is stuck most of the time shows in neither. Readings of a calm
+    (0, or dead zone) are no repeats. A recipe's `stale_after` replaces the rule.
     """
     names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
     names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
@@ -166,6 +167,9 @@ def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], 
     else:
         limit = _longest_by_chance(n, lengths)
         long = (lengths >= limit) & (span >= STALE_SECONDS)
+        total = np.concatenate(([0], np.cumsum(same)))
+        for index in np.flatnonzero(long):
+            long[index] = lengths[index] >= _limit(n, _share_around(total, int(starts[index]), int(lengths[index])))
         text = f"{limit} times or more, which chance and resolution do not explain"
     if not long.any():
         return nothing, ()
@@ -196,9 +200,25 @@ def _longest_by_chance(n: int, lengths: NDArray[np.int64]) -> int:
         within = lengths < limit
         repeats = float(lengths[within].sum())
         rest = n - 1 - float(lengths[~within].sum())
-        share = min(max(repeats / max(rest, 1.0), 0.05), 0.999)
-        limit = max(STALE_SHORTEST, math.ceil(math.log(n / STALE_CHANCE) / -math.log(share)))
+        limit = _limit(n, repeats / max(rest, 1.0))
     return limit
+
+
+def _limit(n: int, share: float) -> int:
+    """Repeats in a row that chance does not explain among n rows of which `share` repeat the one before them."""
+    kept = min(max(share, 0.05), 0.999)
+    return max(STALE_SHORTEST, math.ceil(math.log(n / STALE_CHANCE) / -math.log(kept)))
+
+
+def _share_around(total: NDArray[np.int64], start: int, length: int) -> float:
+    """Share of repeats around a run, itself left out: five times its length to each side, at least 200 rows.
+
+    `total` is the running count of repeats.
+    """
+    reach = max(200, 5 * length)
+    low, high = max(0, start - reach), min(len(total) - 1, start + length + reach)
+    rest = high - low - length
+    return float(total[high] - total[low] - length) / rest if rest > 0 else 0.0
 
 
 def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
