@@ -16,6 +16,7 @@ from flagdata.errors import ConflictError, NotFoundError
 from flagdata.findings import Finding
 
 _GATE_NOT_MET = 3
+_CENTURY = 36_525 * 86_400  # s
 _UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86_400}
 
 
@@ -30,7 +31,10 @@ class Duration(click.ParamType):
         match = re.fullmatch(r"(\d{1,9}(?:\.\d+)?)([smhd])", value.strip())
         if match is None:
             self.fail(f"{value!r} is not a duration; write it as 24h, 30m, 7d or 0s", param, ctx)
-        return timedelta(seconds=float(match[1]) * _UNITS[match[2]])
+        seconds = float(match[1]) * _UNITS[match[2]]
+        if seconds > _CENTURY:
+            self.fail(f"{value!r} is more than a century", param, ctx)
+        return timedelta(seconds=seconds)
 
 
 grace_option = click.option(

@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import operator
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
 from typing import Any
+
+import pyarrow as pa
 
 from flagdata import provenance
 from flagdata.errors import CorruptError, InputError
@@ -19,7 +22,19 @@ from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
 OBJECT_NAME = re.compile(r"(mcap|zarr)/[0-9a-f]{64}")
 _IDENTITY = re.compile(r"[0-9a-f]{32}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+_DERIVED = ("artifact", "recipe", "recipe_hash", "format_version")
+_INTEGERS = [name for name, f in CATALOG.items() if pa.types.is_integer(f.type) and name not in _DERIVED]
+_NUMBERS = [name for name, f in CATALOG.items() if pa.types.is_floating(f.type)]
+_TEXTS = [name for name, f in CATALOG.items() if pa.types.is_string(f.type) and name not in _DERIVED]
 _JSON_COLUMNS = ("parameters", "clock_model", "report")
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # half of a surrogate pair: a file name in another encoding
+        return False
+    return True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,12 +83,13 @@ class Artifact:
     report: str | None = None
 
     def __post_init__(self) -> None:
+        self._check_types()
         if self.kind not in list(Kind):
             raise self._bad("kind", self.kind, f"one of {', '.join(Kind)}")
         object.__setattr__(self, "kind", Kind(self.kind))
         object.__setattr__(self, "parents", tuple(self.parents))
         object.__setattr__(self, "quality", tuple(self.quality))
-        if not self.name.strip():
+        if not self.name.strip() or not self.name.isprintable():
             raise self._bad("name", self.name, "a name people can recognise it by")
         if self.object is not None and not OBJECT_NAME.fullmatch(self.object):
             raise self._bad("object", self.object, "what Transaction.put returned")
@@ -88,9 +104,6 @@ class Artifact:
             value = getattr(self, column)
             if value is not None and value < 0:
                 raise self._bad(column, value, "a number that is not negative")
-        for column, value in vars(self).items():
-            if isinstance(value, float) and not math.isfinite(value):
-                raise self._bad(column, value, "a finite number, or None where it is not known")
         for column in _JSON_COLUMNS:
             text = getattr(self, column)
             if text is not None:
@@ -98,6 +111,25 @@ class Artifact:
                     json.loads(text)
                 except (TypeError, ValueError) as error:
                     raise self._bad(column, str(error), "JSON text") from None
+
+    def _check_types(self) -> None:
+        """Numbers of other libraries become Python's; what the catalog's column cannot hold is refused."""
+        for column in _INTEGERS:
+            value = getattr(self, column)
+            if value is not None:
+                if not hasattr(value, "__index__") or not -(2**63) <= operator.index(value) < 2**63:
+                    raise self._bad(column, value, "a whole number of at most 64 bits")
+                object.__setattr__(self, column, operator.index(value))
+        for column in _NUMBERS:
+            value = getattr(self, column)
+            if value is not None:
+                if isinstance(value, str) or not hasattr(value, "__float__") or not math.isfinite(value):
+                    raise self._bad(column, value, "a finite number, or None where it is not known")
+                object.__setattr__(self, column, float(value))
+        for column in _TEXTS:
+            value = getattr(self, column)
+            if value is not None and not (isinstance(value, str) and _is_unicode(value)):
+                raise self._bad(column, value, "text in Unicode")
 
     def _bad(self, column: str, value: object, wanted: str) -> InputError:
         return InputError(f"{column} is {value!r}", where=f"artifact {self.name!r}", fix=f"give {wanted}")

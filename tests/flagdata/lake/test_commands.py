@@ -174,6 +174,7 @@ def test_gc_says_what_it_deletes_and_a_dry_run_deletes_nothing(run: Run, lake: L
     assert (document["deleted"], document["objects"], document["bytes"]) == (True, [name], 6)
     assert not lake.objects.path(name).exists()
     assert run("gc", "--older-than", "soon").code == 2
+    assert run("gc", "--older-than", "99999999d").code == 2
 
 
 def test_recover_salvages_a_record_that_was_cut_off(run: Run, tmp_path: Path) -> None:

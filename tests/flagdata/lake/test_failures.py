@@ -12,6 +12,7 @@ from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
@@ -189,7 +190,14 @@ def test_a_child_without_its_parent_is_refused(lake: Lake) -> None:
         ("parents", ("abc",)),
         ("source_hash", "abc"),
         ("frame_count", -1),
+        ("frame_count", 1.5),
         ("wind", float("nan")),
+        ("wind", "4"),
+        ("seed", 2**63),
+        ("name", "two\nlines"),
+        ("name", "not unicode \udce9"),
+        ("source_name", "not unicode \udce9"),
+        ("session", 7),
         ("parameters", "{"),
         ("report", "not json"),
     ],
@@ -198,6 +206,16 @@ def test_a_malformed_value_is_refused_by_its_column(column: str, value: object) 
     arguments: dict[str, object] = {"kind": Kind.WIND, "name": "x", column: value}
     with pytest.raises(InputError, match=column):
         Artifact(**arguments)
+
+
+def test_numbers_of_numpy_have_the_identity_of_python_s(lake: Lake) -> None:
+    python = Artifact(kind=Kind.CLIP, name="a", frame_first=0, frame_count=30, seed=7, wind=4.5)
+    values = {"frame_first": np.int64(0), "frame_count": np.uint8(30), "seed": np.int32(7), "wind": np.float32(4.5)}
+    numpy = Artifact(kind=Kind.CLIP, name="a", **values)
+    assert numpy.id == python.id
+    with lake.transaction("numpy") as tx:
+        tx.add(numpy)
+    assert lake.artifact(python.id).wind == 4.5
 
 
 def test_a_lake_is_not_made_where_something_is(lake: Lake, tmp_path: Path) -> None:
