@@ -43,10 +43,10 @@ class Load(Protocol):
 
 
 class Tie(Protocol):
-    """An attachment beside the handles. Where it loosens them its force and stiffness make up the difference."""
+    """Springs beside the handles, damped as those are. Where it loosens handles it makes up the difference to them."""
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]."""
+    def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
+        """The elastic part: (vertex, 3, batch) [N]."""
         ...
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
@@ -196,7 +196,7 @@ class System:
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
         for tie in self.ties:
-            total = total + tie.force(self.cloth, time, position, velocity)
+            total = total + tie.force(self.cloth, time, position)
         for friction, past in zip(self.frictions, self._memory(memory), strict=True):
             total = total + friction.force(self.cloth, past, position)
         return total
@@ -245,6 +245,7 @@ class System:
         """
         wind = torch.lerp(*drive.wind, share)
         total = self.internal(position, velocity) + self.external(wind, time, position, velocity, memory=memory)
+        total = total + self._tie_damping(drive, time, position, velocity)
         if not self.sprung:
             return total
         stretch = position[self.held] - torch.lerp(*drive.targets, share)
@@ -279,7 +280,15 @@ class System:
             total = total + self.air.force(self.cloth, position, velocity, wind)
         if self.cloth.stiffening is not None:
             total = total + bending.added_force(self.cloth, position, velocity)
+        total = total + self._tie_damping(drive, time, position, velocity)
         return self._with_added(total, wind, time, position, velocity, memory)
+
+    def _tie_damping(self, drive: Drive, time: float, position: Tensor, velocity: Tensor) -> Tensor:
+        """Kelvin–Voigt damping of the ties, whose other ends move with the handles: (vertex, 3, batch) [N]."""
+        tied = self.tied(time, position)
+        if tied is None:
+            return torch.zeros_like(velocity)
+        return -self.cloth.damping * tied * (velocity - drive.rate.mean(0))
 
     def tensors(self) -> tuple[Tensor, ...]:
         """The parameters that gradients may be wanted of."""
