@@ -7,14 +7,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import torch
 from torch import Tensor
 
-from sim.cloth import Cloth
+from flagdata.errors import UsageError
+from sim.air import QuadraticNormal, face_wind
+from sim.cloth import Cloth, gather_sum
+from sim.effects.geometry import origin
 from sim.effects.parameter import Parametrised
 from sim.state import State
 from sim.system import System
+from sim.wind import Wind
 
 
 class Effect(Parametrised, ABC):
@@ -22,18 +27,11 @@ class Effect(Parametrised, ABC):
 
     @abstractmethod
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        """The batch with this effect, and its start."""
+        """The batch with this effect, and its start.
 
-
-class ForceEffect(Effect):
-    """An additional force."""
-
-    @abstractmethod
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N], for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
-
-    def apply(self, system: System, state: State) -> tuple[System, State]:
-        return replace(system, effects=(*system.effects, self)), state
+        Raises:
+            UsageError: the effect does not fit the system.
+        """
 
 
 def apply(effects: Iterable[Effect], system: System, state: State) -> tuple[System, State]:
@@ -47,3 +45,119 @@ def apply(effects: Iterable[Effect], system: System, state: State) -> tuple[Syst
             fitted = effect.for_batch(system.cloth.batch, dtype=system.cloth.dtype, device=system.cloth.device)
             system, state = fitted.apply(system, state)
     return system, state
+
+
+class ForceEffect(Effect):
+    """An additional force."""
+
+    @abstractmethod
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N], for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        return replace(system, effects=(*system.effects, self)), state
+
+
+class PressureEffect(Effect):
+    """A factor on the base model's normal force."""
+
+    @abstractmethod
+    def factor(self, density: float, across: Tensor) -> Tensor:
+        """A factor that broadcasts to (face, 1, batch).
+
+        Args:
+            density: ρ of the base model's force ρ a |w_n| w_n [kg/m³].
+            across: (face, 1, batch) the relative wind along the normal w_n [m/s].
+        """
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        air = system.air
+        if isinstance(air, FactoredNormal):
+            return replace(system, air=replace(air, effects=(*air.effects, self))), state
+        if isinstance(air, QuadraticNormal):
+            return replace(system, air=FactoredNormal(base=air, effects=(self,))), state
+        raise UsageError(
+            f"{type(self).__name__} changes a normal force, which {type(air).__name__} has none of",
+            where="effects", fix="use the quadratic-normal wind force",
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class FactoredNormal:
+    """The base model's air with factors on its normal part."""
+
+    base: QuadraticNormal
+    effects: tuple[PressureEffect, ...]
+
+    def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        seen = face_wind(cloth, position, velocity, wind)
+        density = torch.full_like(seen.across, self.base.density)
+        for effect in self.effects:
+            density = density * effect.factor(self.base.density, seen.across)
+        third = (cloth.areas / 3)[:, None, None]
+        push = third * (density * seen.across.abs() * seen.across * seen.normal + self.base.drag * seen.along)
+        return gather_sum([push, push, push], cloth.face_slots)
+
+
+class WindEffect(Effect):
+    """A change of the wind that is the same everywhere."""
+
+    @abstractmethod
+    def velocity(self, time: float, wind: Tensor) -> Tensor:
+        """(3, batch) [m/s] at a time [s], for the wind (3, batch) so far."""
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        return replace(system, wind=ChangedWind(base=system.wind, effect=self)), state
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChangedWind:
+    """A wind with an effect."""
+
+    base: Wind
+    effect: WindEffect
+
+    def velocity(self, time: float) -> Tensor:
+        """(3, batch) [m/s] at a time [s]."""
+        return self.effect.velocity(time, self.base.velocity(time))
+
+
+class FlowEffect(Effect):
+    """A change of the wind that differs from place to place."""
+
+    @abstractmethod
+    def field(self, time: float, offset: Tensor, wind: Tensor) -> Tensor:
+        """The air at the vertices: (vertex, 3, batch) [m/s].
+
+        Args:
+            time: [s].
+            offset: (vertex, 3, batch) from the middle of the attachments at the start to the vertices [m].
+            wind: (3, batch) or (vertex, 3, batch) so far [m/s].
+        """
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        return replace(system, flows=(*system.flows, PlacedFlow(effect=self, origin=origin(system, state)))), state
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedFlow:
+    """A flow effect about a place (3, batch) [m]."""
+
+    effect: FlowEffect
+    origin: Tensor
+
+    def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
+        """The air at the vertices: (vertex, 3, batch) [m/s]."""
+        return self.effect.field(time, position - self.origin, wind)
+
+
+class ClothEffect(Effect):
+    """A change of the cloth itself: mass, stiffness, damping."""
+
+    @abstractmethod
+    def cloth(self, cloth: Cloth) -> Cloth:
+        """The changed cloth."""
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        return replace(system, cloth=self.cloth(system.cloth)), state

@@ -1,13 +1,61 @@
-"""Small geometry that several effects share."""
+"""Small geometry that several effects share. Up is +z."""
 
 from __future__ import annotations
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.mesh import Mesh
+from sim.state import State
+from sim.system import System
 
-def norm(vectors: Tensor) -> Tensor:
-    """(n, 1, batch) lengths of (n, 3, batch); their gradient is 0 at 0, not NaN."""
-    square = (vectors * vectors).sum(1, keepdim=True)
+
+def norm(vectors: Tensor, *, axis: int = 1) -> Tensor:
+    """Lengths along an axis, which is kept; their gradient is 0 at 0, not NaN."""
+    square = (vectors * vectors).sum(axis, keepdim=True)
     positive = square > 0
     return torch.where(positive, torch.where(positive, square, 1.0).sqrt(), 0.0)
+
+
+def origin(system: System, state: State) -> Tensor:
+    """(3, batch) the middle of the attachments, or of the cloth where nothing holds it [m]."""
+    return (system.anchors if len(system.held) else state.position).mean(0)
+
+
+def horizontal(vectors: Tensor, *, axis: int) -> Tensor:
+    """The vectors with their part along z set to 0."""
+    x, y, z = vectors.unbind(axis)
+    return torch.stack([x, y, torch.zeros_like(z)], axis)
+
+
+def left_of(vectors: Tensor, *, axis: int) -> Tensor:
+    """z × the vectors: their horizontal part turned by 90° counter-clockwise seen from above."""
+    x, y, z = vectors.unbind(axis)
+    return torch.stack([-y, x, torch.zeros_like(z)], axis)
+
+
+def boundary_edges(mesh: Mesh) -> NDArray[np.int64]:
+    """(edge, 2) vertices of the edges with one face, sorted."""
+    pairs = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    unique, counts = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
+    return unique[counts == 1]
+
+
+def hem_lengths(mesh: Mesh) -> NDArray[np.float64]:
+    """(vertex,) half the length of the boundary edges at each vertex [m]; their sum is the perimeter."""
+    edges = boundary_edges(mesh)
+    half = np.hypot(*(mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]).T) / 2
+    return np.bincount(edges.ravel(), weights=np.repeat(half, 2), minlength=mesh.vertex_count).astype(np.float64)
+
+
+def edge_distances(mesh: Mesh) -> NDArray[np.float64]:
+    """(vertex,) distance to the nearest boundary edge in the flat cloth [m]."""
+    edges = boundary_edges(mesh)
+    start, along = mesh.rest[edges[:, 0]], mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]
+    offset = mesh.rest[:, None] - start
+    share = np.clip((offset * along).sum(-1) / (along * along).sum(-1), 0, 1)
+    distance = np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
+    distance[mesh.boundary] = 0.0
+    return distance

@@ -1,0 +1,89 @@
+"""A flag held along its whole hoist, as by a sleeve or by many clips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from sim.cloth import Cloth
+from sim.effects.effect import Effect
+from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.handles import Handles, full_hoist
+from sim.state import State
+from sim.system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class FullHoist(Effect):
+    """Springs along the hoist, between the handles, to where its vertices start; they move with the handles.
+
+    Attributes:
+        stiffness: of the springs on each axis, per length of hoist.
+    """
+
+    stiffness: Annotated[
+        Value,
+        strength(
+            unit="N/m²",
+            prior=(1e2, 2e4),
+            admissible=NOT_NEGATIVE,
+            source="loose lacing to a tight sleeve; 1e4 is the reference simulator's 1e3 N/m on vertices 0.1 m apart",
+        ),
+    ] = 0.0
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        mesh = system.cloth.mesh
+        hoist = full_hoist(mesh.rest)
+        added = [i for i, vertex in enumerate(hoist) if vertex not in system.handles.vertices]
+        if not added:
+            raise UsageError(
+                "every vertex of the hoist is held already", where="full hoist",
+                fix="leave the effect out, or start from two corners on a mesh with rows between them",
+            )  # fmt: skip
+        along = mesh.rest[list(hoist), 1]
+        share = np.gradient(along) if len(hoist) > 2 else np.full(2, np.ptp(along) / 2)
+        vertices = torch.tensor([hoist[i] for i in added], device=state.position.device)
+        lace = Lace(
+            springs=torch.as_tensor(share[added], dtype=system.cloth.dtype, device=system.cloth.device)[:, None]
+            * self.stiffness,
+            vertices=vertices,
+            anchors=state.position[vertices],
+            handles=system.handles,
+        )  # fmt: skip
+        return replace(system, ties=(*system.ties, lace)), state
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lace:
+    """Springs to anchors that move with the handles.
+
+    Attributes:
+        springs: (tied, batch or 1) [N/m].
+        vertices: (tied,).
+        anchors: (tied, 3, batch) [m].
+        handles: whose motion they follow.
+    """
+
+    springs: Tensor
+    vertices: Tensor
+    anchors: Tensor
+    handles: Handles
+
+    def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N]."""
+        offset = torch.as_tensor(self.handles.offset(time), dtype=position.dtype, device=position.device)
+        stretch = position[self.vertices] - self.anchors - offset[:, None]
+        return torch.zeros_like(position).index_add(0, self.vertices, -self.springs.unsqueeze(1) * stretch)
+
+    def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
+        """(vertex, batch) [N/m]."""
+        return self.stiffest(cloth)
+
+    def stiffest(self, cloth: Cloth) -> Tensor:
+        """(vertex, batch) [N/m]."""
+        return torch.zeros_like(cloth.mass).index_add(0, self.vertices, self.springs.expand(-1, cloth.batch))

@@ -1,0 +1,92 @@
+"""The reactive fluid loading of a sheet in a stream: what makes a flag flutter.
+
+A sheet with small deflection η(x, t) in a stream U along x feels, per area, the pressure difference
+
+    p = −m_a (∂t + U ∂x)² η = −m_a (η_tt + 2 U η_xt + U² η_xx)
+
+with m_a the air's mass per area that moves with the sheet: π ρ H/4 for a slender strip (Lighthill, J. Fluid Mech.
+9:305, 1960), of the order of ρ L for a wide one; it is the non-circulatory part of the load in Argentina and Mahadevan,
+PNAS 102:1829 (2005). The three terms are inertia, a Coriolis-like coupling, and a centrifugal force that acts as
+compression.
+
+For a sheet of any shape, with velocity v, unit normal n and air u, let V = (v − u)·n be the normal velocity relative to
+the air. The operator (∂t + U ∂x) follows the air along the sheet: D = d/dt + (u − v)_t·∇_s, with d/dt on a material
+point and _t the tangential part, so that the load is −m_a (D V) n,
+
+    D V = n·a + ṅ·(v − u) + (u − v)_t·∇_s V                                 (u taken as slow: u̇ is left out)
+
+For v = η_t e_z, n = e_z − η_x e_x, u = U e_x this is η_tt + U η_xt + U ∂x(η_t + U η_x): the equation above. The first
+term is the integrator's (see `sim.inertia`), the others are a force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from sim.cloth import Cloth, gather_sum
+from sim.effects.added_mass import AddedMass, MassPerArea
+from sim.effects.effect import ForceEffect
+from sim.inertia import area_vectors
+from sim.state import State
+from sim.system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReactiveLoading(ForceEffect):
+    """−m_a (∂t + U ∂x)² η on every vertex along its normal.
+
+    Attributes:
+        mass: m_a, per area of cloth.
+    """
+
+    mass: MassPerArea = 0.0
+
+    def apply(self, system: System, state: State) -> tuple[System, State]:
+        system = replace(system, loads=(*system.loads, AddedMass(mass=self.mass)))
+        return super().apply(system, state)
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        tiny = torch.finfo(position.dtype).tiny
+        relative = velocity - wind
+        area = area_vectors(cloth, position)
+        size = (area * area).sum(1, keepdim=True).sqrt().clamp(min=tiny)
+        normal = area / size
+        rate = area_rates(cloth, position, velocity)
+        turning = (rate - (rate * normal).sum(1, keepdim=True) * normal) / size
+        across = (relative * normal).sum(1, keepdim=True)
+
+        third = (cloth.areas / 3)[:, None, None]
+        stream = sum_of_corners(cloth, -relative) / 3
+        swept = third * (stream * surface_gradient(cloth, position, across)).sum(1, keepdim=True)
+        convective = gather_sum([swept, swept, swept], cloth.face_slots)
+        weight = torch.as_tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)[:, None, None]
+        return -self.mass * (weight * (turning * relative).sum(1, keepdim=True) + convective) * normal
+
+
+def sum_of_corners(cloth: Cloth, field: Tensor) -> Tensor:
+    """(face, …) sums of a vertex field (vertex, …) over the corners."""
+    return field[cloth.faces[:, 0]] + field[cloth.faces[:, 1]] + field[cloth.faces[:, 2]]
+
+
+def area_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
+    """Time derivative of `inertia.area_vectors`: (vertex, 3, batch) [m²/s]."""
+    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+    v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
+    turned = torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)
+    return gather_sum([turned / 6, turned / 6, turned / 6], cloth.face_slots)
+
+
+def surface_gradient(cloth: Cloth, position: Tensor, field: Tensor) -> Tensor:
+    """Gradient along the deformed faces of a linear field (vertex, 1, batch): (face, 3, batch) [1/m].
+
+    With N the face's doubled area vector and e_c the edge opposite to corner c: ∇f = Σ f_c N × e_c / N².
+    """
+    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+    f0, f1, f2 = (field[cloth.faces[:, c]] for c in range(3))
+    doubled = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
+    edges = f0 * (x2 - x1) + f1 * (x0 - x2) + f2 * (x1 - x0)
+    square = (doubled * doubled).sum(1, keepdim=True).clamp(min=torch.finfo(position.dtype).tiny)
+    return torch.linalg.cross(doubled, edges, dim=1) / square
