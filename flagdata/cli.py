@@ -8,7 +8,7 @@ from importlib import import_module
 import click
 
 from flagdata.console import fail
-from flagdata.errors import FlagdataError
+from flagdata.errors import FlagdataError, UnknownNameError
 
 # verb → (where its click command is, one line of help shown without importing it)
 VERBS: dict[str, tuple[str, str]] = {
@@ -46,6 +46,13 @@ class LazyGroup(click.Group):
         module, _, attribute = VERBS[cmd_name][0].partition(":")
         return getattr(import_module(module), attribute)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and not args[0].startswith("-") and args[0] not in VERBS:
+            raise UnknownNameError.of("command", args[0], VERBS)
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(verb, about) for verb, (_, about) in VERBS.items()])
@@ -61,7 +68,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 usage, 3 a gate not met."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        root.main(args=given, prog_name="flagdata", standalone_mode=False)
+        outcome = root.main(args=given, prog_name="flagdata", standalone_mode=False)
     except FlagdataError as error:
         sys.exit(fail(error, as_json="--json" in given))
     except click.ClickException as error:
@@ -70,7 +77,7 @@ def main(arguments: list[str] | None = None) -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("flagdata: interrupted", err=True)
         sys.exit(1)
-    sys.exit(0)
+    sys.exit(outcome if isinstance(outcome, int) else 0)  # an int is what a command gave to Context.exit
 
 
 if __name__ == "__main__":
