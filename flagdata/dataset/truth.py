@@ -23,6 +23,7 @@ from flagdata.signals import Instants, Sensor, Series, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 BLOCK = 1.0  # s, length of the block means whose correlation gives the standard error
+HISTORY = 600.0  # s up to the clip's end over which the correlation time is estimated, or the window, if longer
 GAP = 1.5  # sampling periods; a longer silence, if it is longer than a block too, is a gap
 LOW_COVERAGE = 0.8  # of the window; less is flagged, and refused by default
 STALE = 5.0  # s; an older newest sample is flagged, and refused by default
@@ -162,7 +163,9 @@ class TruthSeries:
         speed, held = self.speed[first:last], self.held[first:last]
         wind = float(np.average(speed, weights=held))
         inside = np.minimum(held, (self.time[first:last] - begin) / NANOSECONDS)
-        sigma_mean = _standard_error(self._blocks(first, last, begin))
+        past = int(np.searchsorted(self.time, end - round(max(HISTORY, window) * NANOSECONDS), side="right"))
+        correlation = _correlation_time(self._blocks(past, last, begin))
+        sigma_mean = _standard_error(self._blocks(first, last, begin), correlation)
         dead = float(np.average(self.dead[first:last], weights=held))
         sigma_sensor = _sensor_sigma(self.sensor, wind, dead)
         sigma_clock = clock_sigma * self._slope(first, last, begin, end, clock_sigma)
@@ -187,7 +190,7 @@ class TruthSeries:
         )
 
     def _blocks(self, first: int, last: int, begin: int) -> Series:
-        """Means over consecutive blocks of a second (or of the sampling period, if longer); empty blocks are absent."""
+        """Means over blocks of a second (or of the sampling period, if longer) from `begin`; empty ones are absent."""
         width = round(max(BLOCK, self.period) * NANOSECONDS)
         # A stamp closes its block, as it closes the window.
         block = (self.time[first:last] - begin - 1) // width
@@ -221,27 +224,37 @@ def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
     return math.hypot(accuracy, step, hidden)
 
 
-def _standard_error(values: Series) -> float:
-    """Standard error of the mean of a correlated series (n,), in the unit of the values; NaN for n < 2.
+def _correlation_time(values: Series) -> float:
+    """Integrated autocorrelation time of a series (n,), in steps: 1 for uncorrelated values.
 
-    var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²) and τ the integrated autocorrelation time in steps: the divisor
-    undoes the loss of variance that removing the sample's own mean causes. τ is Geyer's initial monotone sequence
-    (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992, section 3.3), held between 1 (no credit for
-    anti-correlation) and n/2 (the error is then the scatter itself: the window saw no two independent winds). With
-    few independent winds in the window no estimate from the window alone can be right: for AR(1) series of 60 values,
-    mean ± 2 standard errors holds the true mean in 96, 92, 89 and 76 % of cases at φ = 0, 0.5, 0.7 and 0.9.
+    Geyer's initial monotone sequence (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992, section 3.3), and at
+    least 1: no credit for anti-correlation.
     """
     n = len(values)
-    if n < 2:
-        return math.nan
     centred = values - np.mean(values)
     variance = float(np.mean(centred**2))
     if variance == 0:
-        return 0.0
+        return 1.0
     spectrum = np.fft.rfft(centred, 2 * n)
     correlation = np.fft.irfft(spectrum * np.conj(spectrum), 2 * n)[:n] / (n * variance)
     pairs = correlation[0 : n - n % 2 : 2] + correlation[1::2]
     positive = pairs[: int(np.argmax(pairs <= 0))] if np.any(pairs <= 0) else pairs
-    time = 2 * float(np.sum(np.minimum.accumulate(positive))) - 1
-    time = min(max(time, 1.0), n / 2)
-    return math.sqrt(variance * time / (n - time))
+    return max(2 * float(np.sum(np.minimum.accumulate(positive))) - 1, 1.0)
+
+
+def _standard_error(values: Series, correlation: float) -> float:
+    """Standard error of the mean of a series (n,) with a correlation time τ in steps; NaN for n < 2.
+
+    var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²): the divisor undoes the loss of variance that removing the
+    sample's own mean causes. τ is held at n/2 at most, where the error is the scatter itself: the window then saw no
+    two independent winds.
+
+    For a minute at 1 Hz of an AR(1) process, mean ± 2 standard errors holds the true mean in 96, 96, 94 and 93 % of
+    cases at correlation times of 1, 6, 19 and 39 s when the log goes back ten minutes; when it begins with the window,
+    in 96, 89, 75 and 65 %.
+    """
+    n = len(values)
+    if n < 2:
+        return math.nan
+    time = min(correlation, n / 2)
+    return math.sqrt(float(np.var(values)) * time / (n - time))
