@@ -95,6 +95,9 @@ class _Clock:
     utc: list[NDArray[np.bool_]] = field(default_factory=list)
 
     def parse(self, block: Sequence[Sequence[str]]) -> Stamps:
+        if len(self.columns) == 1:
+            only = self.columns[0]
+            return parse_stamps([row[only] for row in block], self.form)
         return parse_stamps([" ".join(row[i].strip() for i in self.columns) for row in block], self.form)
 
     def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
