@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from flagdata.errors import InputError
 from flagdata.timebase import NANOSECONDS
 
+NINETY = 1.6448536269514722
+"""Half the width of the two-sided 90 % interval of a normal distribution [σ]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Segment:
@@ -52,7 +55,8 @@ class ClockModel:
         device: name of the device whose clock this is.
         reference: name of the clock it is expressed on.
         method: "stamps", "given", "estimated" (from motion) or "paired" (from two stamps of each sample).
-        confidence: probability that the true offset lies within 2 σ of the stated one, 0 to 1; 1 for given offsets.
+        confidence: probability that an estimated offset is neither an accident nor another peak's, 0 to 1; its σ is
+            given that. 1 for offsets that someone states.
     """
 
     device: str

@@ -34,13 +34,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.align.bins import STEPS, LagBins
+from flagdata.align.clock import NINETY
 from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import Whitened, fit
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Series, WindAverage
 
-_NINETY = 1.6448536269514722  # two-sided 90 % of a normal distribution
+_WIDEST = 7200.0  # s
+_WINDS_AT_ONCE = 25
 _EULER = 0.5772156649015329
 
 
@@ -82,6 +84,11 @@ class LagSearch:
             raise InputError("a lag search with numbers that are not finite", fix="give finite numbers")
         if self.window <= 0 or self.overlap <= 0 or self.sigma <= 0:
             raise InputError("window, overlap and sigma must be positive", fix="give seconds > 0")
+        if self.window > _WIDEST:
+            raise InputError(
+                f"a search of ±{self.window:g} s",
+                fix=f"search ±{_WIDEST:g} s at most, around a centre that is known better",
+            )
         if self.response_sigma < 0 or self.stamp_sigma < 0 or self.gustiness < 0:
             raise InputError("uncertainties and gustiness must not be negative", fix="give numbers ≥ 0")
         if not (0 < self.chance < 1 and 0 < self.rival < 1):
@@ -168,7 +175,9 @@ def estimate_offset(
         return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
     model = fit(bins, overlap=search.overlap)
     if model is None:
-        return _nothing(bins, search, (*motion.findings, _short_overlap(bins.longest_overlap(), search)))
+        longest = bins.longest_overlap()
+        reason = _still(motion) if longest >= search.overlap else _short_overlap(longest, search)
+        return _nothing(bins, search, (*motion.findings, reason))
     pair = model.best
     score, counts, best = pair.search(overlap=search.overlap)
     peak = pair.peak(score, best)
@@ -186,7 +195,7 @@ def estimate_offset(
         offset=offset,
         sigma=sigma,
         sigma_statistical=statistical,
-        interval=(offset - _NINETY * sigma, offset + _NINETY * sigma),
+        interval=(offset - NINETY * sigma, offset + NINETY * sigma),
         at=bins.middle(best),
         confidence=(1 - chance) * mass,
         correlation=peak.correlation,
@@ -216,10 +225,13 @@ class _Accidents:
         present = np.isfinite(pair.wind)
         centred = np.where(present, pair.wind - np.mean(pair.wind[present]), 0.0)
         spectrum = np.abs(np.fft.rfft(centred))[:, None]
-        phase = generator.uniform(0.0, 2 * math.pi, (len(spectrum), search.surrogates))
-        winds = np.fft.irfft(spectrum * np.exp(1j * phase), n=len(centred), axis=0)
-        scores, _ = pair.scores(winds, overlap=search.overlap)
-        greatest = np.max(scores[np.all(np.isfinite(scores), axis=1)], axis=0)
+        greatest = np.empty(search.surrogates)
+        for first in range(0, search.surrogates, _WINDS_AT_ONCE):
+            part = greatest[first : first + _WINDS_AT_ONCE]
+            phase = generator.uniform(0.0, 2 * math.pi, (len(spectrum), len(part)))
+            winds = np.fft.irfft(spectrum * np.exp(1j * phase), n=len(centred), axis=0)
+            scores, _ = pair.scores(winds, overlap=search.overlap)
+            part[:] = np.max(scores[np.all(np.isfinite(scores), axis=1)], axis=0)
         scale = float(np.std(greatest, ddof=1)) * math.sqrt(6) / math.pi
         return cls(location=float(np.mean(greatest)) - _EULER * scale, scale=scale)
 
@@ -306,6 +318,10 @@ def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
         " without gusts nothing ties the film to it",
         bins.gustiness,
     )
+
+
+def _still(motion: MotionSeries) -> Finding:
+    return _error("still-flag", f"the motion does not vary over {len(motion)} frames: nothing follows the wind", None)
 
 
 def _short_overlap(longest: float, search: LagSearch) -> Finding:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.align.clock import ClockModel, Segment
+from flagdata.align.clock import NINETY, ClockModel, Segment
 from flagdata.align.declared import by_stamps, given, stamp_sigma
 from flagdata.align.drift import ClockLine, clock_line
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
@@ -212,36 +212,28 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
         clock=clock,
         recipe=recipe,
         findings=(*estimate.findings, *_too_good(pair, line.sigma_offset)),
-        details={"method": "estimated", **summary(estimate), "drift": drift_summary(line)},
+        details={"method": "estimated", **summary(estimate, line)},
         curve=found.as_json(),
     )
     return Outcome(alignment=alignment, evidence=found)
 
 
-def summary(estimate: LagEstimate) -> dict[str, Any]:
-    """An estimate's numbers for JSON; what is not finite is null."""
-
-    def known(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
+def summary(estimate: LagEstimate, line: ClockLine) -> dict[str, Any]:
+    """The numbers of a clock model that was estimated, for JSON; `drift_parts` is 0 where the drift is a prior's."""
+    half = NINETY * line.sigma_offset
     return {
-        "offset": known(estimate.offset),
-        "sigma": known(estimate.sigma),
-        "sigma_statistical": known(estimate.sigma_statistical),
-        "interval": [known(bound) for bound in estimate.interval],
+        "offset": line.offset,
+        "sigma": line.sigma_offset,
+        "interval": [line.offset - half, line.offset + half],
         "level": 0.9,
         "confidence": estimate.confidence,
         "chance": estimate.chance,
-        "correlation": known(estimate.correlation),
+        "correlation": estimate.correlation,
         "bins": estimate.bins,
-        "accepted": estimate.accepted,
-        "findings": [finding.as_dict() for finding in estimate.findings],
+        "drift": line.drift,
+        "drift_sigma": line.sigma_drift,
+        "drift_parts": len(line.parts),
     }
-
-
-def drift_summary(line: ClockLine) -> dict[str, Any]:
-    """A recording's drift for JSON; `parts` is 0 where it is a prior's."""
-    return {"value": line.drift, "sigma": line.sigma_drift, "parts": len(line.parts)}
 
 
 def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import theilslopes
 
-from flagdata.align.clock import ClockModel, Segment
+from flagdata.align.clock import NINETY, ClockModel, Segment
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
@@ -223,7 +223,7 @@ def _first_after(late: Series, starts: NDArray[np.int64], block: int, before: fl
 
 def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, ...]:
     first = model.segments[0]
-    half = 1.645 * first.sigma_offset
+    half = NINETY * first.sigma_offset
     found = [
         Finding(
             kind="clocks-paired",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagdata.align.bins import normal_scores
+from flagdata.align.clock import NINETY
 from flagdata.align.drift import ClockLine
 from flagdata.align.lag import LagEstimate
 from flagdata.align.methods import Evidence
@@ -19,7 +20,6 @@ from flagdata.timebase import NANOSECONDS, iso
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_NINETY = 1.6448536269514722  # two-sided 90 % of a normal distribution
 _MARGIN = 30.0  # s of wind shown either side of the film
 _MOTION, _WIND, _MARK = "#b5541c", "#1f5f8b", "#444444"
 
@@ -104,7 +104,7 @@ def _draw_curve(axes: Axes, estimate: LagEstimate, values: Series, *, label: str
 def _draw_parts(axes: Axes, line: ClockLine) -> None:
     at = np.array([(part.at - line.origin) / NANOSECONDS / 60 for part in line.parts])
     offset = np.array([part.offset for part in line.parts])
-    half = np.array([_NINETY * part.sigma_statistical for part in line.parts])
+    half = np.array([NINETY * part.sigma_statistical for part in line.parts])
     axes.errorbar(at, offset, yerr=half, fmt="o", color=_MOTION, lw=1, ms=4)
     ends = np.array([at.min(), at.max()])
     axes.plot(ends, line.offset + line.drift * 60 * ends, color=_MARK, lw=1)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from flagdata.align.clock import ClockModel
 from flagdata.align.motion import MotionSeries, motion_energy
 from flagdata.dataset.clips import clip_rows
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import ConflictError, InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical, code_version, recipe_hash
@@ -154,12 +154,25 @@ def session_of(pair: Pair, *, named: str | None) -> str | None:
     return sessions.pop() if sessions else None
 
 
-def find_recording(lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, branch: str) -> RecordingResult | None:
-    """The recording that these parents and options make, if it is on the branch."""
+def find_recording(
+    lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
+) -> RecordingResult | None:
+    """The recording that these parents and options make, if it is on the branch.
+
+    Raises:
+        ConflictError: it is, under another name or session than the one asked for.
+    """
     rows = lake.rows(f"kind = 'recording' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
     for row in rows:
         if list(row["parents"]) == [pair.camera.id, pair.wind.id]:
             artifact = Artifact.from_row(row)
+            for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
+                if asked is not None and asked != kept:
+                    raise ConflictError(
+                        f"the recording is there already with the {label} {kept!r}",
+                        where=artifact.id,
+                        fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
+                    )
             return RecordingResult(recording=artifact, clips=_clips_of(lake, artifact, branch), created=False)
     return None
 
@@ -183,9 +196,10 @@ def make_recording(
 
     Raises:
         UsageError: the parents are of different sessions and `session` is `None`.
+        ConflictError: it is there already under another name or session.
         InputError: the clock model folds frames back over a jump, or the wind log has no sample near the film.
     """
-    present = find_recording(lake, pair, alignment.recipe, branch=branch)
+    present = find_recording(lake, pair, alignment.recipe, name=name, session=session, branch=branch)
     if present is not None:
         return present
     chosen = session_of(pair, named=session)

@@ -141,7 +141,7 @@ def _run(
     from flagdata.align.recording import find_recording, make_recording, session_of
 
     session_of(pair, named=session)  # refused before the long part
-    present = None if dry_run or plot else find_recording(lake, pair, recipe, branch=branch)
+    present = None if dry_run or plot else find_recording(lake, pair, recipe, name=name, session=session, branch=branch)
     if present is not None:
         say("this recording is there already; nothing was written")
         _report(present, None, as_json=as_json)
@@ -194,18 +194,17 @@ def _report(made: RecordingResult | None, outcome: Outcome | None, *, as_json: b
 
 def _sentence(outcome: Outcome) -> str:
     """`offset +12.31 s [12.02, 12.60] 90 %, confidence 0.99, n = 596 bins of 1 s`."""
-    if outcome.evidence is not None:
-        found, period = outcome.evidence.estimate, outcome.evidence.wind.period
-        low, high = found.interval
-        return (
-            f"offset {found.offset:+.2f} s [{low:.2f}, {high:.2f}] 90 %, confidence {found.confidence:.2f},"
-            f" n = {found.bins} bins of {period:g} s"
-        )
-    segment = outcome.alignment.clock.segments[0]
-    half = 1.645 * segment.sigma_offset
+    from flagdata.align.clock import NINETY
+
+    (segment,) = outcome.alignment.clock.segments
+    half = NINETY * segment.sigma_offset
     digits = max(2, 1 - math.floor(math.log10(segment.sigma_offset)))
     low, high = segment.offset - half, segment.offset + half
-    return (
-        f"offset {segment.offset:+.{digits}f} s [{low:.{digits}f}, {high:.{digits}f}] 90 %,"
-        f" {outcome.alignment.clock.method}"
-    )
+    text = f"offset {segment.offset:+.{digits}f} s [{low:.{digits}f}, {high:.{digits}f}] 90 %"
+    if outcome.evidence is None or outcome.evidence.line is None:
+        return f"{text}, {outcome.alignment.clock.method}"
+    estimate, line = outcome.evidence.estimate, outcome.evidence.line
+    text += f", confidence {estimate.confidence:.2f}, n = {estimate.bins} bins of {outcome.evidence.wind.period:g} s"
+    if line.parts:
+        text += f"; drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm, n = {len(line.parts)} parts"
+    return text

@@ -154,7 +154,7 @@ def test_an_offset_beyond_the_search_is_refused(scene: Scenes) -> None:
 def test_a_still_film_is_refused(scene: Scenes) -> None:
     motion, wind = scene(seed=3)
     found = estimate((replace(motion, energy=np.zeros(len(motion))), wind))
-    assert not found.accepted
+    assert refusals(found) == {"still-flag"}
 
 
 def test_wind_and_film_of_different_days_say_so(scene: Scenes) -> None:
@@ -174,3 +174,19 @@ def test_bins_off_their_grid_say_so(scene: Scenes) -> None:
     jitter = stream(1, "jitter").integers(-300_000_000, 300_000_000, len(wind.time))
     with pytest.raises(InputError, match="regular grid"):
         estimate((motion, replace(wind, time=wind.time + jitter)))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"window": 0.0},
+        {"window": 1e5},
+        {"centre": np.nan},
+        {"response_sigma": -1.0},
+        {"chance": 1.0},
+        {"surrogates": 3},
+    ],
+)
+def test_searches_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError):
+        LagSearch(**wrong)  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from flagdata.cli import root
-from flagdata.errors import RefusedError, UsageError
+from flagdata.errors import ConflictError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
 from flagdata.rng import stream
@@ -132,6 +132,34 @@ def test_aligning_again_finds_the_recording_and_writes_nothing(gusty: tuple[Path
     assert again["recording"] == first["recording"]
     assert sorted(again["clips"]) == sorted(first["clips"])  # type: ignore[call-overload]
     assert Lake.open(folder).resolve(None) == head
+
+
+def test_another_session_for_a_recording_that_is_there_is_a_conflict(gusty: tuple[Path, str, str]) -> None:
+    folder, camera, wind = gusty
+    options = ("--by", "given", "--offset", "6.5", "--offset-sigma", "0.1", "--lake", str(folder))
+    run("align", camera, wind, *options, "--session", "one")
+    with pytest.raises(ConflictError, match="session 'one'"):
+        run("align", camera, wind, *options, "--session", "two")
+
+
+def test_an_offset_claimed_better_than_a_frame_is_flagged(gusty: tuple[Path, str, str]) -> None:
+    folder, camera, wind = gusty
+    said = run(
+        "align", camera, wind, "--by", "given", "--offset", "7", "--offset-sigma", "0.001", "--lake", str(folder)
+    )
+    assert "sigma-below-frame" in Lake.open(folder).artifact(str(said["recording"])).quality
+
+
+def test_people_read_the_offset_with_its_interval(gusty: tuple[Path, str, str]) -> None:
+    folder, camera, wind = gusty
+    result = CliRunner().invoke(
+        root,
+        ["align", camera, wind, "--by", "given", "--offset", "-3.2", "--offset-sigma", "0.25", "--dry-run",
+         "--lake", str(folder)],
+        catch_exceptions=False,
+    )  # fmt: skip
+    # 1.645 × 0.25 = 0.411 either side.
+    assert result.stdout.strip() == "offset -3.20 s [-3.61, -2.79] 90 %, given"
 
 
 def test_realign_writes_a_new_object_and_names_what_it_supersedes(gusty: tuple[Path, str, str]) -> None:
