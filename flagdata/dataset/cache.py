@@ -93,7 +93,8 @@ class DecodedCache:
                 header = json.loads(line)
                 shape = tuple(header["shape"])
                 data = np.fromfile(stream, dtype=np.uint8)
-                os.utime(stream.fileno())
+                with contextlib.suppress(PermissionError):  # a cache that may be read only keeps its order of eviction
+                    os.utime(stream.fileno())
         except FileNotFoundError:
             return None
         except (ValueError, KeyError, TypeError):
