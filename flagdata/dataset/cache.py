@@ -95,19 +95,20 @@ class DecodedCache:
                 data = np.fromfile(stream, dtype=np.uint8)
                 with contextlib.suppress(PermissionError):  # a cache that may be read only keeps its order of eviction
                     os.utime(stream.fileno())
+            sound = {key: header[key] for key in identity} == identity
+            if sound and name not in self._verified:
+                sound = zlib.crc32(data.data) == header["crc32"]
+            frames = data.reshape(shape)
         except FileNotFoundError:
+            self._verified.discard(name)  # evicted; what takes its place is another file
             return None
         except (ValueError, KeyError, TypeError):
-            path.unlink(missing_ok=True)
-            return None
-        sound = {k: header.get(k) for k in identity} == identity and data.size == int(np.prod(shape))
-        if sound and name not in self._verified:
-            sound = zlib.crc32(data.data) == header.get("crc32")
+            sound, frames = False, None
         if not sound:
             path.unlink(missing_ok=True)
             return None
         self._verified.add(name)
-        return data.reshape(shape)
+        return frames
 
     def _write(self, name: str, identity: dict[str, Any], frames: NDArray[np.uint8]) -> None:
         pixels = np.ascontiguousarray(frames).data
