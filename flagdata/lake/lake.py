@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import cast
@@ -113,24 +112,15 @@ class Lake:
         }
         put_if_absent(self.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode())
 
-    @contextmanager
-    def transaction(self, message: str, *, branch: str = MAIN) -> Iterator[Transaction]:
-        """Collect objects and rows; publish all of them when the block ends, nothing when it raises.
+    def transaction(self, message: str, *, branch: str = MAIN) -> Transaction:
+        """A context manager: collects objects and rows, publishes all when its block ends, nothing when that raises.
 
         Raises:
             UnknownNameError: no such branch.
             ConflictError: other processes kept committing for two minutes.
             FlagdataError: no space, no permission; nothing was published.
         """
-        transaction = Transaction(
-            catalog=self.catalog, objects=self.objects, staging=self.staging, branch=branch, message=message,
-            identities=lambda: self._identities(branch), row=lambda identity: self.artifact(identity, at=branch),
-        )  # fmt: skip
-        try:
-            yield transaction
-            transaction._commit()
-        finally:
-            transaction._close()
+        return Transaction(self, message, branch=branch)
 
     def rows(
         self, where: str | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
@@ -283,11 +273,6 @@ class Lake:
         if len(parts) == 1:
             return parts[0]
         return pa.concat_tables(reversed(parts))
-
-    def _identities(self, branch: str) -> tuple[int, frozenset[str]]:
-        head = self.catalog.head()
-        table = self.table(self.refs.view(branch, head))
-        return head, frozenset(table["artifact"].to_pylist())
 
     def _commits(self) -> dict[str, tuple[int, str]]:
         return {e["commit"]: (e["version"], e["branch"]) for e in self.catalog.history() if "commit" in e}

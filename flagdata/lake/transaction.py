@@ -5,22 +5,26 @@ from __future__ import annotations
 import secrets
 import shutil
 import uuid
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog, Moved, persist
+from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease
-from flagdata.lake.objects import Objects
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
+
+if TYPE_CHECKING:
+    from flagdata.lake.lake import Lake
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,27 +55,41 @@ class Transaction:
     Idempotence holds in a race too: an append is accepted only at the version whose identities were checked. When two
     processes add the same identity at once, one publishes it, the other is told, looks again, and reports it as
     existing. No reader ever sees an identity twice on one branch.
+
+    Raises:
+        UsageError: no message; or anything but `result` used outside the block.
     """
 
-    def __init__(
-        self, *, catalog: Catalog, objects: Objects, staging: Path, branch: str, message: str,
-        identities: Callable[[], tuple[int, frozenset[str]]], row: Callable[[str], Artifact],
-    ) -> None:  # fmt: skip
+    def __init__(self, lake: Lake, message: str, *, branch: str) -> None:
         if not message.strip():
             raise UsageError("the commit has no message", fix="say in a few words what it brings in")
         self.branch = branch
         self.message = message
         self.result: CommitResult | None = None
-        self._catalog = catalog
-        self._objects = objects
-        self._identities = identities
-        self._row = row
+        self._lake = lake
+        self._known: frozenset[str] = frozenset()
         self._pending: dict[str, Artifact] = {}
         self._existing: dict[str, None] = {}
         self._sizes: dict[str, int] = {}  # of the objects that the lease holds
-        self._known = self._identities()[1]
-        with disk_errors("starting a transaction", staging):
-            self._lease = Lease(staging)
+        self._held: Lease | None = None
+
+    def __enter__(self) -> Transaction:
+        self._known = self._look()[1]
+        with disk_errors("starting a transaction", self._lake.staging):
+            self._held = Lease(self._lake.staging)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        lease = self._lease
+        try:
+            if kind is None:
+                with disk_errors("committing", self._lake.catalog.path):
+                    self.result = self._publish()
+        finally:
+            self._held = None
+            lease.close()
 
     def staging(self, suffix: str) -> Path:
         """A fresh path with `suffix` (".mcap", ".zarr"), nothing at it yet; removed with the transaction."""
@@ -87,15 +105,15 @@ class Transaction:
             InputError: neither an .mcap file nor a folder of plain files, or empty.
             FlagdataError: no space, no permission.
         """
-        self._open_only()
+        lease = self._lease
         with disk_errors("storing an object", path):
-            if self._lease.folder not in path.parents:
+            if lease.folder not in path.parents:
                 path = self._copy(path)
-            name = self._objects.name_of(path)
-            with self._lease.keeping_collectors_out():
-                self._lease.hold(name)
-                self._objects.publish(path, name)
-            self._sizes[name] = self._objects.size(name)
+            name = self._lake.objects.name_of(path)
+            with lease.keeping_collectors_out():
+                lease.hold(name)
+                self._lake.objects.publish(path, name)
+            self._sizes[name] = self._lake.objects.size(name)
         return name
 
     def add(self, artifact: Artifact) -> bool:
@@ -106,7 +124,6 @@ class Transaction:
         Raises:
             NotFoundError: its object was not put, or a parent is neither on the branch nor in this transaction.
         """
-        self._open_only()
         identity = artifact.id
         if identity in self._pending:
             return False
@@ -124,24 +141,29 @@ class Transaction:
         """The artifact of that full id if it is in this transaction or on the branch, else `None`."""
         if artifact_id in self._pending:
             return self._pending[artifact_id]
-        return self._row(artifact_id) if artifact_id in self._known else None
+        return self._lake.artifact(artifact_id, at=self.branch) if artifact_id in self._known else None
 
-    def _commit(self) -> None:
-        with disk_errors("committing", self._catalog.path):
-            if self._pending:
-                with self._lease.keeping_collectors_out(), suppress(Moved):
-                    self._catalog.tidy()
-            self.result = self._publish()
+    @property
+    def _lease(self) -> Lease:
+        if self._held is None:
+            raise UsageError("the transaction is not open", fix="use it inside its with-block")
+        return self._held
 
-    def _close(self) -> None:
-        self._lease.close()
+    def _look(self) -> tuple[int, frozenset[str]]:
+        """The head, and the identities that the branch shows at it."""
+        head = self._lake.catalog.head()
+        shown = self._lake.table(self._lake.refs.view(self.branch, head))
+        return head, frozenset(shown["artifact"].to_pylist())
 
     def _publish(self) -> CommitResult:
+        if self._pending:
+            with self._lease.keeping_collectors_out(), suppress(Moved):
+                self._lake.catalog.tidy()
         created = datetime.now(UTC)
         commit = f"c{secrets.token_hex(8)}"
 
         def attempt() -> CommitResult:
-            version, known = self._identities()
+            version, known = self._look()
             fresh = [a for identity, a in self._pending.items() if identity not in known]
             existing = (*self._existing, *(identity for identity in self._pending if identity in known))
             if not fresh:
@@ -156,15 +178,15 @@ class Transaction:
                 "code_version": code_version(),
             }
             with self._lease.keeping_collectors_out():
-                version = self._catalog.append(rows, base=version, info=info)
+                version = self._lake.catalog.append(rows, base=version, info=info)
             return CommitResult(version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing)
 
-        return persist(attempt, where=self._catalog.path)
+        return persist(attempt, where=self._lake.catalog.path)
 
     def _hold(self, name: str) -> int:
         with self._lease.keeping_collectors_out():
             self._lease.hold(name)
-            self._sizes[name] = self._objects.size(name)
+            self._sizes[name] = self._lake.objects.size(name)
         return self._sizes[name]
 
     def _check_parents(self, artifacts: Iterable[Artifact], known: frozenset[str]) -> None:
@@ -186,7 +208,3 @@ class Transaction:
         else:
             raise NotFoundError("there is no such file or folder", where=str(path), fix="write the object first")
         return inside
-
-    def _open_only(self) -> None:
-        if self.result is not None:
-            raise UsageError("the transaction has been committed", fix="open another")

@@ -40,6 +40,18 @@ def test_an_exception_inside_the_block_publishes_nothing(lake: Lake) -> None:
     assert [p.name for p in lake.staging.iterdir() if p.is_dir()] == []
 
 
+def test_a_transaction_is_of_no_use_outside_its_block(lake: Lake) -> None:
+    with lake.transaction("nothing") as tx:
+        pass
+    assert tx.result is not None
+    assert (tx.result.commit, tx.result.added) == (None, ())
+    for use in (lambda: tx.staging(".mcap"), lambda: tx.put(lake.path), lambda: lake.transaction(" ")):
+        with pytest.raises(UsageError):
+            use()
+    with pytest.raises(UnknownNameError), lake.transaction("nowhere", branch="nope"):
+        pass
+
+
 def test_the_same_identity_is_published_once(lake: Lake, put_text: Put) -> None:
     first = put_text(lake, "gusts")
     before = lake.resolve(None)
