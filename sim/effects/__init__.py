@@ -1,6 +1,6 @@
 """Effects the base model lacks: one a file, each with null value, unit, prior and source.
 
-An entry here enrols it in the contract suite (`tests/contract/test_effects.py`).
+An entry here enrols it in the contract suites (`tests/contract/test_effects.py`, `test_sensor_effects.py`).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from flagdata.registry import Registry
 from sim.effects.effect import Effect, apply
 from sim.effects.parameter import Parameter, Role
 
-__all__ = ["EFFECTS", "Effect", "Parameter", "Role", "apply"]
+__all__ = ["EFFECTS", "SENSOR_EFFECTS", "Effect", "Parameter", "Role", "apply"]
 
 EFFECTS = Registry(
     "effect",
@@ -40,3 +40,22 @@ EFFECTS = Registry(
         "tilted-pole": "sim.effects.tilted_pole:TiltedPole",
     },
 )
+"""On the cloth: kinds of `sim.effects.effect`."""
+
+SENSOR_EFFECTS = Registry(
+    "sensor effect",
+    {
+        "anemometer-lag": "sim.effects.anemometer_lag:AnemometerLag",
+        "overspeeding": "sim.effects.overspeeding:Overspeeding",
+        "anemometer-gain": "sim.effects.anemometer_gain:AnemometerGain",
+        "anemometer-offset": "sim.effects.anemometer_offset:AnemometerOffset",
+        "anemometer-dead-zone": "sim.effects.anemometer_dead_zone:AnemometerDeadZone",
+        "clock-offset": "sim.effects.clock_offset:ClockOffset",
+        "clock-drift": "sim.effects.clock_drift:ClockDrift",
+        "frame-rate-error": "sim.effects.frame_rate_error:FrameRateError",
+        "exposure-blur": "sim.effects.exposure_blur:ExposureBlur",
+        "rolling-shutter": "sim.effects.rolling_shutter:RollingShutter",
+        "frame-jitter": "sim.effects.frame_jitter:FrameJitter",
+    },
+)
+"""On the observation: kinds of `sim.effects.sensor`."""
