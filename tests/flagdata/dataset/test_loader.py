@@ -65,7 +65,7 @@ def test_batches_are_identical_with_any_number_of_workers(pairs, expected, worke
     assert epoch(loader) == expected[1]
 
 
-@pytest.mark.parametrize("run_in", ["fork", "spawn"])
+@pytest.mark.parametrize("run_in", ["fork", "spawn", "forkserver"])
 def test_worker_processes_need_nothing_of_the_catalog(field_lake, expected, run_in):
     # The catalog was used in this process just now: what the workers inherit must not need it.
     fresh = flagdata.open(field_lake.path).pairs(at="v1", seed=11)
