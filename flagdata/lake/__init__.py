@@ -1,6 +1,6 @@
 """The lake: immutable objects under their content hash, a Delta catalog whose one commit publishes them, and refs.
 
-Layout of a lake's folder:
+A lake is a folder of a local disk, or of a network file system that carries hard links and flock. Its layout:
 
     lake.json            format version and identity of the lake
     catalog/             the Delta table; one row an artifact (schema.CATALOG)

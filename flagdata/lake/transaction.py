@@ -20,6 +20,7 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease
+from flagdata.lake.objects import files_of
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -202,7 +203,11 @@ class Transaction:
     def _copy(self, path: Path) -> Path:
         inside = self.staging(path.suffix)
         if path.is_dir():
-            shutil.copytree(path, inside, symlinks=True)
+            inside.mkdir()
+            for source in files_of(path):  # without their modes: what is read-only could be neither moved nor collected
+                target = inside / source.relative_to(path)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source, target)
         elif path.is_file():
             shutil.copyfile(path, inside)
         else:

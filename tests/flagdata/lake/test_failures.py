@@ -176,6 +176,22 @@ def test_a_file_from_elsewhere_is_copied_and_stays(lake: Lake, tmp_path: Path) -
     assert lake.object_path(name).read_text() == "mine"
 
 
+def test_a_read_only_folder_is_copied_to_one_that_can_be_moved_and_collected(lake: Lake, tmp_path: Path) -> None:
+    source = tmp_path / "mine.zarr"
+    (source / "inner").mkdir(parents=True)
+    (source / "inner" / "zarr.json").write_text("{}")
+    for folder in (source / "inner", source):
+        folder.chmod(0o555)
+    with lake.transaction("copy") as tx:
+        path = lake.objects.path(tx.put(source))
+    assert all(folder.stat().st_mode & 0o200 for folder in (path, path / "inner"))
+    assert oct((path / "inner" / "zarr.json").stat().st_mode)[-3:] == "444"
+    assert len(collect(lake, grace=NOW).objects) == 1
+    assert list(lake.objects) == []
+    for folder in (source, source / "inner"):
+        folder.chmod(0o755)
+
+
 def test_a_child_without_its_parent_is_refused(lake: Lake) -> None:
     with lake.transaction("orphan") as tx, pytest.raises(NotFoundError, match="parent"):
         tx.add(Artifact(kind=Kind.CLIP, name="clip", parents=("0" * 32,)))
