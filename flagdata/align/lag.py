@@ -36,7 +36,7 @@ import numpy as np
 from flagdata.align.bins import STEPS, LagBins
 from flagdata.align.clock import NINETY
 from flagdata.align.motion import MotionSeries
-from flagdata.align.whitened import Whitened, fit
+from flagdata.align.whitened import FEWEST_BINS, Whitened, fit
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Series, WindAverage
@@ -58,7 +58,7 @@ class LagSearch:
             `flagdata.align.windbins`.
         response_sigma: its standard uncertainty [s]. It bounds from below what this method can know.
         stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut to whole seconds.
-        overlap: least time both must cover [s].
+        overlap: least time both must cover [s]; and never fewer than 30 bins.
         gustiness: least standard deviation over mean of the binned wind. Below it the wind says nothing about time.
         chance: greatest probability of such a peak by accident.
         rival: a second peak at this share of the greatest score makes the estimate ambiguous.
@@ -175,8 +175,8 @@ def estimate_offset(
         return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
     model = fit(bins, overlap=search.overlap)
     if model is None:
-        longest = bins.longest_overlap()
-        reason = _still(motion) if longest >= search.overlap else _short_overlap(longest, search)
+        longest, least = bins.longest_overlap(), max(search.overlap, FEWEST_BINS * bins.period)
+        reason = _still(motion) if longest >= least else _short_overlap(longest, least)
         return _nothing(bins, search, (*motion.findings, reason))
     pair = model.best
     score, counts, best = pair.search(overlap=search.overlap)
@@ -324,10 +324,10 @@ def _still(motion: MotionSeries) -> Finding:
     return _error("still-flag", f"the motion does not vary over {len(motion)} frames: nothing follows the wind", None)
 
 
-def _short_overlap(longest: float, search: LagSearch) -> Finding:
+def _short_overlap(longest: float, least: float) -> Finding:
     return _error(
         "short-overlap",
-        f"film and wind log share {longest:.0f} s at most at any offset searched (limit {search.overlap:g} s)",
+        f"film and wind log share {longest:.0f} s at most at any offset searched (limit {least:g} s)",
         longest,
     )
 

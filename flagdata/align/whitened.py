@@ -16,7 +16,8 @@ from flagdata.signals import Series
 _ORDER = 4
 _WIDTHS = (1.0, 2.0, 4.0, 8.0)  # bins
 _ROUNDS = 3
-_FEWEST_BINS = 30
+FEWEST_BINS = 30
+"""Fewer wind bins in common are not compared, however long they are."""
 _TRIALS_AT_ONCE = 256
 _VANISHING = 1e-12  # of a variance of normal scores: nothing moves
 _PERFECT = 1 - 1e-12  # |r|, so that its atanh is finite
@@ -60,7 +61,7 @@ class Whitened:
         trials = len(self.bins.offsets)
         scores = np.empty((trials, winds.shape[1]))
         counts = np.empty(trials)
-        enough = max(_FEWEST_BINS, overlap / self.bins.period)
+        enough = max(FEWEST_BINS, overlap / self.bins.period)
         for start in range(0, trials, _TRIALS_AT_ONCE):
             part = slice(start, start + _TRIALS_AT_ONCE)
             mask = self.bins.windows(there, part).astype(np.float64)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +14,8 @@ from scipy.signal import lfilter
 
 from flagdata.align.motion import MotionSeries
 from flagdata.rng import stream
-from flagdata.signals import WindAverage
+from flagdata.signals import Sensor, WindAverage, WindSeries
+from flagdata.timebase import from_datetime
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND
@@ -138,3 +142,47 @@ def gusts_alone() -> Callable[[int, float], np.ndarray]:
         return gusts(Scene(seed=seed), stream(seed, "another day"), seconds)
 
     return build
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tunnel:
+    """The camera-tracked card flag and the tunnel's anemometer, both stamped by one laptop.
+
+    Attributes:
+        device, host: (n,) stamps of the tracked flag by the camera's computer and by the laptop [UTC ns].
+        motion: (n,) RMS displacement of the tracked points [px].
+        wind: the anemometer on the laptop's clock, its zero of -0.35 m/s put right.
+    """
+
+    device: np.ndarray
+    host: np.ndarray
+    motion: np.ndarray
+    wind: WindSeries
+
+
+@pytest.fixture(scope="session")
+def tunnel(reference_data: Path) -> Tunnel:
+    """Read here by hand, so that nothing hangs on the ingest."""
+    folder = reference_data / "wind" / "flag-camera-tunnel"
+
+    def lines(name: str) -> list[tuple[int, str]]:
+        with (folder / name).open(newline="") as file:
+            rows = list(csv.reader(file))[1:]
+        return [(from_datetime(datetime.fromisoformat(stamp).replace(tzinfo=UTC)), raw) for stamp, raw in rows]
+
+    device, host, motion = [], [], []
+    for stamp, raw in lines("pi_log.csv"):
+        fields = raw.split(",")
+        if len(fields) == 7:
+            seconds, milliseconds = fields[0].split(".")
+            device.append(int(seconds) * SECOND + int(milliseconds) * 1_000_000)
+            host.append(stamp)
+            motion.append(float(fields[1]))
+    stamps, speeds = zip(*((stamp, float(raw) + 0.35) for stamp, raw in lines("gt_log.csv")), strict=True)
+    wind = WindSeries(
+        time=np.array(stamps),
+        channels={"wind_speed": np.array(speeds)},
+        flags=np.zeros(len(stamps), dtype=np.uint16),
+        sensor=Sensor(name="tunnel", averaging=0.0, distance_constant=0.0),
+    )
+    return Tunnel(device=np.array(device), host=np.array(host), motion=np.array(motion), wind=wind)

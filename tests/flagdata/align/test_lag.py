@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.stats import binom
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
 from flagdata.errors import InputError
+from flagdata.ingest.anemometer import average
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
 
@@ -190,3 +192,12 @@ def test_bins_off_their_grid_say_so(scene: Scenes) -> None:
 def test_searches_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
         LagSearch(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.reference
+@pytest.mark.parametrize(("period", "why"), [(0.25, "accidental-peak"), (1.0, "short-overlap")])
+def test_the_tunnels_one_rise_of_the_wind_in_22_seconds_is_refused(tunnel: Any, period: float, why: str) -> None:
+    """A single ramp ties the clocks to a second at best, and 22 bins to nothing."""
+    motion = MotionSeries(time=tunnel.device, energy=tunnel.motion)
+    found = estimate((motion, average(tunnel.wind, period)), window=8.0, overlap=14.0, response=0.0)
+    assert why in refusals(found)

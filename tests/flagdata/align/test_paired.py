@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from datetime import UTC, datetime
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from flagdata.align.paired import host_clock, nominal_times, pair_clocks
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
-from flagdata.timebase import from_datetime
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND
@@ -146,20 +143,21 @@ def test_a_log_with_one_kind_of_stamp_has_no_host_clock() -> None:
 
 
 @pytest.mark.reference
-def test_the_tunnels_camera_clock_runs_sixty_milliseconds_ahead_of_the_laptop(reference_data: Path) -> None:
+def test_the_tunnels_camera_clock_runs_sixty_milliseconds_ahead_of_the_laptop(tunnel: Any) -> None:
     """The least of laptop − device in the file is near −64 ms; the device writes whole milliseconds."""
-    device, host = [], []
-    with (reference_data / "wind" / "flag-camera-tunnel" / "pi_log.csv").open(newline="") as lines:
-        for stamp, raw in csv.reader(lines):
-            fields = raw.split(",")
-            if len(fields) == 7:
-                seconds, milliseconds = fields[0].split(".")
-                device.append(int(seconds) * SECOND + int(milliseconds) * 1_000_000)
-                host.append(from_datetime(datetime.fromisoformat(stamp).replace(tzinfo=UTC)))
-    paired = pair_clocks(np.array(device), np.array(host))
+    paired = pair_clocks(tunnel.device, tunnel.host)
     (segment,) = paired.model.segments
-    least = min(h - d for d, h in zip(device, host, strict=True)) / SECOND
-    assert segment.offset == pytest.approx(least, abs=0.002)
+    assert segment.offset == pytest.approx(float(np.min(tunnel.host - tunnel.device)) / SECOND, abs=0.002)
     assert 0.0003 < segment.sigma_offset < 0.01
     assert abs(segment.drift) < 1e-4
     assert paired.worst_delay < 0.05
+
+
+@pytest.mark.reference
+def test_the_tunnels_anemometer_keeps_a_steady_203_hertz_without_loss(tunnel: Any) -> None:
+    """12,596 readings in 62 s, by the file's own stamps; bursts of up to 20 ms are delays, not steps."""
+    device = nominal_times(tunnel.wind.time)
+    paired = pair_clocks(device, tunnel.wind.time)
+    assert SECOND / np.median(np.diff(device)) == pytest.approx(203.2, abs=0.2)
+    assert len(paired.model.segments) == 1
+    assert 0.005 < paired.worst_delay < 0.03
