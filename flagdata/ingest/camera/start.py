@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import tzinfo
 
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.timebase import NANOSECONDS, from_wall, iso, parse, zone
+from flagdata.timebase import NANOSECONDS, iso, parse, zone
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ def find_start(
             continue
         try:
             if key == "creation_time":
-                found = _from_creation_time(text, place=place, duration=duration, where=where)
+                found = _from_creation_time(text, default=default, duration=duration, where=where)
             else:
                 found = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
@@ -87,20 +87,15 @@ def find_start(
     )
 
 
-def _from_creation_time(text: str, *, place: str | None, duration: float, where: str) -> Start:
-    if place is None:
-        instant = parse(text, default=zone("UTC"), where=where)
-        what = f"the start is creation_time {text} taken as UTC and as the start of the recording"
-    else:
-        # The camera wrote its wall clock and the container calls it UTC.
-        wall = datetime.fromisoformat(iso(parse(text, default=zone("UTC"), where=where))[:19])
-        instant = from_wall(wall, zone(place), where=where)
-        what = f"the start is creation_time {text} taken as wall-clock time in {place}, at the start of the recording"
+def _from_creation_time(text: str, *, default: tzinfo | None, duration: float, where: str) -> Start:
+    instant = parse(text, default=default, where=where)
+    # Uniform from start to end of the recording, and over the second it is cut to.
     sigma = (1 / 12 + duration**2 / 12) ** 0.5
     finding = Finding(
         kind="start-unsure",
         severity=Severity.WARNING,
-        what=f"{what}; some cameras write the end of it (then it is {duration:.1f} s early) and some local time",
+        what=f"the start is creation_time {text}, taken as the start of the recording in the zone it names; some "
+        f"cameras write their local time as UTC, and some write the end (then it is {duration:.1f} s late)",
         value=sigma,
         fix="give --start with a zone, or align the recording by its contents",
     )

@@ -45,6 +45,14 @@ def test_instants_in_a_gap_are_left_out_and_counted() -> None:
     assert grid.report.longest_gap == 200 * MS
 
 
+def test_a_first_frame_that_is_late_by_just_the_tolerance_stands_for_the_start() -> None:
+    picks, grid = run([20 * MS, 60 * MS], rate=Fraction(25), tolerance=20 * MS)
+    assert [(p.time // MS, p.source) for p in picks] == [(0, 0), (40, 0)]
+    picks, grid = run([21 * MS, 61 * MS], rate=Fraction(25), tolerance=20 * MS)
+    assert [(p.time // MS, p.source) for p in picks] == [(40, 0)]
+    assert (grid.report.left_out, grid.report.gaps, grid.report.longest_gap) == (1, 1, 21 * MS)
+
+
 def test_a_slower_camera_repeats_frames_and_says_how_many() -> None:
     # 12.5 Hz onto 25 Hz: 0, 80, 160 ms; the instants 40 and 120 lie half-way and take the earlier.
     picks, grid = run([0, 80 * MS, 160 * MS], rate=Fraction(25), tolerance=60 * MS)
@@ -75,15 +83,16 @@ def test_stamps_that_do_not_increase_are_refused() -> None:
 
 
 @given(
+    first=st.one_of(st.just(0), st.integers(0, 100 * MS)),
     steps=st.lists(st.integers(1, 120 * MS), min_size=1, max_size=60),
     rate=st.sampled_from([Fraction(25), Fraction(30000, 1001), Fraction(7), Fraction(1000)]),
     tolerance=st.integers(0, 80 * MS),
     tail=st.integers(0, 30 * MS),
 )
 def test_each_instant_gets_the_nearest_frame_within_tolerance_or_none(
-    steps: list[int], rate: Fraction, tolerance: int, tail: int
+    first: int, steps: list[int], rate: Fraction, tolerance: int, tail: int
 ) -> None:
-    stamps = [0]
+    stamps = [first]
     for step in steps:
         stamps.append(stamps[-1] + step)
     picks, grid = run(stamps, rate=rate, tolerance=tolerance, tail=tail)

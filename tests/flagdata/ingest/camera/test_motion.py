@@ -19,18 +19,27 @@ WIDE, HIGH = 384, 216
 
 
 def scene(
-    number: int, *, flag: tuple[int, int, int] | None, flicker: float = 0.0, passer_by: bool = False, seed: int = 0
+    number: int,
+    *,
+    flag: tuple[int, int, int] | None,
+    flicker: float = 0.0,
+    passer_by: bool = False,
+    seed: int = 0,
+    height: float = 80.0,
 ) -> np.ndarray:
-    """(216, 384) still texture; waves in the square `flag` (x, y, side); all of it brighter and darker by `flicker`."""
+    """(216, 384) still texture with waves, `height` gray levels high, in the square `flag` (x, y, side).
+
+    All of it gets brighter and darker by `flicker`.
+    """
     still = np.random.default_rng(seed).integers(60, 180, (HIGH // 8, WIDE // 8)).astype(float)
     image = np.kron(still, np.ones((8, 8)))
     if flag:
         x, y, side = flag
         rows, columns = np.mgrid[:side, :side]
-        image[y : y + side, x : x + side] = 120 + 80 * np.sin(columns / 6 - number * 0.9 + rows / 15)
+        image[y : y + side, x : x + side] = 120 + height * np.sin(columns / 6 - number * 0.9 + rows / 15)
     if passer_by and 40 <= number < 80:
         at = 8 * (number - 40)
-        image[150:210, at : at + 30] = 20
+        image[150:210, at : at + 30] = 255
     image = image * (1 + flicker * np.sin(2.1 * number)) + 20 * flicker * np.cos(1.3 * number)
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
 
@@ -67,7 +76,7 @@ def test_the_proposal_is_a_square_just_around_the_moving_part(
 
 def test_flicker_of_the_whole_image_is_no_motion(film: Callable[..., Path]) -> None:
     flag = (200, 60, 80)
-    proposal = propose_crop(film("flicker.mp4", lambda n: scene(n, flag=flag, flicker=0.15), frames=120))
+    proposal = propose_crop(film("flicker.mp4", lambda n: scene(n, flag=flag, flicker=0.25, height=15), frames=120))
     assert covers(proposal.box.as_tuple(), flag)
     assert proposal.box.width <= 1.6 * flag[2]
     with pytest.raises(RefusedError, match="nothing moves"):
@@ -76,7 +85,7 @@ def test_flicker_of_the_whole_image_is_no_motion(film: Callable[..., Path]) -> N
 
 def test_a_passer_by_is_forgotten(film: Callable[..., Path]) -> None:
     flag = (200, 30, 80)
-    proposal = propose_crop(film("passer.mp4", lambda n: scene(n, flag=flag, passer_by=True)))
+    proposal = propose_crop(film("passer.mp4", lambda n: scene(n, flag=flag, passer_by=True, height=15)))
     assert covers(proposal.box.as_tuple(), flag)
     assert proposal.box.y + proposal.box.height <= 150
 

@@ -61,6 +61,15 @@ def test_a_single_stamp_behind_is_the_one_left_out() -> None:
     assert found == {"stamps-disordered": 1}
 
 
+def test_of_two_in_the_wrong_order_the_one_nearer_to_its_own_place_stays() -> None:
+    # Places by the period: 80 and 120 ms. 100 is 20 off its place, 85 is 35 off its own.
+    kept, _ = repair([0, 40, 100, 85, 160])
+    assert kept == [(0, 0), (1, 40), (2, 100), (4, 160)]
+    # 118 is 38 off its place, 115 is 5 off its own.
+    kept, _ = repair([0, 40, 118, 115, 160])
+    assert kept == [(0, 0), (1, 40), (3, 115), (4, 160)]
+
+
 def test_a_gap_forward_is_believed() -> None:
     kept, found = repair([0, 40, 10_000, 10_040])
     assert [stamp for _, stamp in kept] == [0, 40, 10_000, 10_040]

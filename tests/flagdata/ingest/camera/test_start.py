@@ -43,8 +43,11 @@ def test_creation_time_is_utc_and_its_uncertainty_spans_the_recording() -> None:
     assert start.findings[0].kind == "start-unsure"
 
 
-def test_a_zone_says_that_creation_time_is_the_cameras_wall_clock() -> None:
-    assert find({"creation_time": "2026-05-01T12:00:00.000000Z"}, place="Europe/Amsterdam").instant == TEN
+def test_a_zone_is_for_times_that_name_none_and_moves_no_other() -> None:
+    assert find({"creation_time": "2026-05-01T12:00:00"}, place="Europe/Amsterdam").instant == TEN
+    assert find({"creation_time": "2026-05-01T10:00:00.000000Z"}, place="Europe/Amsterdam").instant == TEN
+    with pytest.raises(TimeError, match="no zone"):
+        find({"creation_time": "2026-05-01T12:00:00"})
 
 
 def test_the_streams_own_wall_clock_is_read_in_the_given_zone() -> None:
@@ -64,6 +67,7 @@ def test_an_unusable_time_is_passed_over_and_mentioned() -> None:
         {},
         {"creation_time": "1904-01-01T00:00:00.000000Z"},
         {"creation_time": "1970-01-01T00:00:00.000000Z"},
+        {"creation_time": "1970-01-09T11:00:00.000000Z"},
         {"creation_time": "yesterday"},
         {"creation_time": ""},
         {"com.apple.quicktime.creationdate": "2026-05-01T12:00:00"},
