@@ -90,10 +90,8 @@ def make(
     spectrum = np.fft.rfft(here)
     frequency = np.fft.rfftfreq(len(here), 1 / FINE)
     coherence = np.exp(-8 * frequency * scene.apart / scene.mean)
-    fresh = np.fft.rfft(gusts(scene, stream(scene.seed, "fresh"), seconds)) if gust is None else np.zeros(len(spectrum))
+    fresh = np.fft.rfft(gusts(scene, stream(scene.seed, "fresh"), seconds))
     there = np.fft.irfft(spectrum * np.sqrt(coherence) + fresh * np.sqrt(1 - coherence), n=len(here))
-    if gust is not None:
-        there = here
     if other is not None:
         there = other
     speed_here = np.maximum(scene.mean * (1 + scene.turbulence * here), 0.1)
