@@ -12,7 +12,7 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from sim.effects import SENSOR_EFFECTS, Role
+from sim.effects import SENSOR_EFFECTS
 from sim.effects.parameter import Parametrised
 from sim.effects.sensor import AnemometerEffect, CameraEffect, ClockEffect, Sampling
 
