@@ -1,8 +1,9 @@
 """MCAP subsets: each artifact as a record of its own, message by message as it was recorded.
 
-A clip keeps its frames and the wind from a truth window before its first frame, so that its ground truth can be worked
-out again from the subset alone. Messages, schemas and metadata are copied byte for byte; whole records as files. H.264
-can be decoded from a key frame only: a clip of it begins with the frames since that one, and says how many they are.
+A clip keeps its frames and the ten minutes of wind up to its end that its ground truth and its σ were worked out from,
+so that both can be worked out again from the subset alone. Messages, schemas and metadata are copied byte for byte;
+whole records as files. H.264 can be decoded from a key frame only: a clip of it begins with the frames since that one,
+and says how many they are.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from flagdata.dataset.truth import HISTORY
 from flagdata.errors import CorruptError
 from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.record import Coding, messages
@@ -27,6 +29,7 @@ from flagdata.record.container import Messages, open_file, read_exact, read_mess
 from flagdata.record.video import is_key
 from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
+from flagdata.timebase import NANOSECONDS
 
 SAMPLE = "sample"
 """Metadata record of a subset: the artifact it is, the object it was cut from, the frames before the clip's own that
@@ -123,6 +126,7 @@ def _cut(entry: Entry, original: _Original, target: Path) -> None:
 def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tuple[str, int]]:
     """Topic and index of the messages of a clip: the parameters, then all others in order of log time."""
     begin, end = entry.wind_span
+    begin = min(begin, end - round(HISTORY * NANOSECONDS))
     topics, indices, times = [], [], []
     for number, (topic, table) in enumerate(original.messages.items()):
         if topic == TOPIC_TRUTH:

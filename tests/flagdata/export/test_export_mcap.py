@@ -40,10 +40,16 @@ def test_a_clip_holds_its_own_frames_and_no_other(known: Any, folder: Path) -> N
     assert {data.format for _, data in messages} == {"jpeg"}
 
 
-def test_a_clip_holds_the_wind_from_a_minute_before_it_to_its_end(known: Any, folder: Path) -> None:
-    messages = decoded(folder / f"{known.clips[1]}.mcap", "/wind/samples")
+@pytest.mark.parametrize(("history", "before"), [(600.0, 600), (30.0, 60)])
+def test_a_clip_holds_the_wind_that_its_ground_truth_was_worked_out_from(
+    known: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, history: float, before: int
+) -> None:
+    # Ten minutes reach back beyond the log's start; half a minute is less than the truth window before the first frame.
+    monkeypatch.setattr("flagdata.export.mcap.HISTORY", history)
+    export(known.lake, Export(format="mcap"), tmp_path / "mcap")
+    messages = decoded(tmp_path / "mcap" / f"{known.clips[1]}.mcap", "/wind/samples")
     start, end = int(known.times[30]), int(known.times[59])
-    wanted = (known.wind_time >= start - 60 * 10**9) & (known.wind_time <= end)
+    wanted = (known.wind_time >= start - before * 10**9) & (known.wind_time <= end)
     assert [message.log_time for message, _ in messages] == known.wind_time[wanted].tolist()
     assert [data.speed for _, data in messages] == known.wind_speed[wanted].tolist()
 
