@@ -16,6 +16,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
     "align": ("flagdata.commands.align:align", "Put a camera and an anemometer on one clock: a recording."),
     "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
+    "simulate": ("sim.commands:simulate", "Simulate cloth in the wind: mesh sequences from a recipe or a scene."),
     "ls": ("flagdata.commands.lake:ls", "List artifacts."),
     "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
     "log": ("flagdata.commands.lake:log", "List commits."),

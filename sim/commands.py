@@ -1,0 +1,63 @@
+"""`flagdata simulate`: a recipe or a scene into mesh sequences of the lake."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.console import document, json_option, lake_option, progress, say
+
+if TYPE_CHECKING:
+    from sim.run import RunReport
+
+
+@click.command()
+@click.argument("recipe", metavar="RECIPE")
+@click.option("--count", type=click.IntRange(min=1), metavar="N", help="How many members, instead of the recipe's.")
+@click.option("--batch", type=click.IntRange(min=1), metavar="N", help="How many at a time, instead of the recipe's.")
+@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda, cuda:1.")
+@click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
+@json_option
+@lake_option
+def simulate(
+    recipe: str, count: int | None, batch: int | None, device: str, branch: str, as_json: bool, lake_path: str
+) -> None:
+    """Simulate cloth in the wind: mesh sequences, with their parameters, seeds and energies.
+
+    RECIPE is a TOML file, a recipe of the catalog by name, or an ArcSim scene (.json), which is run with ArcSim's own
+    steps.
+
+    \b
+      flagdata simulate flag-search-space --lake lake --count 200
+      flagdata simulate my-flag.toml --lake lake --batch 64 --device cuda
+    """
+    from flagdata.lake import Lake
+    from sim.run import load
+    from sim.run import simulate as run
+
+    loaded = load(recipe)
+    loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
+    lake = Lake.open(lake_path)
+    with progress(loaded.count, label=loaded.name, unit="flag") as advance:
+        report = run(lake, loaded, branch=branch, device=device, progress=advance)
+    if as_json:
+        document("simulate", {"lake": str(lake.path), "recipe": loaded.name, **report.as_dict()})
+    else:
+        _print(report)
+    if report.failed:
+        sys.exit(1)
+
+
+def _print(report: RunReport) -> None:
+    for artifact in report.added:
+        click.echo(artifact)
+    for failure in report.failed:
+        say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
+    speed = f"{report.rate:.2f} flags/s, steps of {report.step * 1e3:.3g} ms"
+    say(
+        f"{len(report.added)} simulated in {report.seconds:.1f} s ({speed}), "
+        f"{len(report.existing)} in the lake already, {len(report.failed)} failed"
+    )

@@ -1,0 +1,176 @@
+"""A batch of members through time: frames kept, energies noted, members that fail taken out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from flagdata.lake.meshes import MeshSequence
+from flagdata.timebase import NANOSECONDS
+from sim.integrate import Integrator
+from sim.integrate.implicit import BackwardEuler
+from sim.integrate.stability import stiffest
+from sim.integrate.symplectic import Symplectic, advance
+from sim.run.diagnostics import Diagnosis, Monitor
+from sim.run.members import Crew, Member
+from sim.run.recipe import Recipe
+from sim.state import State
+from sim.system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of a member.
+
+    Attributes:
+        member: which.
+        sequence: its meshes; None where it failed.
+        diagnosis: what was measured on the way.
+        failure: kind and sentence, where it failed.
+    """
+
+    member: Member
+    sequence: MeshSequence | None
+    diagnosis: Diagnosis
+    failure: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepper:
+    """Advances batches of a recipe by frames, in steps that depend on the recipe alone and not on the batch.
+
+    Attributes:
+        method: None for the explicit method in `steps` equal steps a frame.
+        steps: of a frame.
+    """
+
+    recipe: Recipe
+    method: Integrator | None
+    steps: int
+
+    @classmethod
+    def of(cls, crew: Crew) -> Stepper:
+        """The method and the steps of a recipe.
+
+        Raises:
+            UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges.
+        """
+        recipe, spec = crew.recipe, crew.recipe.integrator
+        frame = 1 / recipe.time.rate
+        if spec.name == "implicit":
+            step = spec.step or 5e-3
+            method = BackwardEuler(step=step, air_shape=spec.air_shape)
+            return cls(recipe=recipe, method=method, steps=max(1, math.ceil(frame / step - 1e-9)))
+        system, _ = crew.corners()
+        with torch.no_grad():
+            return cls(recipe=recipe, method=None, steps=Symplectic(step=spec.step).steps(system, frame))
+
+    @property
+    def step(self) -> float:
+        """[s]."""
+        return 1 / self.recipe.time.rate / self.steps
+
+    def frame(self, system: System, state: State) -> State:
+        """One frame later."""
+        frame = 1 / self.recipe.time.rate
+        if self.method is not None:
+            return self.method.advance(system, state, frame)
+        return advance(system, state, frame, steps=self.steps)
+
+    def unstable(self, system: System) -> Tensor:
+        """(batch,) whether a member's own limit is below the step."""
+        if self.method is not None:
+            return torch.zeros(system.cloth.batch, dtype=torch.bool)
+        damping = system.cloth.damping
+        limit = (damping**2 + 4 / stiffest(system)).sqrt() - damping
+        return (limit <= self.step).cpu()
+
+
+def run(
+    crew: Crew,
+    stepper: Stepper,
+    members: Sequence[Member],
+    *,
+    size: int,
+    device: torch.device | str = "cpu",
+    progress: Callable[[int], object] | None = None,
+) -> list[Outcome]:
+    """Simulate some members together.
+
+    The batch always has `size` members, the last repeated as often as it takes: results then depend on a member and
+    the size alone, to the last bit.
+
+    Args:
+        progress: called with 1 after each frame, settling included.
+    """
+    filled = [*members, *[members[-1]] * (size - len(members))]
+    time = crew.recipe.time
+    with torch.no_grad():
+        system, state = crew.assemble(filled, device=device)
+        start, monitor, kept = state, Monitor(), []
+        failures: dict[int, tuple[str, str]] = {}
+        unstable = stepper.unstable(system)
+        for place in torch.nonzero(unstable).flatten().tolist():
+            failures[place] = ("unstable-step", f"its stable step is below the recipe's, {stepper.step:.3g} s")
+        for frame in range(time.total):
+            if frame:
+                state = stepper.frame(system, state)
+                failed = ~state.healthy()
+                for place in torch.nonzero(failed).flatten().tolist():
+                    failures.setdefault(place, ("diverged", f"it diverged before {state.time:.3f} s"))
+                state = _restarted(state, start, failed)
+            if frame >= time.settling:
+                monitor.look(system, state)
+                kept.append(state.position.to("cpu", torch.float32))
+            if progress is not None:
+                progress(1)
+    positions = torch.stack(kept).numpy()
+    first = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
+    outcomes: list[Outcome] = []
+    for place, member in enumerate(members):
+        failure = failures.get(place)
+        sequence = None
+        if failure is None:
+            sequence = MeshSequence(
+                time=np.array(first, dtype=np.int64), positions=np.ascontiguousarray(positions[..., place]),
+                faces=crew.mesh.faces.astype(np.int32), rest=crew.mesh.rest.astype(np.float32),
+                attributes=_attributes(crew, stepper, member, monitor.of(place)),
+            )  # fmt: skip
+        outcomes.append(Outcome(member=member, sequence=sequence, diagnosis=monitor.of(place), failure=failure))
+    return outcomes
+
+
+def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis) -> dict[str, Any]:
+    """What a sequence says of itself, also outside the lake."""
+    return {
+        "source": "flagdata simulate",
+        "recipe": crew.recipe.name,
+        "index": member.index,
+        "seed": member.seed,
+        "parameters": {name: _plain(value) for name, value in member.parameters.items()},
+        "step": stepper.step,
+        "energies": {name: list(values) for name, values in diagnosis.energies.items()},
+        "largest_strain": list(diagnosis.largest_strain),
+    }
+
+
+def _plain(value: float | tuple[float, ...]) -> float | list[float]:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _restarted(state: State, start: State, failed: torch.Tensor) -> State:
+    """Failed members from the start again, so that no infinity slows the batch down; they are not kept."""
+    if not bool(failed.any()):
+        return state
+    return replace(
+        state,
+        position=torch.where(failed, start.position, state.position),
+        velocity=torch.where(failed, 0.0, state.velocity),
+        memory=tuple(torch.where(failed, old, new) for old, new in zip(start.memory, state.memory, strict=True)),
+    )

@@ -1,0 +1,214 @@
+"""The members of a recipe: what each draws from its own named streams, and the batch that some of them form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.rng import child_seed, stream
+from sim import handles as held
+from sim.effects import EFFECTS, Effect, apply
+from sim.effects.gusts import Gusts
+from sim.handles import Handles
+from sim.material import BENDING_SHAPE, Material
+from sim.mesh import Mesh, grid
+from sim.run.recipe import Attachment, EffectSpec, MaterialSpec, Recipe, SceneSpec, Shape
+from sim.run.tables import Quantity, Range, ends
+from sim.scene import Scene, assemble, upright
+from sim.state import State
+from sim.system import System
+
+_GUST_RATE = 10.0  # Hz; the run is linear between samples
+_CALM = 0.01  # m/s; winds below it carry no eddies past within a run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """One simulation of a recipe.
+
+    Attributes:
+        index: 0, 1, … within the recipe.
+        seed: of its own streams; follows from the recipe's seed and the index.
+        scene: what is simulated.
+        parameters: what it drew and what was fixed, by name, SI; for the catalog.
+        effects: name → parameter → value.
+    """
+
+    index: int
+    seed: int
+    scene: Scene
+    parameters: Mapping[str, float | tuple[float, ...]]
+    effects: Mapping[str, Mapping[str, float]]
+
+    @property
+    def wind_speed(self) -> float:
+        """Of the mean wind, horizontally [m/s]."""
+        return math.hypot(*self.scene.wind[:2])
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Makes the members of one recipe, on one mesh."""
+
+    recipe: Recipe
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        spec = self.recipe.scene
+        if spec.arcsim is not None:
+            return spec.arcsim.scene.mesh
+        rows = max(1, round(spec.columns * spec.height / spec.width))
+        return grid(width=spec.width, height=spec.height, columns=spec.columns, rows=rows)
+
+    @cached_property
+    def handles(self) -> Handles:
+        spec = self.recipe.scene
+        if spec.arcsim is not None:
+            return spec.arcsim.scene.handles
+        if spec.shape is Shape.HANGING_CLOTH:
+            return Handles(vertices=held.top_corners(self.mesh.rest))
+        hoist = spec.attachment is Attachment.HOIST
+        return Handles(vertices=held.full_hoist(self.mesh.rest) if hoist else held.corners(self.mesh.rest))
+
+    def seed(self, index: int) -> int:
+        """The seed of a member."""
+        return child_seed(self.recipe.seed, "member", index)
+
+    def member(self, index: int) -> Member:
+        """A member, which depends on the recipe's seed and the index alone.
+
+        Raises:
+            InputError: what it drew makes no scene.
+        """
+        seed = self.seed(index)
+
+        def drawn(quantity: Quantity, *path: str) -> float:
+            return quantity.at(stream(seed, *path).random()) if isinstance(quantity, Range) else quantity
+
+        spec, wind = self.recipe.material, self.recipe.wind
+        each = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
+        material = _material(
+            spec,
+            density=drawn(_of(spec.density, spec.base.density), "material", "density"),
+            stretching=drawn(spec.stretching, "material", "stretching-factor"),
+            bending=drawn(spec.bending, "material", "bending-factor") * each,
+            damping=drawn(_of(spec.damping, spec.base.damping), "material", "damping"),
+        )
+        speed, toward = drawn(wind.speed, "wind", "speed"), drawn(wind.toward, "wind", "toward")
+        effects = {
+            name: {key: drawn(value, "effects", name, key) for key, value in effect.parameters.items()}
+            for name, effect in self.recipe.effects.items()
+        }
+        scene = Scene(
+            mesh=self.mesh, position=self._start(seed), material=material, handles=self.handles,
+            wind=(speed * math.cos(toward), speed * math.sin(toward), wind.vertical),
+            gravity=_gravity(self.recipe.scene), air=wind.force, evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact,
+        )  # fmt: skip
+        parameters: dict[str, float | tuple[float, ...]] = {
+            "wind_speed": speed,
+            "wind_toward": toward,
+            "wind_vertical": wind.vertical,
+            "density": material.density,
+            "damping": material.damping,
+            "stretching": tuple(material.stretching.ravel().tolist()),
+            "bending": tuple(material.bending.ravel().tolist()),
+        }
+        parameters |= {f"{name}.{key}": value for name, chosen in effects.items() for key, value in chosen.items()}
+        return Member(index=index, seed=seed, scene=scene, parameters=parameters, effects=effects)
+
+    def assemble(self, members: Sequence[Member], *, device: torch.device | str = "cpu") -> tuple[System, State]:
+        """The batch of these members with their effects, and its start.
+
+        Raises:
+            UsageError: an effect that does not fit.
+        """
+        system, state = assemble([m.scene for m in members], dtype=self.recipe.dtype, device=device)
+        return apply([self._effect(name, members) for name in self.recipe.effects], system, state)
+
+    def corners(self) -> tuple[System, State]:
+        """Two members at the ends of all ranges: where the stable step is found, so that it depends on no draw."""
+        spec, wind = self.recipe.material, self.recipe.wind
+        density, damping = ends(_of(spec.density, spec.base.density)), ends(_of(spec.damping, spec.base.damping))
+        each = ends(spec.bending_each)
+        members = [
+            Member(
+                index=end, seed=0, parameters={},
+                scene=Scene(
+                    mesh=self.mesh, position=self._start(0), handles=self.handles, air=wind.force,
+                    evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact,
+                    material=_material(
+                        spec, density=density[0], damping=damping[1], stretching=ends(spec.stretching)[1],
+                        bending=np.full(BENDING_SHAPE, ends(spec.bending)[1] * each[1]),
+                    ),
+                ),
+                effects={
+                    name: {key: ends(value)[end] for key, value in effect.parameters.items()}
+                    for name, effect in self.recipe.effects.items()
+                },
+            )
+            for end in (0, 1)
+        ]  # fmt: skip
+        return self.assemble(members)
+
+    def _start(self, seed: int) -> NDArray[np.float64]:
+        spec = self.recipe.scene
+        flat = spec.arcsim.scene.position if spec.arcsim is not None else upright(self.mesh)
+        if not spec.start_noise:
+            return flat
+        noise = stream(seed, "start").normal(0.0, spec.start_noise, flat.shape)
+        noise[list(self.handles.vertices)] = 0.0
+        return flat + noise
+
+    def _effect(self, name: str, members: Sequence[Member]) -> Effect:
+        values = {
+            key: torch.tensor([member.effects[name][key] for member in members], dtype=torch.float64)
+            for key in self.recipe.effects[name].parameters
+        }
+        effect = EFFECTS[name](**values)
+        if isinstance(effect, Gusts):
+            return self._gusty(effect, self.recipe.effects[name], members)
+        return effect
+
+    def _gusty(self, effect: Gusts, spec: EffectSpec, members: Sequence[Member]) -> Gusts:
+        """Each member's gusts from its own stream, whatever the others draw."""
+        time = self.recipe.time
+        duration = max(time.settle + (time.frames + 1) / time.rate, 2 / _GUST_RATE)
+        series: list[Gusts] = []
+        for member in members:
+            speed = member.wind_speed
+            series.append(
+                effect.with_series(
+                    stream(member.seed, "effects", "gusts", "series"), batch=1, speed=max(speed, _CALM),
+                    length=spec.length or 0.0, duration=duration, rate=_GUST_RATE,
+                )
+            )  # fmt: skip
+        return replace(effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1))
+
+
+def _of(quantity: Quantity | None, default: float) -> Quantity:
+    return default if quantity is None else quantity
+
+
+def _factors(spec: MaterialSpec, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    quantity = spec.bending_each
+    values = [quantity.at(share) if isinstance(quantity, Range) else quantity for share in shares.tolist()]
+    return np.array(values).reshape(BENDING_SHAPE)
+
+
+def _material(
+    spec: MaterialSpec, *, density: float, stretching: float, bending: NDArray[np.float64], damping: float
+) -> Material:
+    return replace(
+        spec.base, density=density, damping=damping, stretching=spec.base.stretching * stretching,
+        bending=spec.base.bending * bending,
+    )  # fmt: skip
+
+
+def _gravity(spec: SceneSpec) -> tuple[float, float, float]:
+    return spec.arcsim.scene.gravity if spec.arcsim is not None else (0.0, 0.0, -spec.gravity)

@@ -1,0 +1,165 @@
+"""Typed values out of parsed TOML tables, where every key must be known, and ranges that values are drawn from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, TypeAlias, TypeVar
+
+from flagdata.errors import InputError, UnknownNameError
+
+E = TypeVar("E", bound=StrEnum)
+
+
+class Scale(StrEnum):
+    """In what a drawn value is uniform."""
+
+    LINEAR = "linear"
+    LOG = "log"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """Values from `low` to `high`, uniform in the value or in its logarithm.
+
+    Raises:
+        InputError: bounds that are not finite or not in order, or a logarithm of what is not positive.
+    """
+
+    low: float
+    high: float
+    scale: Scale = Scale.LINEAR
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
+            raise InputError(f"a range from {self.low!r} to {self.high!r}", fix="give finite bounds, low ≤ high")
+        if self.scale is Scale.LOG and self.low <= 0:
+            raise InputError(f"a logarithmic range from {self.low!r}", fix="let it begin above 0, or take it linear")
+
+    def at(self, share: float) -> float:
+        """The value that a share (0 to 1) of the range lies below."""
+        if self.scale is Scale.LOG:
+            return math.exp(math.log(self.low) + share * (math.log(self.high) - math.log(self.low)))
+        return self.low + share * (self.high - self.low)
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"low": self.low, "high": self.high, "scale": self.scale.value}
+
+
+Quantity: TypeAlias = float | Range
+"""One value for all members, or a range that each draws its own from."""
+
+
+def ends(quantity: Quantity) -> tuple[float, float]:
+    """The smallest and the largest value."""
+    return (quantity.low, quantity.high) if isinstance(quantity, Range) else (quantity, quantity)
+
+
+def plain(quantity: Quantity | None) -> Any:
+    """As JSON."""
+    return quantity.as_dict() if isinstance(quantity, Range) else quantity
+
+
+class Table:
+    """A TOML table that is read key by key; `done` refuses what nobody asked for."""
+
+    def __init__(self, content: Any, *, where: str) -> None:
+        if not isinstance(content, Mapping):
+            raise InputError(f"{content!r} is not a table", where=where, fix="write it as [table] with keys")
+        self._content = content
+        self._asked: set[str] = set()
+        self.where = where
+
+    def __contains__(self, key: str) -> bool:
+        self._asked.add(key)
+        return key in self._content
+
+    def names(self) -> list[str]:
+        """Its keys."""
+        return list(self._content)
+
+    def done(self) -> None:
+        """Raises:
+        UnknownNameError: a key that was not asked for, with the nearest that was.
+        """
+        for key in self._content:
+            if key not in self._asked:
+                raise UnknownNameError.of("key", key, self._asked, where=self.where)
+
+    def table(self, key: str) -> Table:
+        """A table inside; an empty one if it is not there."""
+        self._asked.add(key)
+        return Table(self._content.get(key, {}), where=f"{self.where} [{key}]")
+
+    def says(self, key: str, word: str) -> bool:
+        """Whether the value is this text."""
+        return self._take(key, None) == word
+
+    def number(self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf) -> float:
+        value = self._take(key, default)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise self._wrong(key, value, "a finite number")
+        self._bound(key, float(value), least=least, above=above)
+        return float(value)
+
+    def whole(self, key: str, default: int, *, least: int) -> int:
+        value = self._take(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise self._wrong(key, value, f"a whole number of at least {least}")
+        return value
+
+    def text(self, key: str, default: str | None) -> str | None:
+        value = self._take(key, default)
+        if value is not None and not isinstance(value, str):
+            raise self._wrong(key, value, "text in quotes")
+        return value
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self._take(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self._wrong(key, value, 'a list of texts, ["…", "…"]')
+        return tuple(value)
+
+    def choice(self, key: str, default: E) -> E:
+        value = self._take(key, default.value)
+        options = [option.value for option in type(default)]
+        if value not in options:
+            raise UnknownNameError.of(key, str(value), options, where=self.where)
+        return type(default)(value)
+
+    def quantity(
+        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
+    ) -> Quantity:
+        """A number, or a table {low, high, scale}."""
+        value = self._take(key, default)
+        if isinstance(value, Mapping):
+            inner = Table(value, where=f"{self.where} {key}")
+            bounds = {end: inner.number(end, math.nan) for end in ("low", "high") if end in inner}
+            if len(bounds) != 2:
+                raise self._wrong(key, dict(value), "a number or { low = …, high = … }")
+            scale = inner.choice("scale", Scale.LINEAR)
+            inner.done()
+            try:
+                value = Range(low=bounds["low"], high=bounds["high"], scale=scale)
+            except InputError as error:
+                raise InputError(error.what, where=f"{self.where} {key}", fix=error.fix) from None
+            for end in ends(value):
+                self._bound(key, end, least=least, above=above, most=most)
+            return value
+        number = self.number(key, default, least=least, above=above)
+        self._bound(key, number, least=least, above=above, most=most)
+        return number
+
+    def _take(self, key: str, default: Any) -> Any:
+        self._asked.add(key)
+        return self._content.get(key, default)
+
+    def _bound(self, key: str, value: float, *, least: float, above: float, most: float = math.inf) -> None:
+        if value < least or value <= above or value > most:
+            lower = f"at least {least:g}" if value < least else f"above {above:g}"
+            raise self._wrong(key, value, f"a number of at most {most:g}" if value > most else f"a number {lower}")
+
+    def _wrong(self, key: str, value: Any, wanted: str) -> InputError:
+        return InputError(f"{key} is {value!r}", where=self.where, fix=f"give {wanted}")
