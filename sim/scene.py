@@ -14,6 +14,7 @@ from flagdata.errors import InputError, UsageError
 from sim import handles as held
 from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
+from sim.contact import Contact
 from sim.handles import Handles
 from sim.material import Material
 from sim.mesh import Mesh, grid
@@ -38,6 +39,7 @@ class Scene:
         gravity: (3,) [m/s²].
         air: the wind's force.
         evaluation: how the material's tables are read.
+        contact: how layers keep apart; None lets them pass through each other.
 
     Raises:
         InputError: a shape that does not fit, a value that is not finite, a held vertex that is not there, or a
@@ -52,6 +54,7 @@ class Scene:
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
     evaluation: Evaluation = Evaluation.ARCSIM
+    contact: Contact | None = None
 
     def __post_init__(self) -> None:
         position = np.array(self.position, dtype=np.float64)
@@ -142,7 +145,7 @@ def assemble(
     """The batch of these scenes, and their start at rest. Members differ in start, material, wind and gravity.
 
     Raises:
-        UsageError: no scenes, or scenes with different meshes, handles, wind forces or evaluations.
+        UsageError: no scenes, or scenes with different meshes, handles, wind forces, evaluations or contacts.
     """
     if not scenes:
         raise UsageError("no scenes to simulate", fix="give at least one")
@@ -151,11 +154,10 @@ def assemble(
         same = scene.mesh is first.mesh or (
             np.array_equal(scene.mesh.rest, first.mesh.rest) and np.array_equal(scene.mesh.faces, first.mesh.faces)
         )
-        if not (
-            same and scene.handles == first.handles and scene.air == first.air and scene.evaluation == first.evaluation
-        ):
+        shared = ("handles", "air", "evaluation", "contact")
+        if not same or any(getattr(scene, name) != getattr(first, name) for name in shared):
             raise UsageError(
-                f"scene {index} differs from scene 0 in mesh, handles, wind force or evaluation",
+                f"scene {index} differs from scene 0 in mesh, handles, wind force, evaluation or contact",
                 where="batch", fix="simulate such scenes in batches of their own",
             )  # fmt: skip
 
@@ -175,5 +177,6 @@ def assemble(
         handles=first.handles,
         held=torch.tensor(vertices, dtype=torch.int64, device=device),
         anchors=position[vertices].clone(),
+        contact=first.contact,
     )
     return system, State(position=position, velocity=torch.zeros_like(position))

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
 from typing import Protocol
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim import bending, inertia, membrane
+from sim import bending, contact, inertia, membrane
 from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
+from sim.contact import Contact
 from sim.handles import Handles
 from sim.state import State
 from sim.wind import Wind
@@ -106,6 +110,7 @@ class System:
         loads: air that moves with the cloth.
         ties: attachments beside the handles.
         frictions: forces that remember.
+        contact: how layers keep apart; None lets them pass through each other.
     """
 
     cloth: Cloth
@@ -120,6 +125,7 @@ class System:
     loads: tuple[Load, ...] = ()
     ties: tuple[Tie, ...] = ()
     frictions: tuple[Friction, ...] = ()
+    contact: Contact | None = None
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
         """The force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch) [N]."""
@@ -164,8 +170,19 @@ class System:
         return wind
 
     def internal(self, position: Tensor, velocity: Tensor) -> Tensor:
-        """Membrane and bending, elastic and damping: (vertex, 3, batch) [N]."""
-        return membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
+        """Membrane, bending and contact, elastic and damping: (vertex, 3, batch) [N]."""
+        total = membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
+        if self.contact is None:
+            return total
+        pairs = contact.candidates(self.cloth, self.contact, position, self.neighbours)
+        return total + contact.force(self.cloth, self.contact, position, velocity, pairs)
+
+    @cached_property
+    def neighbours(self) -> NDArray[np.bool_]:
+        """(vertex, face) whether contact passes over them: too close at rest to be different layers."""
+        if self.contact is None:
+            return np.ones((self.cloth.mesh.vertex_count, len(self.cloth.faces)), dtype=bool)
+        return contact.neighbours(self.cloth.mesh, self.contact)
 
     def external(
         self,
@@ -311,6 +328,9 @@ class System:
             "bending": bending.energy(self.cloth, state.position),
             "gravity": -(mass * (state.position * self.gravity).sum(1)).sum(0),
         }
+        if self.contact is not None:
+            pairs = contact.candidates(self.cloth, self.contact, state.position, self.neighbours)
+            result["contact"] = contact.energy(self.cloth, self.contact, state.position, pairs)
         if self.sprung:
             stretch = state.position[self.held] - self.targets(state.time)
             result["handles"] = self.handles.stiffness * (stretch**2).sum((0, 1)) / 2

@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim import bending, membrane
+from sim import bending, contact, membrane
 from sim.cloth import gather_sum
 from sim.inertia import vertex_normals
 from sim.state import State
@@ -79,6 +79,7 @@ class BackwardEuler:
         factor = h * (h + cloth.damping)
         tied = system.tied(time, x)
         normals = vertex_normals(cloth, x) if system.loads else None
+        contacts = _contacts(system, x, v)
         added = system.added_mass.unsqueeze(1)
 
         def stiffness(field: Tensor) -> Tensor:
@@ -89,6 +90,8 @@ class BackwardEuler:
                 product = product.index_add(0, system.held, system.handles.stiffness * field[system.held])
             if tied is not None:
                 product = product + tied * field
+            if contacts is not None:
+                product = product + contacts.product(field)
             return product
 
         def inertia(field: Tensor) -> Tensor:
@@ -120,13 +123,18 @@ class BackwardEuler:
             free[system.held] = 0
 
         def operator(field: Tensor) -> Tensor:
-            return free * (inertia(field) + factor * stiffness(field))
+            product = inertia(field) + factor * stiffness(field)
+            if contacts is not None:
+                product = product + h * contacts.drag(field)
+            return free * product
 
         weight = mass
         if tied is not None:
             diagonal = diagonal + tied
         if normals is not None:
             weight = weight + added * normals**2
+        if contacts is not None:
+            force = force + contacts.force(x) - contacts.drag(v)
         right = free * (h * force - factor * stiffness(v))
         change = conjugate_gradients(
             operator, right, weight + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
@@ -134,6 +142,13 @@ class BackwardEuler:
         v = v + change
         memory = system.remembered(state.memory, x, x + h * v)
         return State(position=x + h * v, velocity=v, time=time + h, memory=memory)
+
+
+def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.Linearised | None:
+    if system.contact is None:
+        return None
+    pairs = contact.candidates(system.cloth, system.contact, position, system.neighbours)
+    return contact.Linearised.at(system.cloth, system.contact, position, velocity, pairs)
 
 
 def conjugate_gradients(

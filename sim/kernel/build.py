@@ -18,6 +18,8 @@ _FLAGS = (
     "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC", "-Wno-psabi",
 )  # fmt: skip
 
+_SOURCES = ("kernel.cpp", "contact.hpp")
+
 
 def cache_folder() -> Path:
     """Where compiled kernels are kept: FLAGDATA_CACHE, or `flagdata` in the user's cache folder."""
@@ -59,17 +61,20 @@ def _warn(reason: str) -> None:
 
 
 def _built(path: str) -> Path:
-    source = (files("sim.kernel") / "kernel.cpp").read_bytes()
+    sources = {name: (files("sim.kernel") / name).read_bytes() for name in _SOURCES}
     version = subprocess.run([path, "--version"], capture_output=True, check=True).stdout
-    name = hashlib.sha256(b"\0".join([source, version, " ".join(_FLAGS).encode(), _processor()])).hexdigest()[:20]
+    name = hashlib.sha256(
+        b"\0".join([*sources.values(), version, " ".join(_FLAGS).encode(), _processor()])
+    ).hexdigest()[:20]
     folder = cache_folder()
     target = folder / f"kernel-{name}.so"
     if target.exists():
         return target
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        code, made = Path(scratch) / "kernel.cpp", Path(scratch) / "kernel.so"
-        code.write_bytes(source)
+        code, made = Path(scratch) / _SOURCES[0], Path(scratch) / "kernel.so"
+        for part, text in sources.items():
+            (Path(scratch) / part).write_bytes(text)
         subprocess.run([path, *_FLAGS, "-o", str(made), str(code)], capture_output=True, check=True, text=True)
         made.replace(target)  # atomic: several processes may build at once
     return target

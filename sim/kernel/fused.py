@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from sim.air import QuadraticNormal
+from sim.contact import Contact, layers
 from sim.kernel.build import library
 from sim.system import Drive, System
 from sim.tables import Evaluation
@@ -23,6 +24,20 @@ _SCALARS = ("origin", "spacing", "air_density", "air_drag", "stiffness")
 _BLOCKED = ("mass", "inverse_mass", "segments", "damping", "table", "gravity", "wind", "targets", "rate")
 
 
+_CONTACT_POINTERS = ("face", "vertex_area", "rest", "centre", "apart")
+_CONTACT_SCALARS = ("thickness", "stiffness", "friction")
+
+
+class _Contact(ctypes.Structure):
+    """Mirrors `contact::Settings` of contact.hpp."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("vertices", "faces")),
+        *((name, ctypes.c_void_p) for name in _CONTACT_POINTERS),
+        *((name, ctypes.c_double) for name in _CONTACT_SCALARS),
+    ]
+
+
 class _Problem(ctypes.Structure):
     """Mirrors `Problem` of kernel.cpp field by field."""
 
@@ -32,6 +47,8 @@ class _Problem(ctypes.Structure):
         ("fold", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in _POINTERS),
         *((name, ctypes.c_double) for name in _SCALARS),
+        ("batch", ctypes.c_int64),
+        ("contact", _Contact),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
     ]
 
@@ -102,9 +119,12 @@ class Kernel:
             fold=int(cloth.evaluation is Evaluation.CORRECTED), origin=cloth.grid.origin, spacing=cloth.grid.spacing,
             air_density=air.density, air_drag=air.drag, stiffness=system.handles.stiffness if system.sprung else 0.0,
         )  # fmt: skip
+        problem.batch = cloth.batch
         problem.counts[:] = cloth.grid.counts
         for name, tensor in tensors.items():
             setattr(problem, name, tensor.data_ptr())
+        if system.contact is not None:
+            tensors |= _set_contact(problem.contact, system, system.contact, tensors["face"])
         return cls(system=system, code=code, lanes=lanes, blocks=blocks, problem=problem, tensors=tensors)
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
@@ -150,6 +170,25 @@ class Kernel:
         function.restype = None
         passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
         function(ctypes.byref(problem), ctypes.c_int64(self.blocks), *passed)
+
+
+def _set_contact(settings: _Contact, system: System, contact: Contact, face: Tensor) -> dict[str, Tensor]:
+    """Fill in the contact's settings; the tensors it points to are returned, to be kept alive."""
+    cloth = system.cloth
+    centre, apart = layers(cloth.mesh, contact)
+    tensors = {
+        name: torch.tensor(values, dtype=cloth.dtype)
+        for name, values in {
+            "vertex_area": cloth.mesh.vertex_areas, "rest": cloth.mesh.rest, "centre": centre, "apart": apart**2,
+        }.items()
+    }  # fmt: skip
+    settings.vertices, settings.faces = cloth.mesh.vertex_count, len(cloth.faces)
+    settings.thickness, settings.stiffness = contact.thickness, contact.stiffness
+    settings.friction = contact.friction
+    settings.face = face.data_ptr()
+    for name, tensor in tensors.items():
+        setattr(settings, name, tensor.data_ptr())
+    return {f"contact_{name}": tensor for name, tensor in tensors.items()}
 
 
 _KERNELS: WeakKeyDictionary[System, Kernel] = WeakKeyDictionary()

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <array>
+
+#include "contact.hpp"
 
 namespace {
 
@@ -55,6 +58,8 @@ struct Problem {
   const int32_t* held_vertex;  // (held)
   const T* samples;            // (tables, n0, n1, n2, 4)
   double origin, spacing, air_density, air_drag, stiffness;
+  int64_t batch;  // members; lanes beyond are spare
+  contact::Settings<T> contact;
   // One block's share of each of the following is contiguous, lanes innermost.
   const T* mass;          // (blocks, vertices, L)
   const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly
@@ -119,6 +124,9 @@ class Block {
   const int64_t b, blocks;
   const V damping;
   I base;
+  std::array<contact::Search<T>, L> search_;
+  std::vector<contact::Point<T>> near_;
+  std::vector<T> built_;  // positions at each lane's last search
 
  public:
   Block(const Problem<T>& problem, int64_t block, int64_t count)
@@ -245,6 +253,33 @@ class Block {
     }
   }
 
+  // Every lane by itself: their candidates differ.
+  void contacts(const T* x, const T* v, T* f) {
+    const int64_t n = p.vertices;
+    const int real = int(p.batch - b * L < L ? p.batch - b * L : L);
+    V worst = V{};
+    if (built_.empty()) {
+      built_.assign(x, x + 3 * L * n);
+    } else {
+      for (int64_t i = 0; i < n; ++i) {
+        const V3 moved = sub(load3(x + 3 * L * i), load3(built_.data() + 3 * L * i));
+        worst = maximum(worst, dot(moved, moved));
+      }
+    }
+    const T* mass = p.mass + b * n * L;
+    for (int l = 0; l < real; ++l) {
+      if (!search_[l].holds(p.contact, worst[l])) {
+        near_.resize(n);
+        for (int64_t i = 0; i < n; ++i) near_[i] = {x[3 * L * i + l], x[3 * L * i + L + l], x[3 * L * i + 2 * L + l]};
+        search_[l].build(p.contact, near_.data());
+        for (int64_t i = l; i < 3 * L * n; i += L) built_[i] = x[i];
+        worst[l] = 0;
+      }
+      if (!search_[l].pairs().empty())
+        contact::apply<T, L>(p.contact, search_[l], std::sqrt(worst[l]), x + l, v + l, mass + l, T(damping[l]), f + l);
+    }
+  }
+
   void springs(const T* x, const T* v, T share, T* f) const {
     const T stiffness = T(p.stiffness);
     for (int64_t h = 0; h < p.held; ++h) {
@@ -261,7 +296,7 @@ class Block {
   }
 
   // All forces at `share` of the way between the drive's start and end.
-  void forces(const T* x, const T* v, T share, T* f) const {
+  void forces(const T* x, const T* v, T share, T* f) {
     const V3 g = load3(p.gravity + b * 3 * L);
     const T* mass = p.mass + b * p.vertices * L;
     for (int64_t i = 0; i < p.vertices; ++i) {
@@ -276,10 +311,11 @@ class Block {
     faces(x, v, wind, f);
     hinges(x, v, f);
     if (p.stiffness > 0) springs(x, v, share, f);
+    if (p.contact.thickness > 0) contacts(x, v, f);
   }
 
   // Leapfrog: half a kick, drift and kick in turn, half a kick.
-  void advance(T* x, T* v, T* f, double h, int64_t steps) const {
+  void advance(T* x, T* v, T* f, double h, int64_t steps) {
     const T* inverse = p.inverse_mass + b * p.vertices * L;
     for (int64_t s = 0; s <= steps; ++s) {
       forces(x, v, T(double(s) / double(steps)), f);
