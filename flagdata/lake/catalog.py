@@ -4,10 +4,11 @@ Each append is one Parquet file and one log entry. The file is written and flush
 only if its version number is free, so of two writers at the same version one wins and the other is told (`Moved`) and
 looks again. The log is never expired: a tag must be readable for as long as the lake exists.
 
-Every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row, and a checkpoint is
-written, which bounds the log that must be replayed. The old files stay, since old versions are made of them. (Each file
-costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a commit.) The library's own checkpoints are
-off: it does not flush them to the disk, so a power cut could leave one that is empty and a table that does not open.
+After every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row, and a
+checkpoint is written, which bounds the log that must be replayed. The old files stay, since old versions are made of
+them. (Each file costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a commit.) The library's own
+checkpoints are off: it does not flush them to the disk, so a power cut could leave one that is empty and a table that
+does not open.
 """
 
 from __future__ import annotations
@@ -184,15 +185,20 @@ class Catalog:
         self._commit(table, rows, removed=files, rows_change=True, info=info)
         return base + 1
 
+    def is_due_for_tidying(self) -> bool:
+        """Whether `tidy` would do anything: `_TIDY_EVERY` versions after it last did."""
+        return self.head() - self._checkpoint() >= _TIDY_EVERY
+
     @_one_at_a_time
     def tidy(self) -> None:
-        """Every `_TIDY_EVERY` versions, merge the small files and write a checkpoint; called before an append.
+        """Merge the small files and write a checkpoint, if it is due; called before an append.
 
-        If another writer intervenes, the merge is left to the next time.
+        Raises:
+            Moved: another writer intervened; the small files are left to the next time.
         """
-        version = self.head()
-        if version % _TIDY_EVERY != _TIDY_EVERY - 1:
+        if not self.is_due_for_tidying():
             return
+        version = self.head()
         table = self._writable(version)
         table.create_checkpoint()
         for name in (f"{version:020d}.checkpoint.parquet", "_last_checkpoint"):

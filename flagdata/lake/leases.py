@@ -19,15 +19,17 @@ import shutil
 import socket
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import IO
 
 from flagdata.lake.durable import disk_errors
 
 _LEASE = "lease"
 _COLLECT = ".collect"
+_TURN = ".turn"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,14 +84,14 @@ class Lease:
 @contextmanager
 def keeping_collectors_out(staging: Path) -> Iterator[None]:
     """No collection runs during the block; any number of writers may."""
-    with _locked(staging / _COLLECT, fcntl.LOCK_SH):
+    with _locked(staging, fcntl.LOCK_SH):
         yield
 
 
 @contextmanager
 def collecting(staging: Path) -> Iterator[None]:
-    """No transaction starts, puts an object or commits, and no ref is made, during the block."""
-    with _locked(staging / _COLLECT, fcntl.LOCK_EX):
+    """No transaction starts, puts an object, commits or ends, and no ref is made, during the block."""
+    with _locked(staging, fcntl.LOCK_EX):
         yield
 
 
@@ -127,12 +129,20 @@ def _try_lock(descriptor: int) -> bool:
 
 
 @contextmanager
-def _locked(path: Path, mode: int) -> Iterator[None]:
+def _locked(staging: Path, mode: int) -> Iterator[None]:
+    """Take the lock behind a turnstile: whoever waits for it holds the turnstile, so that a stream of shared holders
+    cannot keep an exclusive one out for ever. Not to be nested."""
+    with ExitStack() as held:
+        with _opened(staging / _TURN) as turn:
+            fcntl.flock(turn, fcntl.LOCK_EX)
+            lock = held.enter_context(_opened(staging / _COLLECT))
+            fcntl.flock(lock, mode)
+        yield
+
+
+def _opened(path: Path) -> IO[str]:
     with disk_errors("locking the lake", path):
         if not path.exists():
             path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
             path.touch()
-        file = path.open()
-    with file:
-        fcntl.flock(file, mode)
-        yield
+        return path.open()

@@ -19,7 +19,7 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import Lease
+from flagdata.lake.leases import Lease, collecting
 from flagdata.lake.objects import files_of
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
@@ -157,8 +157,8 @@ class Transaction:
         return head, frozenset(shown["artifact"].to_pylist())
 
     def _publish(self) -> CommitResult:
-        if self._pending:
-            with self._lease.keeping_collectors_out(), suppress(Moved):
+        if self._pending and self._lake.catalog.is_due_for_tidying():
+            with collecting(self._lake.staging), suppress(Moved):  # alone, so that it is not always overtaken
                 self._lake.catalog.tidy()
         created = datetime.now(UTC)
         commit = f"c{secrets.token_hex(8)}"

@@ -18,7 +18,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect, garbage
 from flagdata.lake.difference import difference
 from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify
-from flagdata.lake.leases import collecting, leases
+from flagdata.lake.leases import collecting, keeping_collectors_out, leases
 from flagdata.schema import Kind
 
 NOW = timedelta(0)
@@ -201,6 +201,29 @@ def test_a_transaction_ends_only_when_no_collector_can_see_it_half_gone(lake: La
         assert [state.alive for state in leases(lake.staging)] == [True]
     holder.join(60)
     assert leases(lake.staging) == []
+
+
+def test_a_collector_is_let_in_though_writers_never_pause(lake: Lake) -> None:
+    stop = threading.Event()
+
+    def write() -> None:
+        while not stop.is_set():
+            with keeping_collectors_out(lake.staging):
+                time.sleep(0.02)
+
+    # Four holders that overlap: without a turnstile there is hardly an instant at which nobody holds the lock.
+    writers = [threading.Thread(target=write) for _ in range(4)]
+    for writer in writers:
+        writer.start()
+    began = time.monotonic()
+    for _ in range(20):
+        with collecting(lake.staging):
+            pass
+    took = time.monotonic() - began
+    stop.set()
+    for writer in writers:
+        writer.join(60)
+    assert took < 10  # 20 times what is left of the holders' 0.02 s, with room for a busy machine
 
 
 def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(
