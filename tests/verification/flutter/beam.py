@@ -1,6 +1,6 @@
 """Linear stability of a clamped–free sheet in an axial stream, solved by itself: nothing here is the simulator's.
 
-A strip of length L, clamped at x = 0 and free at x = L, with mass m and flexural rigidity B (1 + d ∂t) per width, pulled
+A strip of length L, clamped at x = 0 and free at L, with mass m and flexural rigidity B (1 + d ∂t) per width, pulled
 towards its end by a weight g and by the friction c U of the stream, and loaded by air of mass M per area in a stream U:
 
     m w_tt + B (1 + d ∂t) w_xxxx − g ((L − x) w_x)_x − c U (L − x) w_xx + M (∂t + U ∂x)² w = 0
