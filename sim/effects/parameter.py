@@ -76,7 +76,7 @@ class Parameter(Described):
         if not (math.isfinite(lowest) and math.isfinite(highest) and least <= lowest and highest <= most):
             shown = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
             raise InputError(
-                f"{shown} {self.unit} is not admissible", where=where,
+                f"{shown}{'' if self.unit == '1' else f' {self.unit}'} is not admissible", where=where,
                 fix=f"give a value from {least:g} to {most:g}; expected are {self.prior[0]:g} to {self.prior[1]:g}",
             )  # fmt: skip
 

@@ -1,0 +1,55 @@
+"""Descriptions and checks of parameters."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.rng import stream
+from sim.effects import EFFECTS, apply
+from sim.effects.porosity import Porosity
+from sim.effects.shear import Shear
+
+
+def test_a_refused_value_is_told_with_what_is_admissible_and_expected() -> None:
+    with pytest.raises(InputError) as caught:
+        Porosity(open_share=torch.tensor([0.1, 1.5]))
+    assert caught.value.where == "Porosity.open_share"
+    assert caught.value.what == "0.1 to 1.5 is not admissible"
+    assert caught.value.fix == "give a value from 0 to 1; expected are 0 to 0.3"
+
+
+def test_a_mistyped_effect_is_answered_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'porosity'"):
+        EFFECTS["porostiy"]
+
+
+def test_an_effect_at_null_leaves_the_system_itself(make_system, plain, square) -> None:
+    system, state = make_system(square, [plain])
+    assert apply([Porosity(), Shear(exponent=0.0, height=3.0)], system, state) == (system, state)
+
+
+def test_a_wanted_gradient_keeps_an_effect_at_null(make_system, plain, square) -> None:
+    system, state = make_system(square, [plain])
+    wanted = torch.zeros(1, dtype=torch.float64, requires_grad=True)
+    changed, _ = apply([Porosity(open_share=wanted)], system, state)
+    assert changed is not system
+    assert any(tensor.requires_grad for tensor in changed.tensors())
+
+
+def test_values_for_another_batch_are_refused(make_system, plain, square) -> None:
+    system, state = make_system(square, [plain, plain])
+    with pytest.raises(UsageError, match="3 members in a batch of 2"):
+        apply([Porosity(open_share=torch.full((3,), 0.1))], system, state)
+
+
+def test_draws_lie_in_the_prior_and_repeat() -> None:
+    draws = [Shear.drawn(stream(1, "shear"), batch=200) for _ in range(2)]
+    for label, parameter in Shear.parameters().items():
+        one, two = (getattr(draw, label) for draw in draws)
+        assert torch.equal(one, two)
+        low, high = parameter.prior
+        assert low <= float(one.min()) < float(one.max()) <= high
+        # The mean of 200 uniform draws: (high − low)/√(12·200) is 2 % of the range; 4 σ allowed.
+        assert float(one.mean()) == pytest.approx((low + high) / 2, abs=0.082 * (high - low))
