@@ -7,7 +7,6 @@ it. One source is one transaction: an error, Ctrl-C or a crash leaves the lake a
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -18,13 +17,14 @@ import numpy as np
 import pyarrow.compute as pc
 
 from flagdata.align.paired import host_clock
-from flagdata.errors import ConflictError, InputError, UnknownNameError
+from flagdata.errors import InputError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
-from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
+from flagdata.provenance import digest, recipe_hash
 from flagdata.record import Coding, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.record.writer import ATTACHMENT_LIMIT, JPEG_QUALITY
@@ -132,9 +132,9 @@ def ingest_camera(
         ConflictError: the file changed while it was read.
     """
     options, labels = options or CameraIngest(), labels or Labels()
-    source = _Source.of(path)
+    source = Source.of(path)
     recipe = options.recipe()
-    present = _find(lake, Kind.CAMERA, source, recipe, branch=branch)
+    present = find(lake, Kind.CAMERA, source, recipe, branch=branch)
     if present is not None:
         return present
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
@@ -162,7 +162,7 @@ def ingest_camera(
             rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
         )  # fmt: skip
         transaction.add(artifact)
-    return _result(lake, transaction, artifact, report, branch=branch)
+    return result_of(lake, transaction, artifact, report, branch=branch)
 
 
 def ingest_wind(
@@ -180,9 +180,9 @@ def ingest_wind(
         ConflictError: the file changed while it was read.
     """
     options, labels = options or WindIngest(), labels or Labels()
-    source = _Source.of(path)
+    source = Source.of(path)
     recipe = options.recipe()
-    present = _find(lake, Kind.WIND, source, recipe, branch=branch)
+    present = find(lake, Kind.WIND, source, recipe, branch=branch)
     if present is not None:
         return present
     log = read_log(path, options.wind)
@@ -210,7 +210,7 @@ def ingest_wind(
             rate=report["rate"], frame_count=None, stored=transaction.put(staged),
         )  # fmt: skip
         transaction.add(artifact)
-    return _result(lake, transaction, artifact, report, branch=branch)
+    return result_of(lake, transaction, artifact, report, branch=branch)
 
 
 def recipe_text(recipe: str) -> bytes:
@@ -228,63 +228,6 @@ def recipe_text(recipe: str) -> bytes:
         return (files("catalogs") / "sensors" / f"{recipe}.toml").read_bytes()
     except OSError as error:
         raise InputError(f"the recipe cannot be read: {error.strerror}", where=recipe, fix="check its path") from None
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Source:
-    """A file, or a folder of pictures, as it was when its hash was taken."""
-
-    path: Path
-    hash: str
-    state: tuple[tuple[str, int, int], ...]
-
-    @property
-    def name(self) -> str:
-        """The file's name as text; bytes that are no UTF-8 are shown as \\xNN."""
-        return os.fsencode(self.path.name).decode("utf-8", "backslashreplace")
-
-    @property
-    def stem(self) -> str:
-        return Path(self.name).stem
-
-    @classmethod
-    def of(cls, path: Path) -> _Source:
-        before = _state(path)
-        if path.is_dir():
-            parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
-            return cls(path=path, hash=digest("\n".join(parts)), state=before)
-        try:
-            return cls(path=path, hash=file_hash(path), state=before)
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
-
-    def check_unchanged(self) -> None:
-        if _state(self.path) != self.state:
-            raise ConflictError(
-                "the file changed while it was read", where=str(self.path), fix="ingest it when it is complete"
-            )
-
-    def provenance(self, recipe: Mapping[str, Any]) -> dict[str, str]:
-        return {
-            "source_name": self.name,
-            "source_hash": self.hash,
-            "recipe": canonical(recipe),
-            "recipe_hash": recipe_hash(recipe),
-            "code_version": code_version(),
-        }
-
-
-def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Name, size and time of change of the file, or of each file in the folder that is not hidden."""
-    try:
-        if not path.is_dir():
-            status = path.stat()
-            return ((path.name, status.st_size, status.st_mtime_ns),)
-        with os.scandir(path) as entries:
-            found = [(e.name, e.stat()) for e in entries if e.is_file() and not e.name.startswith(".")]
-        return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
 
 
 @dataclass
@@ -309,7 +252,7 @@ class _Times:
         return (self.count - 1) * NANOSECONDS / (self.last - self.first) if self.count > 1 else None
 
 
-def _find(lake: Lake, kind: Kind, source: _Source, recipe: Mapping[str, Any], *, branch: str) -> IngestResult | None:
+def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], *, branch: str) -> IngestResult | None:
     """The artifact that this ingest would make, if it is on the branch."""
     same = (
         (pc.field("kind") == kind.value)
@@ -325,7 +268,7 @@ def _find(lake: Lake, kind: Kind, source: _Source, recipe: Mapping[str, Any], *,
 
 def _artifact(
     kind: Kind,
-    source: _Source,
+    source: Source,
     recipe: Mapping[str, Any],
     labels: Labels,
     *,
@@ -355,9 +298,10 @@ def _artifact(
     )
 
 
-def _result(
+def result_of(
     lake: Lake, transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], *, branch: str
 ) -> IngestResult:
+    """What an ingest did whose transaction has ended."""
     committed = transaction.result
     created = committed is not None and artifact.id in committed.added
     kept = artifact if created else lake.artifact(artifact.id, at=branch)

@@ -1,0 +1,85 @@
+"""A file or folder that is ingested: its identity, and whether it stayed what it was."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import ConflictError, InputError
+from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A file, or a folder of files, as it was when its hash was taken.
+
+    Attributes:
+        hash: SHA-256 of the file, or of the names and hashes of the folder's files that are not hidden.
+        state: name, size and time of change of each file.
+    """
+
+    path: Path
+    hash: str
+    state: tuple[tuple[str, int, int], ...]
+
+    @property
+    def name(self) -> str:
+        """The file's name as text; bytes that are no UTF-8 are shown as \\xNN."""
+        return os.fsencode(self.path.name).decode("utf-8", "backslashreplace")
+
+    @property
+    def stem(self) -> str:
+        return Path(self.name).stem
+
+    @classmethod
+    def of(cls, path: Path) -> Source:
+        """The source as it is now.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        before = _state(path)
+        if path.is_dir():
+            parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
+            return cls(path=path, hash=digest("\n".join(parts)), state=before)
+        try:
+            return cls(path=path, hash=file_hash(path), state=before)
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
+
+    def check_unchanged(self) -> None:
+        """Make sure that nothing was written to it since.
+
+        Raises:
+            ConflictError: something was.
+        """
+        if _state(self.path) != self.state:
+            raise ConflictError(
+                "the file changed while it was read", where=str(self.path), fix="ingest it when it is complete"
+            )
+
+    def provenance(self, recipe: Mapping[str, Any]) -> dict[str, str]:
+        """For the metadata of a record."""
+        return {
+            "source_name": self.name,
+            "source_hash": self.hash,
+            "recipe": canonical(recipe),
+            "recipe_hash": recipe_hash(recipe),
+            "code_version": code_version(),
+        }
+
+
+def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Name, size and time of change of the file, or of each file in the folder that is not hidden."""
+    try:
+        if not path.is_dir():
+            status = path.stat()
+            return ((path.name, status.st_size, status.st_mtime_ns),)
+        with os.scandir(path) as entries:
+            found = [(e.name, e.stat()) for e in entries if e.is_file() and not e.name.startswith(".")]
+        return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
