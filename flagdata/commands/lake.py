@@ -48,21 +48,24 @@ def init(context: click.Context, folder: str | None, as_json: bool, lake_path: s
 @json_option
 @lake_option
 def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
-    """List artifacts; filters and SQL are `flagdata query`'s."""
+    """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata query`'s."""
     from flagdata.errors import UnknownNameError
     from flagdata.lake import Lake
     from flagdata.schema import Kind
 
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
-    rows = Lake.open(lake_path).rows(None if kind is None else f"kind = '{kind}'", at=at).to_pylist()
+    found = Lake.open(lake_path).rows(None if kind is None else f"kind = '{kind}'", at=at).to_pylist()
+    rows = [row for row in found if kind is not None or row["kind"] != Kind.CLIP]
+    clips = len(found) - len(rows)
     if as_json:
-        document("ls", {"at": at, "artifacts": [_plain(row) for row in rows]})
+        document("ls", {"at": at, "artifacts": [_plain(row) for row in rows], "clips_not_listed": clips})
         return
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
     if rows:
         table(header, [_line(row) for row in rows])
-    say(f"{len(rows)} artifacts" if rows else "no artifacts")
+    more = f" and {clips} clips (--kind clip lists them)" if clips else ""
+    say(f"{len(rows)} artifacts{more}" if found else "no artifacts")
 
 
 @click.command()

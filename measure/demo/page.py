@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -59,7 +58,6 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
     shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
-    reasons = Counter(reason for refusal in pairs.refused for reason in refusal.reasons)
     page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
         files("measure.demo").joinpath("page.html.j2").read_text(encoding="utf-8")
     )
@@ -75,7 +73,7 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
             counts={
                 "pairs": len(pairs),
                 "refused": len(pairs.refused),
-                "reasons": ", ".join(f"{count} × {reason}" for reason, count in reasons.items()),
+                "reason": "; ".join(pairs.refused[0].reasons) if pairs.refused else "",
             },
             clips=[_clip_card(sample) for sample in shown],
             findings=_findings(lake, at),

@@ -92,6 +92,27 @@ def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake:
     assert "did you mean 'wind'?" in misspelt.err
 
 
+def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_text: Put) -> None:
+    recording = put_text(lake, "recording")
+    with lake.transaction("clips") as tx:
+        for first in (0, 30):
+            tx.add(
+                Artifact(
+                    kind="clip",
+                    name="clip",
+                    object=recording.object,
+                    parents=(recording.id,),
+                    frame_first=first,
+                    frame_count=30,
+                )
+            )
+    listed = run("ls")
+    assert [line.split()[2] for line in listed.out.splitlines()[1:]] == ["recording"]
+    assert "1 artifacts and 2 clips (--kind clip lists them)" in listed.err
+    assert run("ls", "--json").document["clips_not_listed"] == 2
+    assert len(run("ls", "--kind", "clip", "--json").document["artifacts"]) == 2
+
+
 def test_log_tells_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
