@@ -1,4 +1,4 @@
-"""`flagdata ingest`: camera files and anemometer logs into the lake, or a look at what a file is."""
+"""`flagdata ingest`: camera files, anemometer logs and mesh sequences into the lake, or a look at what a file is."""
 
 from __future__ import annotations
 
@@ -17,12 +17,20 @@ from flagdata.errors import FlagdataError, InputError, UsageError
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
+    from flagdata.ingest.meshes.store import MeshIngest
     from flagdata.ingest.store import CameraIngest, IngestResult, Labels, WindIngest
     from flagdata.lake import Lake
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
-CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "rate", "crop", "crop_picture", "exposure", "archive")
+CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "zero_offset", "encoding")
+MESHES_ONLY = ("unit",)
+FOREIGN = {
+    "camera": ("a camera file", (*WIND_ONLY, *MESHES_ONLY)),
+    "anemometer": ("an anemometer log", (*CAMERA_ONLY, *MESHES_ONLY, "rate")),
+    "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
+}
+"""What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = ("sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture")
 ONE_SOURCE = ("start", "date", "name", "crop_picture")
 
@@ -33,6 +41,7 @@ class _Given:
 
     camera: CameraIngest
     wind: WindIngest
+    meshes: MeshIngest
     labels: Labels
     branch: str
     crop_picture: Path | None
@@ -46,7 +55,7 @@ class _Given:
     "--format",
     "format_name",
     metavar="FORMAT",
-    help="camera, or an anemometer format; by content if not given.",
+    help="camera, meshes, or an anemometer format; by content if not given.",
 )
 @click.option("--session", metavar="NAME", help="One set-up at one place; splits never cut through it.")
 @click.option("--name", help="What people call the artifact; the file's name by default.")
@@ -55,7 +64,10 @@ class _Given:
 @click.option("--start", metavar="TIME", help="Camera: instant of the first frame, ISO 8601.")
 @click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
-@click.option("--rate", default="25", show_default=True, metavar="HZ|native", help="Camera: frames a second to keep.")
+@click.option(
+    "--rate", default="25", show_default=True, metavar="HZ|native",
+    help="Camera: frames a second to keep. Meshes: frames a second there are, by default as conf.json says.",
+)  # fmt: skip
 @click.option(
     "--crop", default="whole", show_default=True, metavar="BOX",
     help="Camera: x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
@@ -83,6 +95,7 @@ class _Given:
 )
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
+@click.option("--unit", default="m", show_default=True, metavar="UNIT", help="Meshes: of the vertices' positions.")
 @json_option
 @lake_option
 @click.pass_context
@@ -111,18 +124,20 @@ def ingest(
     azimuth: float | None,
     zero_offset: str | None,
     encoding: str | None,
+    unit: str,
     as_json: bool,
     lake_path: str,
 ) -> None:
-    """Bring camera files and anemometer logs in.
+    """Bring camera files, anemometer logs and mesh sequences in.
 
-    Whether a SOURCE is a camera's or an anemometer's is decided by its content. Each is one commit: what fails leaves
-    the lake as it was, and the others go on.
+    Whether a SOURCE is a camera's, an anemometer's or a folder of meshes is decided by its content. Each is one commit:
+    what fails leaves the lake as it was, and the others go on.
 
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
       flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png
       flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
+      flagdata ingest arcsim-output --name reference-4ms
     """
     given = frozenset(
         parameter for parameter in context.params
@@ -139,10 +154,11 @@ def ingest(
             exposure=exposure, archive=archive,
         ),
         wind=_wind_options(
-            format_name=None if format_name == "camera" else format_name, sensor=sensor, zone_name=zone, date=date,
-            date_order=date_order, platform=platform, talker=talker, azimuth=azimuth, zero_offset=zero_offset,
-            encoding=encoding,
+            format_name=None if format_name in ("camera", "meshes") else format_name, sensor=sensor, zone_name=zone,
+            date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
+            zero_offset=zero_offset, encoding=encoding,
         ),
+        meshes=_mesh_options(rate=rate if "rate" in given else None, length=unit),
         labels=_labels(name, session),
         branch=branch,
         crop_picture=crop_picture,
@@ -240,6 +256,14 @@ def _wind_options(
     )
 
 
+def _mesh_options(*, rate: str | None, length: str) -> MeshIngest:
+    from flagdata.ingest.meshes.store import MeshIngest
+
+    if rate is None or rate.strip().lower() == "native":
+        return MeshIngest(unit=length)
+    return MeshIngest(rate=_number(rate, "--rate", "frames a second"), unit=length)
+
+
 def _number(text: str, option: str, wanted: str) -> float:
     try:
         return float(text)
@@ -315,10 +339,9 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
 
 def _check_applies(guess: Guess, source: Path, given: frozenset[str]) -> None:
     """Refuse options that mean nothing for this source, before anything is written."""
-    if guess.kind not in ("camera", "anemometer"):
+    if guess.kind not in FOREIGN:
         return
-    foreign = WIND_ONLY if guess.kind == "camera" else CAMERA_ONLY
-    what = "a camera file" if guess.kind == "camera" else "an anemometer log"
+    what, foreign = FOREIGN[guess.kind]
     for parameter in foreign:
         if parameter in given:
             raise UsageError(
@@ -330,6 +353,8 @@ def _check_applies(guess: Guess, source: Path, given: frozenset[str]) -> None:
 def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:
     from flagdata.ingest.store import ingest_camera, ingest_wind
 
+    if kind.kind == "meshes":
+        return _meshes(lake, source, kind, options)
     if kind.kind != "camera":
         return ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch)
     with progress(None, label=source.name, unit="frame") as advance:
@@ -340,6 +365,16 @@ def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult
     if options.crop_picture is not None:
         _write_crop_picture(lake, result, options.crop_picture)
     return result
+
+
+def _meshes(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:
+    from flagdata.ingest.meshes.store import ingest_meshes
+
+    with progress(None, label=source.name, unit="mesh") as advance:
+        return ingest_meshes(
+            lake, source, options.meshes, labels=options.labels, branch=options.branch, reasons=kind.reasons,
+            progress=advance,
+        )  # fmt: skip
 
 
 def _write_crop_picture(lake: Lake, result: IngestResult, path: Path) -> None:

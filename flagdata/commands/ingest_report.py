@@ -25,6 +25,30 @@ def print_result(result: IngestResult) -> None:
 def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     lines = [("format", report["format"])]
     lines += [("why", reason) for reason in report["reasons"]]
+    if report["kind"] == "meshes":
+        lines += _mesh_lines(report)
+    else:
+        lines += _device_lines(report)
+    for finding in report["findings"]:
+        where = f" ({finding['where']})" if finding["where"] else ""
+        lines.append((finding["severity"], f"{finding['kind']}: {finding['what']}{where}"))
+        if finding["fix"]:
+            lines.append(("", f"fix: {finding['fix']}"))
+    return lines
+
+
+def _mesh_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    rate = "–" if report["rate"] is None else f"{report['rate']:.6g} Hz"
+    vertices, faces = ("–".join(map(str, sorted(set(report[what])))) for what in ("vertices", "faces"))
+    return [
+        ("time", f"{report['first']:.3f} to {report['first'] + report['span']:.3f} s of the simulation"),
+        ("frames", f"{report['frames']} at {rate}"),
+        ("mesh", f"{vertices} vertices, {faces} faces, {report['topology']} topology"),
+    ]
+
+
+def _device_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    lines: list[tuple[str, str]] = []
     lines.append(("time", f"{report['start']} to {report['end']} ({report['span']:.3f} s)"))
     rate = "–" if report["rate"] is None else f"{report['rate']:.6g} Hz"
     if report["kind"] == "camera":
@@ -44,11 +68,6 @@ def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
         channels = ", ".join(f"{name} [{c['unit']}]" for name, c in report["channels"].items())
         lines.append(("samples", f"{report['samples']}, median rate {rate}: {channels}"))
         lines.append(("sensor", report["sensor"]["name"]))
-    for finding in report["findings"]:
-        where = f" ({finding['where']})" if finding["where"] else ""
-        lines.append((finding["severity"], f"{finding['kind']}: {finding['what']}{where}"))
-        if finding["fix"]:
-            lines.append(("", f"fix: {finding['fix']}"))
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Whether a source is a camera's or an anemometer's, by its content and never by its name alone."""
+"""Whether a source is a camera's, an anemometer's or a mesh sequence, by its content and never by its name alone."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from flagdata.ingest.anemometer.formats import FORMATS
 from flagdata.ingest.camera import CameraProbe, probe
 
 CAMERA = "camera"
+MESHES = "meshes"
 
 
 def guesses(path: Path) -> tuple[Guess, ...]:
@@ -31,31 +32,33 @@ def guesses(path: Path) -> tuple[Guess, ...]:
 
 
 def classify(path: Path, *, format_name: str | None = None, recipe: str | None = None) -> Guess:
-    """What a source is to be ingested as: a guess whose kind is "camera" or "anemometer".
+    """What a source is to be ingested as: a guess whose kind is "camera", "anemometer" or "meshes".
 
     Args:
-        format_name: the user's word for it: "camera" or an anemometer format; goes before the content.
+        format_name: the user's word for it: "camera", "meshes" or an anemometer format; goes before the content.
         recipe: a sensor recipe the user named, which makes it an anemometer's.
 
     Raises:
-        InputError: something else (meshes, a record, an archive), with what to do.
+        InputError: something else (one mesh, a record, an archive), with what to do.
         UnknownNameError: no such format.
         NotFoundError: there is no such source.
     """
     _check_plain(path)
     if format_name == CAMERA:
         return Guess(format="video", score=1.0, reasons=("it was said to be a camera's",), kind="camera")
+    if format_name == MESHES:
+        return Guess(format="mesh folder", score=1.0, reasons=("it was said to be meshes",), kind="meshes")
     if format_name is not None:
         if format_name not in FORMATS:
-            raise UnknownNameError.of("format", format_name, [CAMERA, *FORMATS], where="--as")
+            raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, *FORMATS], where="--as")
         return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
     if recipe is not None:
         return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
     best = guesses(path)[0]
-    if best.kind in ("camera", "anemometer"):
+    if best.kind in ("camera", "anemometer") or (best.kind == "meshes" and path.is_dir()):
         return best
     raise InputError(
-        f"neither a camera file nor an anemometer log: {'; '.join(best.reasons)}",
+        f"neither a camera file nor an anemometer log nor a folder of meshes: {'; '.join(best.reasons)}",
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )

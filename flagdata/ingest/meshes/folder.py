@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -41,19 +42,55 @@ def read_json(path: Path) -> dict[str, Any]:
     return content
 
 
-def read_folder(path: Path) -> MeshSequence | RaggedMeshSequence:
-    """A sequence of one cloth; ragged if the topology changes. Times count from 0 in steps of the scene's `frame_time`.
+def read_folder(
+    path: Path, *, rate: float | None = None, metre: float = 1.0, progress: Callable[[int], object] | None = None
+) -> MeshSequence | RaggedMeshSequence:
+    """A sequence of one cloth; ragged if the topology changes. Frame n is at n frame times from 0.
+
+    The frames are the files `NNNN_00.obj`; in a folder without such, all `.obj` files, which must then differ in one
+    number only ("flag_001.obj"). The rest shape is their texture coordinates, in metres.
+
+    Args:
+        rate: frames a second [Hz]; None for 1/`frame_time` of conf.json.
+        metre: how many metres the unit of the positions has. Texture coordinates are not touched.
+        progress: called with 1 for each frame.
 
     Raises:
-        NotFoundError: no folder, no frames, or no conf.json.
-        InputError: frames missing in between, several cloths, a malformed file or frame time.
+        NotFoundError: no folder, no frames, or neither rate nor conf.json.
+        InputError: frames missing in between, several cloths, a malformed file or frame time, no texture coordinates.
         LimitError: more than `FRAME_LIMIT` frames.
     """
     if not path.is_dir():
-        raise NotFoundError("no such folder", where=str(path), fix="name the folder with the NNNN_00.obj files")
-    found = sorted((int(m[1]), int(m[2]), entry) for entry in path.iterdir() if (m := _FRAME.fullmatch(entry.name)))
+        raise NotFoundError("no such folder", where=str(path), fix="name the folder with the .obj files")
+    numbered = frame_files(path)
+    configuration = read_json(path / _CONFIGURATION) if rate is None or (path / _CONFIGURATION).is_file() else None
+    frame_time = _frame_time(configuration or {}, path) if rate is None else 1 / rate
+    frames: list[Obj] = []
+    for _, entry in numbered:
+        frame = read_obj(entry)
+        if not frame.textured:
+            raise InputError(
+                "no texture coordinates (vt), so that the rest shape is not known",
+                where=str(entry), fix="export the mesh with texture coordinates in metres",
+            )  # fmt: skip
+        frames.append(frame)
+        if progress is not None:
+            progress(1)
+    return _sequence(frames, [n for n, _ in numbered], frame_time, metre, configuration)
+
+
+def frame_files(path: Path) -> list[tuple[int, Path]]:
+    """The frames of a folder with their numbers, in order.
+
+    Raises:
+        NotFoundError: there are none.
+        InputError: numbers missing in between or twice, several cloths, or names that are no sequence.
+        LimitError: more than `FRAME_LIMIT`.
+    """
+    entries = sorted(entry for entry in path.iterdir() if entry.is_file())
+    found = [(int(m[1]), int(m[2]), entry) for entry in entries if (m := _FRAME.fullmatch(entry.name))]
     if not found:
-        raise NotFoundError("no NNNN_00.obj files", where=str(path), fix="name an ArcSim output folder")
+        found = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
     if len(found) > FRAME_LIMIT:
         raise LimitError(f"{len(found)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read")
     cloths = {cloth for _, cloth, _ in found}
@@ -62,34 +99,60 @@ def read_folder(path: Path) -> MeshSequence | RaggedMeshSequence:
             f"{len(cloths)} cloths, numbered {', '.join(f'{c:02d}' for c in sorted(cloths))}",
             where=str(path), fix="keep one cloth's files, NNNN_00.obj, in a folder",
         )  # fmt: skip
-    numbers = [number for number, _, _ in found]
+    frames = sorted((number, entry) for number, _, entry in found)
+    numbers = [number for number, _ in frames]
     missing = sorted(set(range(numbers[0], numbers[-1] + 1)) - set(numbers))
     if missing:
         raise InputError(
             f"{len(missing)} frames are missing", where=f"{path}, frame {missing[0]:04d}", fix="copy them, or cut there"
         )
-    configuration = read_json(path / _CONFIGURATION)
+    if len(set(numbers)) < len(numbers):
+        twice = next(a for a, b in pairwise(numbers) if a == b)
+        raise InputError("two files for one frame", where=f"{path}, frame {twice:04d}", fix="keep one of them")
+    return frames
+
+
+def _numbered(entries: list[Path], path: Path) -> list[tuple[int, int, Path]]:
+    """Frames of other programs: one stem with a number at its end."""
+    if not entries:
+        raise NotFoundError("no .obj files", where=str(path), fix="name a folder with a mesh for each frame")
+    matches = [(re.fullmatch(r"(.*?)(\d+)", entry.stem), entry) for entry in entries]
+    loose = [entry.name for match, entry in matches if match is None]
+    stems = sorted({match[1] for match, _ in matches if match is not None})
+    if loose or len(stems) != 1:
+        odd = loose[0] if loose else f"{stems[0]}… and {stems[1]}…"
+        raise InputError(
+            f"the .obj files are no sequence: {odd}", where=str(path), fix="name them alike, with the frame's number"
+        )
+    return [(int(match[2]), 0, entry) for match, entry in matches if match is not None]
+
+
+def _frame_time(configuration: Mapping[str, Any], path: Path) -> float:
     frame_time = configuration.get("frame_time")
     if isinstance(frame_time, bool) or not isinstance(frame_time, int | float) or not 0 < frame_time < 1e6:
         raise InputError(
             f"frame_time is {frame_time!r}", where=str(path / _CONFIGURATION), fix="give seconds between frames"
         )
-    frames = [read_obj(entry) for _, _, entry in found]
+    return float(frame_time)
+
+
+def _sequence(
+    frames: list[Obj], numbers: list[int], frame_time: float, metre: float, configuration: Mapping[str, Any] | None
+) -> MeshSequence | RaggedMeshSequence:
     time = np.array([round(n * frame_time * NANOSECONDS) for n in numbers], dtype=np.int64)
-    attributes = {"source": "arcsim", "scene": configuration}
+    attributes = {"source": "obj"} if configuration is None else {"source": "arcsim", "scene": configuration}
     first = frames[0]
-    fixed = all(np.array_equal(f.faces, first.faces) and np.array_equal(f.rest, first.rest) for f in frames)
-    if fixed:
+    if all(np.array_equal(f.faces, first.faces) and np.array_equal(f.rest, first.rest) for f in frames):
         return MeshSequence(
             time=time,
-            positions=np.stack([f.positions for f in frames]).astype(np.float32),
+            positions=(np.stack([f.positions for f in frames]) * metre).astype(np.float32),
             faces=first.faces.astype(np.int32),
             rest=first.rest.astype(np.float32),
             attributes=attributes,
         )
     return RaggedMeshSequence(
         time=time,
-        positions=np.concatenate([f.positions for f in frames]).astype(np.float32),
+        positions=(np.concatenate([f.positions for f in frames]) * metre).astype(np.float32),
         faces=np.concatenate([f.faces for f in frames]).astype(np.int32),
         rest=np.concatenate([f.rest for f in frames]).astype(np.float32),
         vertex_offset=np.cumsum([0, *(len(f.positions) for f in frames)]).astype(np.int64),

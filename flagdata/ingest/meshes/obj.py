@@ -31,12 +31,14 @@ class Obj:
         faces: (face, 3) indices.
         rest: (vertex, 2) material coordinates [m].
         velocities: (vertex, 3) [m/s], or None where the file has none.
+        textured: whether `rest` was given (`vt`), and not taken from x and y.
     """
 
     positions: NDArray[np.float64]
     faces: NDArray[np.int64]
     rest: NDArray[np.float64]
     velocities: NDArray[np.float64] | None = None
+    textured: bool = True
 
 
 def read_obj(path: Path) -> Obj:
@@ -145,7 +147,10 @@ def _assembled(
     if velocities:
         speed = np.zeros((len(positions), 3))
         speed[list(velocities)] = list(velocities.values())
-    return Obj(positions=np.array(positions), faces=vertex.reshape(-1, 3), rest=rest, velocities=speed)
+    return Obj(
+        positions=np.array(positions), faces=vertex.reshape(-1, 3), rest=rest, velocities=speed,
+        textured=bool((uv >= 0).all()),
+    )  # fmt: skip
 
 
 def write_obj(path: Path, mesh: Obj) -> None:
