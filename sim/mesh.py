@@ -120,6 +120,12 @@ class Mesh:
         return np.einsum("fji,jc->fic", inverse, differences)
 
     @cached_property
+    def arms(self) -> NDArray[np.float64]:
+        """(face, 3, 2) corners relative to the face's centroid, at rest [m]."""
+        corners = self.rest[self.faces]
+        return corners - corners.mean(axis=1, keepdims=True)
+
+    @cached_property
     def hinges(self) -> NDArray[np.int64]:
         """(hinge, 4) inner edges as [i, j, k, l]: the edge runs i→j in face (i, j, k) and j→i in face (j, i, l)."""
         start = self.faces.ravel()

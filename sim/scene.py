@@ -16,6 +16,7 @@ from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
 from sim.contact import Contact
 from sim.handles import Handles
+from sim.limits import StrainLimits
 from sim.material import Material
 from sim.mesh import Mesh, grid
 from sim.state import State
@@ -40,6 +41,7 @@ class Scene:
         air: the wind's force.
         evaluation: how the material's tables are read.
         contact: how layers keep apart; None lets them pass through each other.
+        limits: of strain; None lets faces stretch as their stiffness allows.
 
     Raises:
         InputError: a shape that does not fit, a value that is not finite, a held vertex that is not there, or a
@@ -55,6 +57,7 @@ class Scene:
     air: AirForce = field(default_factory=QuadraticNormal)
     evaluation: Evaluation = Evaluation.ARCSIM
     contact: Contact | None = None
+    limits: StrainLimits | None = None
 
     def __post_init__(self) -> None:
         position = np.array(self.position, dtype=np.float64)
@@ -154,10 +157,10 @@ def assemble(
         same = scene.mesh is first.mesh or (
             np.array_equal(scene.mesh.rest, first.mesh.rest) and np.array_equal(scene.mesh.faces, first.mesh.faces)
         )
-        shared = ("handles", "air", "evaluation", "contact")
+        shared = ("handles", "air", "evaluation", "contact", "limits")
         if not same or any(getattr(scene, name) != getattr(first, name) for name in shared):
             raise UsageError(
-                f"scene {index} differs from scene 0 in mesh, handles, wind force, evaluation or contact",
+                f"scene {index} differs from scene 0 in mesh or one of: {', '.join(shared)}",
                 where="batch", fix="simulate such scenes in batches of their own",
             )  # fmt: skip
 
@@ -178,5 +181,6 @@ def assemble(
         held=torch.tensor(vertices, dtype=torch.int64, device=device),
         anchors=position[vertices].clone(),
         contact=first.contact,
+        limits=first.limits,
     )
     return system, State(position=position, velocity=torch.zeros_like(position))

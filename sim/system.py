@@ -18,6 +18,7 @@ from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
 from sim.contact import Contact
 from sim.handles import Handles
+from sim.limits import StrainLimits, limited
 from sim.state import State
 from sim.wind import Wind
 
@@ -111,6 +112,7 @@ class System:
         ties: attachments beside the handles.
         frictions: forces that remember.
         contact: how layers keep apart; None lets them pass through each other.
+        limits: of strain; None lets faces stretch as their stiffness allows.
     """
 
     cloth: Cloth
@@ -126,6 +128,21 @@ class System:
     ties: tuple[Tie, ...] = ()
     frictions: tuple[Friction, ...] = ()
     contact: Contact | None = None
+    limits: StrainLimits | None = None
+
+    @cached_property
+    def free(self) -> Tensor:
+        """(vertex, 1, 1): 0 for rigidly held vertices, 1 for all others."""
+        free = torch.ones_like(self.cloth.mass[:, :1]).unsqueeze(-1)
+        if self.clamped:
+            free[self.held] = 0
+        return free
+
+    def limited(self, position: Tensor, velocity: Tensor, step: float) -> tuple[Tensor, Tensor]:
+        """Positions and velocities after a step [s], brought within the strain limits."""
+        if self.limits is None:
+            return position, velocity
+        return limited(self.cloth, self.limits, position, velocity, step, self.free)
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
         """The force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch) [N]."""

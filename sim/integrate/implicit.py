@@ -140,8 +140,9 @@ class BackwardEuler:
             operator, right, weight + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
         )
         v = v + change
-        memory = system.remembered(state.memory, x, x + h * v)
-        return State(position=x + h * v, velocity=v, time=time + h, memory=memory)
+        after, v = system.limited(x + h * v, v, h)
+        memory = system.remembered(state.memory, x, after)
+        return State(position=after, velocity=v, time=time + h, memory=memory)
 
 
 def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.Linearised | None:

@@ -95,6 +95,7 @@ def advance(system: System, state: State, duration: float, *, steps: int, backen
         v = v + (h / 2 if index in (0, steps) else h) * inverse_mass * system.effective(x, force)
         if index < steps:
             before, x = x, x + h * v
+            x, v = system.limited(x, v, h)
             memory = system.remembered(memory, before, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
 

@@ -49,6 +49,11 @@ class _Problem(ctypes.Structure):
         *((name, ctypes.c_double) for name in _SCALARS),
         ("batch", ctypes.c_int64),
         ("contact", _Contact),
+        ("lowest", ctypes.c_double),
+        ("highest", ctypes.c_double),
+        ("sweeps", ctypes.c_int64),
+        ("arms", ctypes.c_void_p),
+        ("vertex_areas", ctypes.c_void_p),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
     ]
 
@@ -106,6 +111,8 @@ class Kernel:
             "hinge_rows": cloth.hinge_rows,
             "held_vertex": system.held.int(),
             "samples": cloth.samples,
+            "arms": torch.tensor(cloth.mesh.arms, dtype=cloth.dtype),
+            "vertex_areas": torch.tensor(cloth.mesh.vertex_areas, dtype=cloth.dtype),
             "mass": block(cloth.mass),
             "inverse_mass": block(inverse_mass),
             "segments": block(cloth.segments),
@@ -125,6 +132,9 @@ class Kernel:
             setattr(problem, name, tensor.data_ptr())
         if system.contact is not None:
             tensors |= _set_contact(problem.contact, system, system.contact, tensors["face"])
+        if system.limits is not None:
+            problem.lowest, problem.highest = system.limits.low, system.limits.high
+            problem.sweeps = system.limits.sweeps
         return cls(system=system, code=code, lanes=lanes, blocks=blocks, problem=problem, tensors=tensors)
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:

@@ -4,10 +4,12 @@
 // repeats it for speed and is tested against it. One block holds LANES members of the batch side by side, in vector
 // registers; every lane does the same operations in the same order, so a member's result does not depend on the others.
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <array>
+#include <limits>
+#include <vector>
 
 #include "contact.hpp"
 
@@ -60,6 +62,10 @@ struct Problem {
   double origin, spacing, air_density, air_drag, stiffness;
   int64_t batch;  // members; lanes beyond are spare
   contact::Settings<T> contact;
+  double lowest, highest;  // strain limits
+  int64_t sweeps;          // corrections a step; 0: no limits
+  const T* arms;           // (faces, 3, 2)
+  const T* vertex_areas;   // (vertices)
   // One block's share of each of the following is contiguous, lanes innermost.
   const T* mass;          // (blocks, vertices, L)
   const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly
@@ -314,6 +320,45 @@ class Block {
     if (p.contact.thickness > 0) contacts(x, v, f);
   }
 
+  // One sweep of the strain limits; `moves` is scratch.
+  void limit(T* x, T* v, T step, T* moves) const {
+    const V low = splat(T(p.lowest)), high = splat(T(p.highest)), tiny = splat(std::numeric_limits<T>::min());
+    std::memset(moves, 0, sizeof(T) * p.vertices * 3 * L);
+    for (int64_t e = 0; e < p.faces; ++e) {
+      const int64_t at[3] = {3 * L * int64_t(p.face[3 * e]), 3 * L * int64_t(p.face[3 * e + 1]),
+                             3 * L * int64_t(p.face[3 * e + 2])};
+      const T* g = p.gradients + 6 * e;
+      const V3 x0 = load3(x + at[0]), x1 = load3(x + at[1]), x2 = load3(x + at[2]);
+      auto derive = [&](const T* d) -> V3 {
+        return {x0.x * d[0] + x1.x * d[1] + x2.x * d[2], x0.y * d[0] + x1.y * d[1] + x2.y * d[2],
+                x0.z * d[0] + x1.z * d[1] + x2.z * d[2]};
+      };
+      const V3 xu = derive(g), xv = derive(g + 3);
+      const V a = dot(xu, xu), c = dot(xv, xv), d = dot(xu, xv);
+      const V middle = (a + c) * T(0.5), half = root((a - c) * (a - c) * T(0.25) + d * d);
+      const V large = middle + half, small = maximum(middle - half, tiny);
+      const V s1 = root(large), s2 = root(small);
+      const V f1 = minimum(maximum(s1, low), high) / s1, f2 = minimum(maximum(s2, low), high) / s2;
+      const V gap = large - small;
+      const V beta = gap > T(1e-9) ? (f1 - f2) / maximum(gap, splat(T(1e-9))) : V{};
+      const V alpha = f1 - 1 - beta * large;
+      const V3 du = combine(xu, alpha + beta * a, xv, beta * d), dv = combine(xu, beta * d, xv, alpha + beta * c);
+      const T* arm = p.arms + 6 * e;
+      const T share = p.areas[e] / 3;
+      for (int k = 0; k < 3; ++k)
+        add3(moves + at[k], combine(du, splat(share * arm[2 * k]), dv, splat(share * arm[2 * k + 1])));
+    }
+    const T* inverse = p.inverse_mass + b * p.vertices * L;
+    for (int64_t i = 0; i < p.vertices; ++i) {
+      const T weight = inverse[i * L] == 0 ? T(0) : 1 / p.vertex_areas[i];
+      for (int64_t k = 3 * L * i; k < 3 * L * (i + 1); k += L) {
+        const V move = load(moves + k) * weight;
+        store(x + k, load(x + k) + move);
+        store(v + k, load(v + k) + move / step);
+      }
+    }
+  }
+
   // Leapfrog: half a kick, drift and kick in turn, half a kick.
   void advance(T* x, T* v, T* f, double h, int64_t steps) {
     const T* inverse = p.inverse_mass + b * p.vertices * L;
@@ -328,6 +373,8 @@ class Block {
           store(x + c, load(x + c) + drift * speed);
         }
       }
+      if (s < steps)
+        for (int64_t sweep = 0; sweep < p.sweeps; ++sweep) limit(x, v, T(h), f);
     }
   }
 };
