@@ -54,7 +54,7 @@ class LagBins:
         """
         period = round(wind.period * NANOSECONDS)
         step = round(period / STEPS)
-        if len(wind.time) == 0 or len(motion) < 2:
+        if len(wind.time) == 0 or np.count_nonzero(np.isfinite(motion.energy)) < 2:
             raise InputError("no wind bins or no motion to compare", fix="check both inputs; see their reports")
         spacing = float(np.median(np.diff(motion.time)))
         if spacing * 2 > period:

@@ -175,9 +175,7 @@ def estimate_offset(
         return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
     model = fit(bins, overlap=search.overlap)
     if model is None:
-        longest, least = bins.longest_overlap(), max(search.overlap, FEWEST_BINS * bins.period)
-        reason = _still(motion) if longest >= least else _short_overlap(longest, least)
-        return _nothing(bins, search, (*motion.findings, reason))
+        return _nothing(bins, search, (*motion.findings, _unfit(bins, search)))
     pair = model.best
     score, counts, best = pair.search(overlap=search.overlap)
     peak = pair.peak(score, best)
@@ -320,8 +318,14 @@ def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
     )
 
 
-def _still(motion: MotionSeries) -> Finding:
-    return _error("still-flag", f"the motion does not vary over {len(motion)} frames: nothing follows the wind", None)
+def _unfit(bins: LagBins, search: LagSearch) -> Finding:
+    """Why no model fits at any offset."""
+    longest, least = bins.longest_overlap(), max(search.overlap, FEWEST_BINS * bins.period)
+    if longest < least:
+        return _short_overlap(longest, least)
+    if not np.nanstd(bins.motion) > 0:
+        return _error("still-flag", "the motion does not vary: nothing follows the wind", None)
+    return _error("unmoved-flag", "at no offset searched does the motion rise with the wind", None)
 
 
 def _short_overlap(longest: float, least: float) -> Finding:

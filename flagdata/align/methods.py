@@ -141,12 +141,12 @@ def declared(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) ->
     Raises:
         UsageError: `options.by` is neither, or a σ that is no uncertainty.
     """
-    if options.offset_sigma is None or options.by is Method.ESTIMATE:
+    if options.offset_sigma is None:
         raise UsageError("an estimate is not declared", fix="call estimated")
     start, end = pair.span
     names = (pair.camera.name, pair.wind.name)
-    if options.by is Method.GIVEN:
-        clock = given(*names, start=start, end=end, offset=options.offset or 0.0, sigma=options.offset_sigma)
+    if options.offset is not None:
+        clock = given(*names, start=start, end=end, offset=options.offset, sigma=options.offset_sigma)
     else:
         resolution = math.hypot(_start_sigma(pair), stamp_sigma(pair.series().time))
         clock = by_stamps(*names, start=start, end=end, sigma=math.hypot(options.offset_sigma, resolution))

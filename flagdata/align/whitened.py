@@ -140,7 +140,7 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
     the residual.
 
     Returns:
-        `None` where no trial offset covers `overlap` [s].
+        `None` where no trial offset covers `overlap` [s], or the motion rises with the wind at none.
     """
     smooth = np.stack([_smoothed(bins.wind, width) for width in _WIDTHS], axis=1)  # (n, widths)
     own = filters = autoregression(bins.motion, stride=STEPS)
@@ -151,32 +151,34 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
             best, highest = trial, float(score[trial])
     if best < 0:
         return None
-    pair, wind = None, smooth[:, 0]
+    pair = Whitened.by(own, smooth[:, 0], bins)
+    wind = smooth[:, 0]
     for _ in range(_ROUNDS):
         motion = bins.motion[bins.index(best)]
-        wind = _response(smooth, motion, filters)
+        weights = _response(smooth, motion, filters)
+        if not np.any(weights > 0):
+            return None
+        wind = smooth @ weights
         filters = autoregression(motion - wind, stride=1)
         pair = Whitened.by(filters, wind, bins)
-        _, _, best = pair.search(overlap=overlap)
-        if best < 0:
+        score, _, best = pair.search(overlap=overlap)
+        if best < 0 or score[best] <= 0:
             return None
-    return Fit(best=pair, whitest=Whitened.by(own, wind, bins)) if pair is not None else None
+    return Fit(best=pair, whitest=Whitened.by(own, wind, bins))
 
 
 def _response(smooth: NDArray[np.float64], motion: Series, filters: Series) -> Series:
-    """Σ a_w smooth_w, (n,), with a ≥ 0 fitted to the motion (n,) behind the filter; the narrowest if all are 0."""
+    """a_w ≥ 0, (widths,), of Σ a_w smooth_w fitted to the motion (n,) behind the filter."""
     columns = np.stack([_filter(column, filters, 1) for column in smooth.T], axis=1)
     target = _filter(motion, filters, 1)
     both = np.isfinite(target) & np.all(np.isfinite(columns), axis=1)
     centred = columns[both] - columns[both].mean(axis=0)
     weights, _ = nnls(centred, target[both] - target[both].mean())
-    return smooth @ weights if np.any(weights > 0) else 1e-3 * smooth[:, 0]
+    return weights
 
 
 def _smoothed(samples: Series, width: float) -> Series:
     """Mean over a Gaussian of standard deviation `width` [bins] of what is there; NaN stays NaN."""
-    if width == 0:
-        return samples
     reach = math.ceil(3 * width)
     kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / width))
     there = np.isfinite(samples)

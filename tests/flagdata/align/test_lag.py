@@ -160,6 +160,18 @@ def test_a_still_film_is_refused(scene: Scenes) -> None:
     assert refusals(found) == {"still-flag"}
 
 
+def test_a_motion_that_falls_when_the_wind_rises_is_refused(scene: Scenes) -> None:
+    motion, wind = scene(seed=3, offset=0.0, apart=0.5, flag_noise=0.1)
+    found = estimate((replace(motion, energy=1 / motion.energy), wind), window=3.0, surrogates=60)
+    assert "unmoved-flag" in refusals(found)
+
+
+def test_a_film_without_two_comparable_frames_says_so(scene: Scenes) -> None:
+    motion, wind = scene(seed=3)
+    with pytest.raises(InputError, match="no motion"):
+        estimate((replace(motion, energy=np.full(len(motion), np.nan)), wind))
+
+
 def test_wind_and_film_of_different_days_say_so(scene: Scenes) -> None:
     motion, wind = scene(seed=3)
     with pytest.raises(InputError, match="do not overlap"):
