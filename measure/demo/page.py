@@ -67,7 +67,7 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
         page.render(
             minutes=f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",
             seconds=seconds,
-            clock=recovered(row, made),
+            clock=recovered(row, made.clock_offset),
             images={"wind": wind_image, "alignment": _data_url((folder / "alignment.png").read_bytes(), "image/png")},
             wind_caption=caption,
             counts={
@@ -85,8 +85,8 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     return target
 
 
-def recovered(recording: dict[str, Any], made: Field) -> Recovered:
-    """The recording's clock at mid-recording beside the truth the generator kept."""
+def recovered(recording: dict[str, Any], truth: float) -> Recovered:
+    """The recording's clock at mid-recording beside the true offset [s] that the generator kept."""
     clock = ClockModel.from_json(recording["clock_model"])
     middle = (recording["start"] + recording["end"]) // 2
     device = middle - round(recording["clock_offset"] * NANOSECONDS)
@@ -97,7 +97,7 @@ def recovered(recording: dict[str, Any], made: Field) -> Recovered:
         low=offset - half,
         high=offset + half,
         confidence=clock.confidence,
-        truth=made.clock_offset,
+        truth=truth,
     )
 
 
