@@ -134,16 +134,24 @@ def run(
     first = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
     outcomes: list[Outcome] = []
     for place, member in enumerate(members):
-        failure = failures.get(place)
+        diagnosis = monitor.of(place)
+        failure = failures.get(place) or _crumpled(diagnosis)
         sequence = None
         if failure is None:
             sequence = MeshSequence(
                 time=np.array(first, dtype=np.int64), positions=np.ascontiguousarray(positions[..., place]),
                 faces=crew.mesh.faces.astype(np.int32), rest=crew.mesh.rest.astype(np.float32),
-                attributes=_attributes(crew, stepper, member, monitor.of(place)),
+                attributes=_attributes(crew, stepper, member, diagnosis),
             )  # fmt: skip
-        outcomes.append(Outcome(member=member, sequence=sequence, diagnosis=monitor.of(place), failure=failure))
+        outcomes.append(Outcome(member=member, sequence=sequence, diagnosis=diagnosis, failure=failure))
     return outcomes
+
+
+def _crumpled(diagnosis: Diagnosis) -> tuple[str, str] | None:
+    if not diagnosis.crumpled:
+        return None
+    rate = f"{diagnosis.late_compression:.0%} (root mean square)"
+    return "crumpled", f"it crumpled: its faces are compressed by {rate}; declare more damping"
 
 
 def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -157,6 +165,7 @@ def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnos
         "step": stepper.step,
         "energies": {name: list(values) for name, values in diagnosis.energies.items()},
         "largest_strain": list(diagnosis.largest_strain),
+        "compression": list(diagnosis.compression),
     }
 
 

@@ -108,7 +108,8 @@ class Crew:
         scene = Scene(
             mesh=self.mesh, position=self._start(seed), material=material, handles=self.handles,
             wind=(speed * math.cos(toward), speed * math.sin(toward), wind.vertical),
-            gravity=_gravity(self.recipe.scene), air=wind.force, evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact,
+            gravity=_gravity(self.recipe.scene), air=wind.force, evaluation=self.recipe.scene.evaluation,
+            contact=self.recipe.contact,
         )  # fmt: skip
         parameters: dict[str, float | tuple[float, ...]] = {
             "wind_speed": speed,

@@ -81,8 +81,10 @@ class Table:
         return list(self._content)
 
     def done(self) -> None:
-        """Raises:
-        UnknownNameError: a key that was not asked for, with the nearest that was.
+        """Make sure that every key was asked for.
+
+        Raises:
+            UnknownNameError: one was not; the nearest that was is suggested.
         """
         for key in self._content:
             if key not in self._asked:

@@ -1,0 +1,287 @@
+"""Recipes as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+
+All values are SI. A *quantity* is a number, or `{ low = …, high = …, scale = "linear" | "log" }`, from which each
+member draws its own value.
+
+    title, seed, count, batch, precision
+    [scene]      shape = "flag" | "hanging-cloth" | "arcsim"; width, height, columns, attachment, start-noise;
+                 file, root, accept (of an ArcSim scene); evaluation = "arcsim" | "corrected"; gravity
+    [material]   name (of catalogs/materials) or file (TOML, or ArcSim JSON); density, stretching-factor,
+                 bending-factor, bending-factors (drawn for each of the 15 coefficients), damping: quantities
+    [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
+    [contact]    thickness, stiffness, friction; without the table, layers pass through each other
+    [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit)
+    [time]       settle, frames, rate
+    [effects.NAME]  parameters of an effect (quantities, or "prior" for its prior range)
+
+`count`, `batch` and `title` do not change what a member is; everything else does.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.provenance import canonical, digest
+from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
+from sim.arcsim import ArcsimScene, read_material, read_scene
+from sim.contact import Contact
+from sim.effects import EFFECTS
+from sim.integrate import INTEGRATORS
+from sim.integrate.implicit import AirShape
+from sim.material import Material, named
+from sim.run.recipe import (
+    DTYPES,
+    Attachment,
+    EffectSpec,
+    IntegratorSpec,
+    MaterialSpec,
+    Recipe,
+    SceneSpec,
+    Shape,
+    TimeSpec,
+    WindSpec,
+)  # fmt: skip
+from sim.run.tables import Quantity, Range, Table
+from sim.scene import GRAVITY
+from sim.tables import Evaluation
+
+_GUST_LENGTH = 60.0  # m, integral length scale near the ground; see sim.wind.spectral
+
+
+def names() -> list[str]:
+    """Recipes of the catalog, sorted."""
+    folder = files("catalogs") / "scenes"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load(source: str) -> Recipe:
+    """The recipe of that name in the catalog, of a `.toml` file, or of an ArcSim scene `.json`.
+
+    Raises:
+        NotFoundError: no such file.
+        UnknownNameError: no such recipe; a key, name or option that is not known.
+        InputError: a value that does not fit, or a scene that cannot be simulated.
+    """
+    path = Path(source)
+    if path.suffix == ".json":
+        return _of_scene_file(path)
+    if path.suffix != ".toml":
+        if source not in names():
+            raise UnknownNameError.of("recipe", source, names())
+        text = (files("catalogs") / "scenes" / f"{source}.toml").read_text(encoding="utf-8")
+        return parse(text, name=source, folder=Path(), where=f"recipe {source}")
+    if not path.is_file():
+        raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
+    return parse(path.read_text(encoding="utf-8"), name=path.stem, folder=path.parent, where=source)
+
+
+def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
+    """A recipe from its text.
+
+    Args:
+        folder: that the files it names are relative to.
+
+    Raises:
+        UnknownNameError, InputError: as `load`.
+    """
+    try:
+        top = Table(tomllib.loads(text), where=where)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    scene = _scene(top.table("scene"), folder)
+    precision = top.text("precision", "float32") or ""
+    if precision not in DTYPES:
+        raise UnknownNameError.of("precision", precision, DTYPES, where=where)
+    contact = _contact(top.table("contact")) if "contact" in top else None
+    recipe = Recipe(
+        name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0),
+        count=top.whole("count", 1, least=1), batch=top.whole("batch", 16, least=1), precision=precision,
+        scene=scene, material=_material(top.table("material"), folder, scene), wind=_wind(top.table("wind"), scene),
+        contact=contact, integrator=_integrator(top.table("integrator")), time=_time(top.table("time")),
+        effects=_effects(top.table("effects")),
+    )  # fmt: skip
+    top.done()
+    return recipe
+
+
+def _scene(table: Table, folder: Path) -> SceneSpec:
+    shape = table.choice("shape", Shape.FLAG)
+    evaluation = table.choice("evaluation", Evaluation.ARCSIM)
+    noise = table.number("start-noise", 0.0, least=0.0)
+    if shape is Shape.ARCSIM:
+        file, root = table.text("file", None), table.text("root", None)
+        accept = table.texts("accept")
+        table.done()
+        if file is None:
+            raise InputError("no file is named", where=table.where, fix='add file = "scene.json"')
+        content = read_scene(folder / file, root=None if root is None else folder / root, accept=accept)
+        return _arcsim(content, noise=noise, evaluation=evaluation)
+    square = shape is Shape.HANGING_CLOTH
+    width = table.number("width", 1.0 if square else 1.5, above=0.0)
+    height = table.number("height", width if square else width * 2 / 3, above=0.0)
+    columns = table.whole("columns", 20 if square else 30, least=1)
+    attachment = table.choice("attachment", Attachment.CORNERS)
+    gravity = table.number("gravity", -GRAVITY[2])
+    table.done()
+    if square and attachment is Attachment.HOIST:
+        raise UsageError("a hanging cloth has no hoist", where=table.where, fix='take attachment = "corners"')
+    return SceneSpec(
+        shape=shape, width=width, height=height, columns=columns, attachment=attachment, start_noise=noise,
+        evaluation=evaluation, gravity=gravity,
+    )  # fmt: skip
+
+
+def _arcsim(scene: ArcsimScene, *, noise: float, evaluation: Evaluation) -> SceneSpec:
+    rest, gravity = scene.scene.mesh.rest, scene.scene.gravity
+    width, height = (float(side) for side in rest.max(axis=0) - rest.min(axis=0))
+    content = {
+        "positions": scene.scene.position.tolist(), "rest": rest.tolist(), "faces": scene.scene.mesh.faces.tolist(),
+        "handles": list(scene.scene.handles.vertices), "stiffness": scene.scene.handles.stiffness,
+        "gravity": list(gravity),
+    }  # fmt: skip
+    return SceneSpec(
+        shape=Shape.ARCSIM, width=width, height=height, columns=0, attachment=Attachment.CORNERS, start_noise=noise,
+        evaluation=evaluation, gravity=-gravity[2], arcsim=scene,
+        content=digest(canonical(content)),
+    )  # fmt: skip
+
+
+def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
+    name, file = table.text("name", None), table.text("file", None)
+    if name is not None and file is not None:
+        raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
+    if name is not None:
+        base = named(name)
+    elif file is not None:
+        base = _material_file(folder / file)
+    elif scene.arcsim is not None:
+        base = scene.arcsim.scene.material
+    else:
+        raise InputError("no material is named", where=table.where, fix='add name = "camel-ponte-roma", or a file')
+    spec = MaterialSpec(
+        base=base,
+        density=table.quantity("density", base.density, above=0.0) if "density" in table else None,
+        stretching=table.quantity("stretching-factor", 1.0, above=0.0),
+        bending=table.quantity("bending-factor", 1.0, least=0.0),
+        bending_each=table.quantity("bending-factors", 1.0, least=0.0),
+        damping=table.quantity("damping", base.damping, least=0.0) if "damping" in table else None,
+    )
+    table.done()
+    return spec
+
+
+def _material_file(path: Path) -> Material:
+    if path.suffix == ".json":
+        return read_material(path)
+    if not path.is_file():
+        raise NotFoundError("no such material file", where=str(path), fix="check the path")
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
+    return Material.from_mapping(content, name=path.stem)
+
+
+def _wind(table: Table, scene: SceneSpec) -> WindSpec:
+    if scene.arcsim is not None and not table.names():
+        x, y, z = scene.arcsim.scene.wind
+        return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=scene.arcsim.scene.air)
+    name = table.text("force", "quadratic-normal") or ""
+    if name not in AIR_FORCES:
+        raise UnknownNameError.of("wind force", name, AIR_FORCES, where=table.where)
+    force: AirForce
+    if name == "stokes":
+        force = Stokes(viscosity=table.number("viscosity", Stokes().viscosity, least=0.0))
+    else:
+        base = QuadraticNormal()
+        force = QuadraticNormal(
+            density=table.number("density", base.density, least=0.0), drag=table.number("drag", base.drag, least=0.0)
+        )
+    if "speed" not in table:
+        raise InputError("no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range")
+    spec = WindSpec(
+        speed=table.quantity("speed", 0.0, least=0.0, most=100.0), toward=table.quantity("toward", 0.0),
+        vertical=table.number("vertical", 0.0), force=force,
+    )  # fmt: skip
+    table.done()
+    return spec
+
+
+def _contact(table: Table) -> Contact:
+    base = Contact()
+    contact = Contact(
+        thickness=table.number("thickness", base.thickness, above=0.0),
+        stiffness=table.number("stiffness", base.stiffness, above=0.0),
+        friction=table.number("friction", base.friction, least=0.0),
+    )
+    table.done()
+    return contact
+
+
+def _integrator(table: Table) -> IntegratorSpec:
+    name = table.text("name", "symplectic") or ""
+    if name not in INTEGRATORS:
+        raise UnknownNameError.of("integrator", name, INTEGRATORS, where=table.where)
+    step = table.number("step", 0.0, above=0.0) if "step" in table else None
+    air_shape = AirShape.CURRENT
+    if name == "implicit":
+        step = 5e-3 if step is None else step
+        air_shape = table.choice("air-shape", AirShape.CURRENT)
+    table.done()
+    return IntegratorSpec(name=name, step=step, air_shape=air_shape)
+
+
+def _time(table: Table) -> TimeSpec:
+    spec = TimeSpec(
+        settle=table.number("settle", 4.0, least=0.0), frames=table.whole("frames", 60, least=1),
+        rate=table.number("rate", 25.0, above=0.0),
+    )  # fmt: skip
+    table.done()
+    return spec
+
+
+def _effects(table: Table) -> dict[str, EffectSpec]:
+    specs: dict[str, EffectSpec] = {}
+    for name in table.names():
+        if name not in EFFECTS:
+            raise UnknownNameError.of("effect", name, EFFECTS, where=table.where)
+        if name == "logged-gusts":
+            raise UsageError(
+                "logged gusts need a log, which a recipe cannot name",
+                where=table.where, fix="take gusts, or apply the effect from Python",
+            )  # fmt: skip
+        inner = table.table(name)
+        length = inner.number("length", _GUST_LENGTH, above=0.0) if name == "gusts" else None
+        parameters: dict[str, Quantity] = {}
+        for key, described in EFFECTS[name].parameters().items():
+            spelled = key.replace("_", "-")
+            if spelled not in inner:
+                parameters[key] = described.null
+                continue
+            least, most = described.admissible
+            if inner.says(spelled, "prior"):
+                parameters[key] = Range(low=described.prior[0], high=described.prior[1])
+            else:
+                parameters[key] = inner.quantity(spelled, described.null, least=least, most=most)
+        inner.done()
+        specs[name] = EffectSpec(parameters=parameters, length=length)
+    table.done()
+    return specs
+
+
+def _of_scene_file(path: Path) -> Recipe:
+    """An ArcSim scene as it is: its own steps and duration, from its first frame on."""
+    file = read_scene(path)
+    scene = _arcsim(file, noise=0.0, evaluation=Evaluation.ARCSIM)
+    where = f"scene {path}"
+    return Recipe(
+        name=path.stem, title=path.name, seed=0, count=1, batch=1, precision="float64", scene=scene,
+        material=_material(Table({}, where=where), path.parent, scene), wind=_wind(Table({}, where=where), scene),
+        contact=None,
+        integrator=IntegratorSpec(name="implicit", step=file.step, air_shape=AirShape.PREVIOUS),
+        time=TimeSpec(settle=0.0, frames=file.frames + 1, rate=1 / file.frame_time), effects={},
+    )  # fmt: skip
