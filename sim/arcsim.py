@@ -29,19 +29,28 @@ from sim.scene import Scene
 STAGES = ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter", "plasticity")
 """Stages of ArcSim's step that a scene may disable."""
 
-_TOP = {
-    "frame_time", "frame_steps", "end_time", "end_frame", "duration", "cloths", "handles", "gravity", "wind", "disable",
-    "magic", "motions", "obstacles", "morphs",
+# What of a scene file is read: key → None for a value, a mapping for a table, a list of one for a list of tables.
+_KEYS: Mapping[str, Any] = {
+    **dict.fromkeys(("frame_time", "frame_steps", "end_time", "end_frame", "duration", "gravity", "disable")),
+    "cloths": [
+        {
+            "mesh": None,
+            "transform": dict.fromkeys(("translate", "scale", "rotate")),
+            "materials": [
+                dict.fromkeys(
+                    ("data", "thicken", "density_mult", "stretching_mult", "bending_mult", "damping", "strain_limits",
+                     "yield_curv", "weakening")
+                )
+            ],
+            "remeshing": None,
+        }
+    ],
+    "handles": [dict.fromkeys(("nodes", "type"))],
+    "wind": dict.fromkeys(("velocity", "density", "drag")),
+    "magic": dict.fromkeys(("handle_stiffness", "repulsion_thickness", "collision_stiffness", "friction")),
+    **dict.fromkeys(("motions", "obstacles", "morphs")),
 }  # fmt: skip
-_CLOTH = {"mesh", "transform", "materials", "remeshing"}
-_TRANSFORM = {"translate", "scale", "rotate"}
-_MATERIAL = {
-    "data", "thicken", "density_mult", "stretching_mult", "bending_mult", "damping", "strain_limits", "yield_curv",
-    "weakening",
-}  # fmt: skip
-_HANDLE = {"nodes", "type"}
-_WIND = {"velocity", "density", "drag"}
-_MAGIC = {"handle_stiffness", "repulsion_thickness", "collision_stiffness", "friction"}
+_EMPTY = ("motions", "obstacles", "morphs")  # known, and only supported empty
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,25 +113,15 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
     for stage in (*accept, *_list(content, "disable", where)):
         if stage not in STAGES:
             raise UnknownNameError.of("ArcSim stage", str(stage), STAGES, where=where)
-    _known(content, _TOP, where)
-    filled = [key for key in ("motions", "obstacles", "morphs") if content.get(key)]
-    if filled:
-        raise InputError(f"{', '.join(filled)} are not supported", where=where, fix="remove them")
+    left_out = _supported(content, where, frozenset(accept))
     cloth = _one(content, "cloths", where)
-    _known(cloth, _CLOTH, f"{where}, cloths")
     entry = _one(cloth, "materials", where)
-    _known(entry, _MATERIAL, f"{where}, materials")
-    left_out = _stages(content, cloth, entry, where, frozenset(accept))
 
     shape = read_obj(folder / _text(cloth, "mesh", where))
     mesh = Mesh(rest=shape.rest, faces=shape.faces)
-    wind = content.get("wind", {})
-    _known(wind, _WIND, f"{where}, wind")
-    magic = content.get("magic", {})
-    _known(magic, _MAGIC, f"{where}, magic")
+    wind, magic = content.get("wind", {}), content.get("magic", {})
     nodes: list[int] = []
     for handle in _list(content, "handles", where):
-        _known(handle, _HANDLE, f"{where}, handles")
         if handle.get("type", "node") != "node":
             raise InputError(f"handle type {handle['type']!r}", where=where, fix="only node handles are supported")
         nodes += [int(node) for node in handle.get("nodes", [])]
@@ -165,29 +164,56 @@ def _frames(content: Mapping[str, Any], frame_time: float, where: str) -> int:
     return math.floor(frames + 1e-9)
 
 
-def _stages(
-    content: Mapping[str, Any], cloth: Mapping[str, Any], entry: Mapping[str, Any], where: str, accept: frozenset[str]
-) -> tuple[str, ...]:
+def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -> tuple[str, ...]:
     """The stages that would act and were accepted to be left out.
 
     Raises:
-        InputError: some would act and were not.
+        InputError: keys, contents or stages that are not supported, all of them in one.
     """
+    keys = _strange(content, _KEYS, "", where)
+    filled = [key for key in _EMPTY if content.get(key)]
+    cloths = [c for c in _list(content, "cloths", where) if isinstance(c, Mapping)]
+    entries = [e for c in cloths for e in _list(c, "materials", where) if isinstance(e, Mapping)]
     acts = {"proximity", "collision", "separation", "popfilter"}
-    if "remeshing" in cloth:
+    if any("remeshing" in cloth for cloth in cloths):
         acts.add("remeshing")
-    if "strain_limits" in entry:
+    if any("strain_limits" in entry for entry in entries):
         acts.add("strainlimiting")
-    if "yield_curv" in entry:
+    if any("yield_curv" in entry for entry in entries):
         acts.add("plasticity")
-    acting = [stage for stage in STAGES if stage in acts - set(content.get("disable", []))]
+    acting = tuple(stage for stage in STAGES if stage in acts - set(_list(content, "disable", where)))
     refused = [stage for stage in acting if stage not in accept]
-    if refused:
-        raise InputError(
-            f"stages that are not simulated: {', '.join(refused)}",
-            where=where, fix='add them to the scene\'s "disable", or accept to leave them out',
-        )  # fmt: skip
-    return tuple(acting)
+    told = [
+        f"{what} {', '.join(names)}"
+        for what, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
+        if names
+    ]
+    if told:
+        fixes = ["remove what is not supported"] if keys or filled else []
+        fixes += ['add the stages to the scene\'s "disable", or accept to leave them out'] if refused else []
+        raise InputError(f"not supported: {'; '.join(told)}", where=where, fix="; ".join(fixes))
+    return acting
+
+
+def _strange(content: Any, known: Mapping[str, Any], path: str, where: str) -> list[str]:
+    """Full names of the keys that are not known, at any depth.
+
+    Raises:
+        InputError: a value where a table or list belongs.
+    """
+    if not isinstance(content, Mapping):
+        raise InputError(f"{path or 'the file'} is {content!r}", where=where, fix="give an object, {…}")
+    found: list[str] = []
+    for key, value in content.items():
+        name = f"{path}.{key}" if path else str(key)
+        if key not in known:
+            found.append(name)
+        elif isinstance(known[key], Mapping):
+            found += _strange(value, known[key], name, where)
+        elif isinstance(known[key], list):
+            for index, item in enumerate(_list(content, key, where)):
+                found += _strange(item, known[key][0], f"{name}[{index}]", where)
+    return found
 
 
 def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Material:
@@ -202,7 +228,6 @@ def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Materia
 
 def _placed(positions: NDArray[np.float64], transform: Mapping[str, Any], where: str) -> NDArray[np.float64]:
     """Scaled, turned (angle in degrees about an axis), then moved."""
-    _known(transform, _TRANSFORM, f"{where}, transform")
     placed = positions * _number(transform, "scale", 1.0, where)
     if "rotate" in transform:
         turn = transform["rotate"]
