@@ -10,13 +10,17 @@ PNAS 102:1829 (2005). The three terms are inertia, a Coriolis-like coupling, and
 compression.
 
 For a sheet of any shape, with velocity v, unit normal n and air u, let V = (v − u)·n be the normal velocity relative to
-the air. The operator (∂t + U ∂x) follows the air along the sheet: D = d/dt + (u − v)_t·∇_s, with d/dt on a material
-point and _t the tangential part, so that the load is −m_a (D V) n,
+the air and s = (u − v)_t the air's slip along the sheet. The operator (∂t + U ∂x) becomes the air's momentum V followed
+along the sheet, and the load −m_a (D V) n,
 
-    D V = n·a + ṅ·(v − u) + (u − v)_t·∇_s V                                 (u taken as slow: u̇ is left out)
+    D V = n·a + ṅ·(v − u) + s·∇_s V + ½ V ∇_s·s                             (u taken as slow: u̇ is left out)
 
-For v = η_t e_z, n = e_z − η_x e_x, u = U e_x this is η_tt + U η_xt + U ∂x(η_t + U η_x): the equation above. The first
-term is the integrator's (see `sim.inertia`), the others are a force.
+For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term is of third order, and the others are
+η_tt + U η_xt + U ∂x(η_t + U η_x): the equation above. The last makes it Lighthill's large-amplitude theory (Proc. R.
+Soc. B 179:125, 1971) as Candelier, Boyer and Leroyer put it (J. Fluid Mech. 668:196, 2011) for a sheet that does not
+stretch, ½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change of
+½ m_a V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.inertia`), the
+others are a force.
 """
 
 from __future__ import annotations
@@ -57,18 +61,17 @@ class ReactiveLoading(ForceEffect):
         rate = area_rates(cloth, position, velocity)
         turning = (rate - (rate * normal).sum(1, keepdim=True) * normal) / size
         across = (relative * normal).sum(1, keepdim=True)
+        slip = across * normal - relative
 
-        third = (cloth.areas / 3)[:, None, None]
-        stream = sum_of_corners(cloth, -relative) / 3
-        swept = third * (stream * surface_gradient(cloth, position, across)).sum(1, keepdim=True)
+        g0, g1, g2 = shape_gradients(cloth, position)
+        v0, v1, v2 = (across[cloth.faces[:, c]] for c in range(3))
+        s0, s1, s2 = (slip[cloth.faces[:, c]] for c in range(3))
+        following = ((s0 + s1 + s2) / 3 * (g0 * v0 + g1 * v1 + g2 * v2)).sum(1, keepdim=True)
+        spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
+        swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
         convective = gather_sum([swept, swept, swept], cloth.face_slots)
         weight = torch.as_tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)[:, None, None]
         return -self.mass * (weight * (turning * relative).sum(1, keepdim=True) + convective) * normal
-
-
-def sum_of_corners(cloth: Cloth, field: Tensor) -> Tensor:
-    """(face, …) sums of a vertex field (vertex, …) over the corners."""
-    return field[cloth.faces[:, 0]] + field[cloth.faces[:, 1]] + field[cloth.faces[:, 2]]
 
 
 def area_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
@@ -79,14 +82,13 @@ def area_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
     return gather_sum([turned / 6, turned / 6, turned / 6], cloth.face_slots)
 
 
-def surface_gradient(cloth: Cloth, position: Tensor, field: Tensor) -> Tensor:
-    """Gradient along the deformed faces of a linear field (vertex, 1, batch): (face, 3, batch) [1/m].
+def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Gradients along the deformed faces of the linear shapes that are 1 at a corner: (face, 3, batch) each [1/m].
 
-    With N the face's doubled area vector and e_c the edge opposite to corner c: ∇f = Σ f_c N × e_c / N².
+    With N the face's doubled area vector and e_c the edge opposite to corner c: N × e_c / N².
     """
     x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
-    f0, f1, f2 = (field[cloth.faces[:, c]] for c in range(3))
     doubled = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
-    edges = f0 * (x2 - x1) + f1 * (x0 - x2) + f2 * (x1 - x0)
-    square = (doubled * doubled).sum(1, keepdim=True).clamp(min=torch.finfo(position.dtype).tiny)
-    return torch.linalg.cross(doubled, edges, dim=1) / square
+    scaled = doubled / (doubled * doubled).sum(1, keepdim=True).clamp(min=torch.finfo(position.dtype).tiny)
+    first, second = torch.linalg.cross(scaled, x2 - x1, dim=1), torch.linalg.cross(scaled, x0 - x2, dim=1)
+    return first, second, -first - second

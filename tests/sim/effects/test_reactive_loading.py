@@ -75,6 +75,35 @@ def test_a_still_curved_sheet_in_a_stream_is_pushed_away_from_its_centre(make_sy
     assert float(total) == pytest.approx(-MASS * U**2 * 0.01, rel=0.01)
 
 
+def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives(make_system, plain) -> None:
+    """A gutter of radius R from φ = −φ₀ to φ₀ moves at c along its axis of symmetry through still air.
+
+    There V = c cos φ, s = c sin φ e_φ, and nothing changes in time: D V = c²/R (½ cos² φ − sin² φ). The work on the
+    air, ∫ m_a V (D V) R dφ, is what leaves at the edges φ = ±φ₀, ½ m_a V² s at each: m_a c³ cos² φ₀ sin φ₀.
+    """
+    radius, speed, half = 0.4, 3.0, 1.2
+    mesh = grid(width=2 * half * radius, height=0.2, columns=96, rows=8)
+    system, _ = make_system(mesh, [plain])
+    angle = mesh.rest[:, 0] / radius - half
+    position = np.stack([radius * np.cos(angle), radius * np.sin(angle), mesh.rest[:, 1]], axis=1)
+    x = torch.tensor(position)[..., None]
+    velocity = torch.tensor([speed, 0.0, 0.0], dtype=torch.float64)[:, None].expand_as(x)
+    still = torch.zeros((3, 1), dtype=torch.float64)
+    force = ReactiveLoading(mass=MASS).force(system.cloth, 0.0, x, velocity, still)[..., 0].numpy()
+    load = -MASS * speed**2 / radius * (np.cos(angle) ** 2 / 2 - np.sin(angle) ** 2)
+    rows = angle.round(9)
+    for value in np.unique(rows)[4:-4]:
+        row = rows == value
+        outwards = np.array([np.cos(value), np.sin(value), 0.0])
+        # Second order in the cell, 0.025 rad; by rows, since alternating diagonals share a row's areas unevenly.
+        density = (force[row] @ outwards).sum() / mesh.vertex_areas[row].sum()
+        assert density == pytest.approx(load[row][0], abs=5e-3 * np.abs(load).max())
+    shed = MASS * speed**3 * np.cos(half) ** 2 * np.sin(half) * 0.2
+    given = -force[:, 0].sum() * speed
+    # Of first order at the two free edges.
+    assert given == pytest.approx(shed, abs=0.02 * MASS * speed**3 * 0.2)
+
+
 @pytest.mark.parametrize("speed", [0.0, 8.0])
 def test_the_loads_terms_scale_as_powers_of_the_stream(make_system, plain, square, speed) -> None:
     """For a still, wavy sheet only U² η_xx is left."""
