@@ -29,6 +29,18 @@ def vertex_normals(cloth: Cloth, position: Tensor) -> Tensor:
     return area / length.clamp(min=torch.finfo(position.dtype).tiny)
 
 
+def normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
+    """Time derivative ṅ of the unit normals at the vertices: (vertex, 3, batch) [1/s]."""
+    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+    v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
+    sixth = (torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)) / 6
+    rate = gather_sum([sixth, sixth, sixth], cloth.face_slots)
+    area = area_vectors(cloth, position)
+    size = (area * area).sum(1, keepdim=True).sqrt().clamp(min=torch.finfo(position.dtype).tiny)
+    normal = area / size
+    return (rate - (rate * normal).sum(1, keepdim=True) * normal) / size
+
+
 def effective(force: Tensor, *, mass: Tensor, added: Tensor, normals: Tensor) -> Tensor:
     """The force that gives the cloth's own mass the acceleration it has with the added mass: (vertex, 3, batch) [N].
 

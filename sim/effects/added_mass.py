@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import Effect
+from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.inertia import normal_rates, vertex_normals
 from sim.state import State
 from sim.system import System
 
@@ -18,17 +19,20 @@ MassPerArea: TypeAlias = Annotated[
     Value,
     strength(
         unit="kg/m²",
-        prior=(0.0, 1.0),
+        prior=(0.0, 0.4),
         admissible=NOT_NEGATIVE,
-        source="potential flow: ρ λ/π for waves of length λ on a wide sheet, both sides; π ρ H/4, the mean over a "
-        "slender strip of height H (Lighthill 1960); ρ = 1.2 kg/m³ and λ, H of 0.1–1 m give 0.04–1",
+        source="potential flow: ρ λ/π for waves of length λ on a wide sheet, both sides, and π ρ H/4, the mean over a "
+        "slender strip of height H (Lighthill 1960): 0.04–0.4 for waves of 0.1–1 m",
     ),
 ]
 
 
 @dataclass(frozen=True, kw_only=True)
-class AddedMass(Effect):
-    """Still-air inertia: (m + m_a A n nᵀ) a = F at a vertex with rest area A and normal n (see `sim.inertia`).
+class AddedMass(ForceEffect):
+    """Still-air inertia: per area −m_a V̇ n, with V = v·n the velocity along the normal n and V̇ = n·a + ṅ·v.
+
+    Its power is that of the air's kinetic energy ½ m_a V², so that none is made or lost when the cloth turns. The first
+    term is mass (see `sim.inertia`), the second a force.
 
     Attributes:
         mass: m_a, per area of cloth.
@@ -38,8 +42,16 @@ class AddedMass(Effect):
 
     def added_mass(self, cloth: Cloth) -> Tensor:
         """(vertex, batch) [kg]."""
-        areas = torch.as_tensor(cloth.mesh.vertex_areas, dtype=cloth.dtype, device=cloth.device)
-        return (areas[:, None] * self.mass).expand_as(cloth.mass)
+        return (rest_areas(cloth)[:, None] * self.mass).expand_as(cloth.mass)
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        turning = (normal_rates(cloth, position, velocity) * velocity).sum(1, keepdim=True)
+        return -self.mass * rest_areas(cloth)[:, None, None] * turning * vertex_normals(cloth, position)
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        return replace(system, loads=(*system.loads, self)), state
+        return super().apply(replace(system, loads=(*system.loads, self)), state)
+
+
+def rest_areas(cloth: Cloth) -> Tensor:
+    """(vertex,) [m²]."""
+    return torch.as_tensor(cloth.mesh.vertex_areas, dtype=cloth.dtype, device=cloth.device)

@@ -18,9 +18,9 @@ along the sheet, and the load −m_a (D V) n,
 For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term is of third order, and the others are
 η_tt + U η_xt + U ∂x(η_t + U η_x): the equation above. The last makes it Lighthill's large-amplitude theory (Proc. R.
 Soc. B 179:125, 1971) as Candelier, Boyer and Leroyer put it (J. Fluid Mech. 668:196, 2011) for a sheet that does not
-stretch, ½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change of
-½ m_a V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.inertia`), the
-others are a force.
+stretch, ½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change
+of ½ m_a V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.inertia`),
+the others are a force.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth, gather_sum
-from sim.effects.added_mass import AddedMass, MassPerArea
+from sim.effects.added_mass import AddedMass, MassPerArea, rest_areas
 from sim.effects.effect import ForceEffect
-from sim.inertia import area_vectors
+from sim.inertia import normal_rates, vertex_normals
 from sim.state import State
 from sim.system import System
 
@@ -53,13 +53,9 @@ class ReactiveLoading(ForceEffect):
         return super().apply(system, state)
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        tiny = torch.finfo(position.dtype).tiny
         relative = velocity - wind
-        area = area_vectors(cloth, position)
-        size = (area * area).sum(1, keepdim=True).sqrt().clamp(min=tiny)
-        normal = area / size
-        rate = area_rates(cloth, position, velocity)
-        turning = (rate - (rate * normal).sum(1, keepdim=True) * normal) / size
+        normal = vertex_normals(cloth, position)
+        turning = normal_rates(cloth, position, velocity)
         across = (relative * normal).sum(1, keepdim=True)
         slip = across * normal - relative
 
@@ -70,16 +66,11 @@ class ReactiveLoading(ForceEffect):
         spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
         swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
         convective = gather_sum([swept, swept, swept], cloth.face_slots)
-        weight = torch.as_tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)[:, None, None]
-        return -self.mass * (weight * (turning * relative).sum(1, keepdim=True) + convective) * normal
-
-
-def area_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """Time derivative of `inertia.area_vectors`: (vertex, 3, batch) [m²/s]."""
-    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
-    v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
-    turned = torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)
-    return gather_sum([turned / 6, turned / 6, turned / 6], cloth.face_slots)
+        return (
+            -self.mass
+            * (rest_areas(cloth)[:, None, None] * (turning * relative).sum(1, keepdim=True) + convective)
+            * normal
+        )
 
 
 def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Tensor]:
