@@ -107,7 +107,8 @@ def stretching_stiffness(
     cells, shares = [], []
     for value, start, count in zip((g00, g11, g01.abs()), (grid.origin, grid.origin, 0.0), grid.counts, strict=True):
         place = ((value - start) / grid.spacing).clamp(0, count - 1)
-        cell = place.detach().floor().clamp(max=count - 2)
+        # A member that has diverged (NaN) stays so through its share; its cell must only be one that is there.
+        cell = place.detach().nan_to_num(nan=0.0).floor().clamp(max=count - 2)
         cells.append(cell.long())
         shares.append(place - cell)
     flat = samples.reshape(-1, 4)

@@ -23,6 +23,7 @@ from flagdata.errors import UsageError
 from sim import bending, contact, membrane
 from sim.cloth import gather_sum
 from sim.inertia import vertex_normals
+from sim.integrate.backend import Backend, kernel_for
 from sim.state import State
 from sim.system import System
 
@@ -47,12 +48,14 @@ class BackwardEuler:
         tolerance: relative residual at which a member's solve stops.
         iterations: bound on conjugate-gradient steps. A member that has not converged by then gets NaN, which
             `State.healthy` reports; the others go on.
+        backend: what computes the step; the kernel knows the base model without contact and effects.
     """
 
     step: float = 5e-3
     air_shape: AirShape = AirShape.CURRENT
     tolerance: float = 1e-6
-    iterations: int = 1000
+    iterations: int = 5000
+    backend: Backend = Backend.AUTO
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.step) and self.step > 0):
@@ -72,10 +75,18 @@ class BackwardEuler:
     def _step(self, system: System, state: State, h: float) -> State:
         cloth = system.cloth
         x, v, time = state.position, state.velocity, state.time
+        drive = system.drive(time, time + h)
+        if system.clamped:
+            v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
+        kernel = kernel_for(system, state, self.backend)
+        if kernel is not None and not system.extra and system.contact is None:
+            lag = h if self.air_shape is AirShape.PREVIOUS else 0.0
+            x, v = kernel.implicit(drive, x, v, h, lag=lag, tolerance=self.tolerance, iterations=self.iterations)
+            x, v = system.limited(x, v, h)
+            return State(position=x, velocity=v, time=time + h)
         mass = cloth.mass.unsqueeze(1)
         faces = membrane.Linearised.at(cloth, x)
         folds = bending.Linearised.at(cloth, x) if len(cloth.hinges) else None
-        drive = system.drive(time, time + h)
         factor = h * (h + cloth.damping)
         tied = system.tied(time, x)
         normals = vertex_normals(cloth, x) if system.loads else None
@@ -114,9 +125,6 @@ class BackwardEuler:
             force = force.index_add(0, system.held, pull)
             hold = torch.full_like(x[system.held], system.handles.stiffness)
             diagonal = diagonal.index_add(0, system.held, hold)
-        if system.clamped:
-            moved = (drive.targets[1] - x[system.held]) / h
-            v = v.index_copy(0, system.held, moved)
 
         free = torch.ones_like(x[:, :1])
         if system.clamped:

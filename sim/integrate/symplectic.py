@@ -8,28 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
-
-import torch
 
 from flagdata.errors import UsageError
+from sim.integrate.backend import Backend, kernel_for
 from sim.integrate.stability import stable_step
-from sim.kernel.fused import Kernel
 from sim.state import State
 from sim.system import System
 
 # Share of the linear stability limit that is used: large deformation stiffens faces beyond the estimate.
 _SAFETY = 0.7
-
-
-class Backend(StrEnum):
-    """What computes the forces."""
-
-    AUTO = "auto"
-    """The kernel where it can; torch on other devices, where gradients are wanted, and, with one warning, where the
-    kernel cannot be built."""
-    TORCH = "torch"
-    KERNEL = "kernel"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +63,7 @@ def advance(system: System, state: State, duration: float, *, steps: int, backen
     x, v = state.position, state.velocity
     if system.clamped:
         v = v.index_copy(0, system.held, drive.rate)
-    kernel = _kernel(system, state, backend)
+    kernel = kernel_for(system, state, backend)
     if kernel is not None and not system.extra:
         x, v = kernel.advance(drive, x, v, h, steps)
         return State(position=x, velocity=v, time=state.time + duration)
@@ -98,19 +85,3 @@ def advance(system: System, state: State, duration: float, *, steps: int, backen
             x, v = system.limited(x, v, h)
             memory = system.remembered(memory, before, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
-
-
-def _kernel(system: System, state: State, backend: Backend) -> Kernel | None:
-    differentiated = torch.is_grad_enabled() and any(
-        tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
-    )
-    if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
-        return None
-    kernel = Kernel.of(system)
-    if backend is Backend.KERNEL and (kernel is None or differentiated):
-        raise UsageError(
-            "the compiled kernel cannot run this batch",
-            where="integrator symplectic",
-            fix="it needs a C++ compiler, a CPU, float32 or 64 and no gradients; or leave the choice to AUTO",
-        )
-    return kernel

@@ -175,6 +175,26 @@ class Kernel:
         del alive
         return self.unpack(out)
 
+    def implicit(
+        self, drive: Drive, x: Tensor, v: Tensor, h: float, *, lag: float, tolerance: float, iterations: int
+    ) -> tuple[Tensor, Tensor]:
+        """One backward Euler step without effects and contact: positions and velocities (vertex, 3, batch).
+
+        Args:
+            lag: the air sees the shape x − lag v [s].
+
+        Returns:
+            NaN for members whose solve did not converge.
+        """
+        problem, alive = self._drive(drive)
+        xb, vb = self.pack(x), self.pack(v)
+        failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
+        numbers = (ctypes.c_double(h), ctypes.c_double(lag), ctypes.c_double(tolerance), ctypes.c_int64(iterations))
+        self._call("implicit", problem, xb, vb, failed, *numbers)
+        del alive
+        lost = self.unpack(failed) != 0
+        return self.unpack(xb).masked_fill(lost, torch.nan), self.unpack(vb).masked_fill(lost, torch.nan)
+
     def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes.c_double | ctypes.c_int64) -> None:
         function = _function(self.code, name, self.system.cloth.dtype)
         function.restype = None

@@ -108,7 +108,7 @@ def change(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
         (change("wind.gusts", 3), "gusts"),
         (change("cloths.0.materials.0.friction", 3), "friction"),
         (change("magic.tangential_stiffness", 3), "tangential_stiffness"),
-        (change("obstacles", [{"mesh": "pole.obj"}]), "obstacles are not supported"),
+        (change("obstacles", [{"mesh": "pole.obj"}]), "obstacles"),
         (change("cloths", []), "0 cloths"),
         (change("frame_time", 0), "frame_time"),
         (change("frame_steps", 2.5), "frame_steps"),

@@ -1,0 +1,43 @@
+"""Who computes the forces: torch, which defines them, or the compiled kernel."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import torch
+
+from flagdata.errors import UsageError
+from sim.kernel.fused import Kernel
+from sim.state import State
+from sim.system import System
+
+
+class Backend(StrEnum):
+    """What computes the forces."""
+
+    AUTO = "auto"
+    """The kernel where it can; torch on other devices, where gradients are wanted, and, with one warning, where the
+    kernel cannot be built."""
+    TORCH = "torch"
+    KERNEL = "kernel"
+
+
+def kernel_for(system: System, state: State, backend: Backend) -> Kernel | None:
+    """The compiled kernel where the backend allows it and it can run; None where torch is to do the work.
+
+    Raises:
+        UsageError: the kernel was asked for and cannot run this system, or gradients are wanted from it.
+    """
+    differentiated = torch.is_grad_enabled() and any(
+        tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
+    )
+    if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
+        return None
+    kernel = Kernel.of(system)
+    if backend is Backend.KERNEL and (kernel is None or differentiated):
+        raise UsageError(
+            "the compiled kernel cannot run this batch",
+            where="integrator",
+            fix="it needs a C++ compiler, a CPU, float32 or 64 and no gradients; or leave the choice to AUTO",
+        )
+    return kernel

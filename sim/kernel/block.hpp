@@ -1,0 +1,418 @@
+// The base model on a CPU: membrane, bending, gravity, quadratic-normal air, handle springs, contact, limits, leapfrog.
+//
+// The torch source (sim/membrane.py, bending.py, air.py, system.py, integrate/symplectic.py) is the definition; this file
+// repeats it for speed and is tested against it. One block holds LANES members of the batch side by side, in vector
+// registers; every lane does the same operations in the same order, so a member's result does not depend on the others.
+
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "contact.hpp"
+
+namespace {
+
+template <typename T, int L>
+struct Vector {
+  typedef T type __attribute__((vector_size(sizeof(T) * L)));
+  typedef int32_t index __attribute__((vector_size(4 * L)));
+};
+
+// Coefficients of atan(sqrt(u))/sqrt(u) in powers of 2u - 1 on [0, 1], by Chebyshev interpolation: largest error of
+// atan 1.5e-9 (degree 9) and 1.1e-16 (degree 20).
+template <typename T>
+struct Arctangent;
+template <>
+struct Arctangent<float> {
+  static constexpr int terms = 10;
+  static constexpr float c[] = {0.8704197533355914f,   -0.1018765429522826f,   0.02085175296811603f, -0.005030833614468352f,
+                                0.0013163640918424742f, -0.0003612200464794893f, 0.00010014512956245252f,
+                                -2.8998424551572838e-05f, 1.1063999869689915e-05f, -3.322597781383979e-06f};
+};
+template <>
+struct Arctangent<double> {
+  static constexpr int terms = 21;
+  static constexpr double c[] = {0.8704197513671031,      -0.10187654235021819,    0.02085185120710812,
+                                 -0.005030863660250071,   0.0013155859496292637,   -0.0003609820870537958,
+                                 0.00010227656112457649,  -2.9650040727272736e-05, 8.74493865928441e-06,
+                                 -2.6140726587443016e-06, 7.898643101492844e-07,   -2.4079970758706004e-07,
+                                 7.3946703181214e-08,     -2.2806127912204115e-08, 7.084749388337621e-09,
+                                 -2.268247878883474e-09,  7.111461799834528e-10,   -1.7840616846746431e-10,
+                                 5.614478327142391e-11,   -3.787822214408087e-11,  1.2046030455090929e-11};
+};
+
+// Field by field as in fused.py.
+template <typename T>
+struct Problem {
+  int64_t vertices, faces, hinges, held;
+  int64_t counts[3];
+  int64_t fold;  // 1: bending looks up |curvature|
+  const int32_t* face;         // (faces, 3)
+  const T* gradients;          // (faces, 2, 3)
+  const T* areas;              // (faces)
+  const int32_t* hinge;        // (hinges, 4)
+  const T* hinge_shape;        // (hinges)
+  const T* hinge_column;       // (hinges)
+  const T* hinge_rows;         // (hinges, 3)
+  const int32_t* held_vertex;  // (held)
+  const T* samples;            // (tables, n0, n1, n2, 4)
+  double origin, spacing, air_density, air_drag, stiffness;
+  int64_t batch;  // members; lanes beyond are spare
+  contact::Settings<T> contact;
+  double lowest, highest;  // strain limits
+  int64_t sweeps;          // corrections a step; 0: no limits
+  const T* arms;           // (faces, 3, 2)
+  const T* vertex_areas;   // (vertices)
+  // One block's share of each of the following is contiguous, lanes innermost.
+  const T* mass;          // (blocks, vertices, L)
+  const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly
+  const T* segments;      // (blocks, 3, 5, L)
+  const T* damping;       // (blocks, L)
+  const int32_t* table;   // (blocks, L)
+  const T* gravity;       // (blocks, 3, L)
+  const T* wind;          // (2, blocks, 3, L)
+  const T* targets;       // (2, blocks, held, 3, L)
+  const T* rate;          // (blocks, held, 3, L)
+};
+
+template <typename T, int L>
+class Block {
+ protected:
+  using V = typename Vector<T, L>::type;
+  using I = typename Vector<T, L>::index;
+  struct V3 {
+    V x, y, z;
+  };
+
+  static V splat(T value) { return V{} + value; }
+  static V load(const T* p) {
+    V v;
+    std::memcpy(&v, p, sizeof v);
+    return v;
+  }
+  static void store(T* p, V v) { std::memcpy(p, &v, sizeof v); }
+  static V3 load3(const T* p) { return {load(p), load(p + L), load(p + 2 * L)}; }
+  static void add3(T* p, V3 a) {
+    store(p, load(p) + a.x);
+    store(p + L, load(p + L) + a.y);
+    store(p + 2 * L, load(p + 2 * L) + a.z);
+  }
+  static V maximum(V a, V b) { return a > b ? a : b; }
+  static V minimum(V a, V b) { return a < b ? a : b; }
+  static V absolute(V a) { return a < 0 ? -a : a; }
+  static V root(V a) {
+    V r;
+    for (int l = 0; l < L; ++l) r[l] = std::sqrt(a[l]);
+    return r;
+  }
+  static V dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+  static V3 sub(V3 a, V3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  static V3 scale(V3 a, V s) { return {a.x * s, a.y * s, a.z * s}; }
+  static V3 combine(V3 a, V s, V3 b, V t) { return {a.x * s + b.x * t, a.y * s + b.y * t, a.z * s + b.z * t}; }
+  static V3 cross(V3 a, V3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+
+  // atan2 for arguments that are not both zero.
+  static V arctangent2(V y, V x) {
+    V ay = absolute(y), ax = absolute(x);
+    V t = minimum(ay, ax) / maximum(ay, ax);
+    V w = 2 * t * t - 1;
+    V p = splat(Arctangent<T>::c[Arctangent<T>::terms - 1]);
+    for (int i = Arctangent<T>::terms - 2; i >= 0; --i) p = p * w + Arctangent<T>::c[i];
+    V angle = p * t;
+    angle = ay > ax ? T(M_PI / 2) - angle : angle;
+    angle = x < 0 ? T(M_PI) - angle : angle;
+    return y < 0 ? -angle : angle;
+  }
+
+  const Problem<T>& p;
+  const int64_t b, blocks;
+  const V damping;
+  I base;
+  std::array<contact::Search<T>, L> search_;
+  std::vector<contact::Point<T>> near_;
+  std::vector<T> built_;  // positions at each lane's last search
+
+ public:
+  Block(const Problem<T>& problem, int64_t block, int64_t count)
+      : p(problem), b(block), blocks(count), damping(load(problem.damping + block * L)) {
+    for (int l = 0; l < L; ++l) base[l] = p.table[b * L + l] * int32_t(p.counts[0] * p.counts[1] * p.counts[2]);
+  }
+
+  // Cell and share of a coordinate of the stretching grid.
+  static void locate(V place, int64_t count, I& cell, V& share) {
+    place = minimum(maximum(place, splat(0)), splat(T(count - 1)));
+    cell = __builtin_convertvector(place, I);
+    I last = I{} + int32_t(count - 2);
+    cell = cell < last ? cell : last;
+    share = place - __builtin_convertvector(cell, V);
+  }
+
+  void stiffness(V g00, V g11, V g01, V k[4]) const {
+    typedef T V4 __attribute__((vector_size(sizeof(T) * 4)));
+    I c0, c1, c2;
+    V w0, w1, w2;
+    const T inverse = T(1 / p.spacing), origin = T(p.origin);
+    locate((g00 - origin) * inverse, p.counts[0], c0, w0);
+    locate((g11 - origin) * inverse, p.counts[1], c1, w1);
+    locate(absolute(g01) * inverse, p.counts[2], c2, w2);
+    const int64_t n2 = p.counts[2], n12 = p.counts[1] * n2;
+    const I cell = base + (c0 * int32_t(p.counts[1]) + c1) * int32_t(n2) + c2;
+    for (int l = 0; l < L; ++l) {
+      const T* s = p.samples + 4 * int64_t(cell[l]);
+      auto at = [s](int64_t offset) {
+        V4 v;
+        std::memcpy(&v, s + 4 * offset, sizeof v);
+        return v;
+      };
+      auto line = [&](int64_t offset) { return at(offset) + w2[l] * (at(offset + 1) - at(offset)); };
+      auto plane = [&](int64_t offset) {
+        V4 low = line(offset);
+        return low + w1[l] * (line(offset + n2) - low);
+      };
+      V4 low = plane(0);
+      V4 value = low + w0[l] * (plane(n12) - low);
+      for (int i = 0; i < 4; ++i) k[i][l] = value[i];
+    }
+  }
+
+  // The air's force on each corner of a face.
+  V3 pushed(V3 x0, V3 x1, V3 x2, V3 v0, V3 v1, V3 v2, V3 wind, T area) const {
+    V3 normal = cross(sub(x1, x0), sub(x2, x0));
+    const V length = root(dot(normal, normal));
+    normal = scale(normal, 1 / maximum(length, splat(T(1e-30))));
+    const T third = T(1) / 3;
+    const V3 relative = {wind.x - (v0.x + v1.x + v2.x) * third, wind.y - (v0.y + v1.y + v2.y) * third,
+                         wind.z - (v0.z + v1.z + v2.z) * third};
+    const V across = dot(relative, normal);
+    const T share = area * third, drag = T(p.air_drag) * share;
+    return combine(normal, T(p.air_density) * share * absolute(across) * across - drag * across, relative, splat(drag));
+  }
+
+  // Gravity, and the air at the drive's start on the shape x - lag v.
+  void external(const T* x, const T* v, T lag, T* f) const {
+    weigh(f);
+    if (p.air_density == 0 && p.air_drag == 0) return;
+    const V3 wind = load3(p.wind + b * 3 * L);
+    for (int64_t e = 0; e < p.faces; ++e) {
+      const int32_t* c = p.face + 3 * e;
+      V3 at[3], speed[3];
+      for (int i = 0; i < 3; ++i) {
+        speed[i] = load3(v + 3 * L * int64_t(c[i]));
+        at[i] = combine(load3(x + 3 * L * int64_t(c[i])), splat(1), speed[i], splat(-lag));
+      }
+      const V3 push = pushed(at[0], at[1], at[2], speed[0], speed[1], speed[2], wind, p.areas[e]);
+      for (int i = 0; i < 3; ++i) add3(f + 3 * L * int64_t(c[i]), push);
+    }
+  }
+
+  void weigh(T* f) const {
+    const V3 g = load3(p.gravity + b * 3 * L);
+    const T* mass = p.mass + b * p.vertices * L;
+    for (int64_t i = 0; i < p.vertices; ++i) {
+      const V m = load(mass + i * L);
+      store(f + 3 * L * i, m * g.x);
+      store(f + 3 * L * i + L, m * g.y);
+      store(f + 3 * L * i + 2 * L, m * g.z);
+    }
+  }
+
+  void faces(const T* x, const T* v, V3 wind, T* f) const {
+    const bool air = p.air_density != 0 || p.air_drag != 0;
+    for (int64_t e = 0; e < p.faces; ++e) {
+      const int64_t i0 = 3 * L * int64_t(p.face[3 * e]), i1 = 3 * L * int64_t(p.face[3 * e + 1]),
+                    i2 = 3 * L * int64_t(p.face[3 * e + 2]);
+      const T* g = p.gradients + 6 * e;
+      const T area = p.areas[e];
+      const V3 x0 = load3(x + i0), x1 = load3(x + i1), x2 = load3(x + i2);
+      const V3 v0 = load3(v + i0), v1 = load3(v + i1), v2 = load3(v + i2);
+      auto derive = [](V3 a, V3 b, V3 c, const T* d) -> V3 {
+        return {a.x * d[0] + b.x * d[1] + c.x * d[2], a.y * d[0] + b.y * d[1] + c.y * d[2],
+                a.z * d[0] + b.z * d[1] + c.z * d[2]};
+      };
+      const V3 xu = derive(x0, x1, x2, g), xv = derive(x0, x1, x2, g + 3);
+      const V3 vu = derive(v0, v1, v2, g), vv = derive(v0, v1, v2, g + 3);
+      const V g00 = (dot(xu, xu) - 1) * T(0.5), g11 = (dot(xv, xv) - 1) * T(0.5), g01 = dot(xu, xv) * T(0.5);
+      V k[4];
+      stiffness(g00, g11, g01, k);
+      const V s00 = g00 + damping * dot(xu, vu), s11 = g11 + damping * dot(xv, vv);
+      const V s01 = g01 + damping * T(0.5) * (dot(xu, vv) + dot(xv, vu));
+      const V t00 = (k[0] * s00 + k[1] * s11) * area, t11 = (k[2] * s11 + k[1] * s00) * area, t01 = k[3] * s01 * area;
+      const V3 pu = combine(xu, t00, xv, t01), pv = combine(xv, t11, xu, t01);
+      const V3 push = air ? pushed(x0, x1, x2, v0, v1, v2, wind, area) : V3{V{}, V{}, V{}};
+      const int64_t at[3] = {i0, i1, i2};
+      for (int c = 0; c < 3; ++c) {
+        const V3 inner = combine(pu, splat(g[c]), pv, splat(g[3 + c]));
+        add3(f + at[c], sub(push, inner));
+      }
+    }
+  }
+
+  // Fold angle of a hinge and its gradients at the corners i, j, k, l.
+  void fold(const T* x, int64_t e, V3 g[4], V& angle) const {
+    const int32_t* c = p.hinge + 4 * e;
+    const V3 xi = load3(x + 3 * L * int64_t(c[0]));
+    const V3 edge = sub(load3(x + 3 * L * int64_t(c[1])), xi), left = sub(load3(x + 3 * L * int64_t(c[2])), xi),
+             right = sub(load3(x + 3 * L * int64_t(c[3])), xi);
+    const V3 normal0 = cross(edge, left), normal1 = cross(right, edge);
+    const V square = dot(edge, edge), length = root(square);
+    const V doubled0 = root(dot(normal0, normal0)), doubled1 = root(dot(normal1, normal1));
+    const V floor = T(1e-3) * square, tiny = splat(T(1e-30));
+    const V3 n0 = scale(normal0, 1 / maximum(doubled0, tiny)), n1 = scale(normal1, 1 / maximum(doubled1, tiny));
+    g[2] = scale(n0, length / maximum(doubled0, floor));
+    g[3] = scale(n1, length / maximum(doubled1, floor));
+    const V inverse = 1 / square;
+    const V w0 = dot(edge, left) * inverse, w1 = dot(edge, right) * inverse;
+    const V sine = -dot(edge, cross(n0, n1)) / length, cosine = dot(n0, n1);
+    angle = arctangent2(sine, cosine);
+    g[0] = combine(g[2], w0 - 1, g[3], w1 - 1);
+    g[1] = combine(g[2], -w0, g[3], -w1);
+  }
+
+  // k S / 2 of a hinge at a fold angle.
+  V bending(int64_t e, V angle) const {
+    const T* segments = p.segments + b * 15 * L;
+    V column = angle * p.hinge_column[e];
+    if (p.fold) column = absolute(column);
+    column = minimum(column, splat(4));
+    const V c1 = maximum(column - 1, V{}), c2 = maximum(column - 2, V{}), c3 = maximum(column - 3, V{});
+    V k = V{};
+    for (int r = 0; r < 3; ++r) {
+      const T weight = p.hinge_rows[3 * e + r];
+      if (weight == 0) continue;
+      const T* s = segments + 5 * L * r;
+      k += weight * (load(s) + load(s + L) * column + load(s + 2 * L) * c1 + load(s + 3 * L) * c2 + load(s + 4 * L) * c3);
+    }
+    return maximum(k, V{}) * (p.hinge_shape[e] * T(0.5));
+  }
+
+  void hinges(const T* x, const T* v, T* f) const {
+    for (int64_t e = 0; e < p.hinges; ++e) {
+      const int32_t* c = p.hinge + 4 * e;
+      V3 g[4];
+      V angle, rate = V{};
+      fold(x, e, g, angle);
+      for (int i = 0; i < 4; ++i) rate += dot(g[i], load3(v + 3 * L * int64_t(c[i])));
+      const V moment = -bending(e, angle) * (angle + damping * rate);
+      for (int i = 0; i < 4; ++i) add3(f + 3 * L * int64_t(c[i]), scale(g[i], moment));
+    }
+  }
+
+  // Every lane by itself: their candidates differ.
+  void contacts(const T* x, const T* v, T* f) {
+    const int64_t n = p.vertices;
+    const int real = int(p.batch - b * L < L ? p.batch - b * L : L);
+    V worst = V{};
+    if (built_.empty()) {
+      built_.assign(x, x + 3 * L * n);
+    } else {
+      for (int64_t i = 0; i < n; ++i) {
+        const V3 moved = sub(load3(x + 3 * L * i), load3(built_.data() + 3 * L * i));
+        worst = maximum(worst, dot(moved, moved));
+      }
+    }
+    const T* mass = p.mass + b * n * L;
+    for (int l = 0; l < real; ++l) {
+      if (!search_[l].holds(p.contact, worst[l])) {
+        near_.resize(n);
+        for (int64_t i = 0; i < n; ++i) near_[i] = {x[3 * L * i + l], x[3 * L * i + L + l], x[3 * L * i + 2 * L + l]};
+        search_[l].build(p.contact, near_.data());
+        for (int64_t i = l; i < 3 * L * n; i += L) built_[i] = x[i];
+        worst[l] = 0;
+      }
+      if (!search_[l].pairs().empty())
+        contact::apply<T, L>(p.contact, search_[l], std::sqrt(worst[l]), x + l, v + l, mass + l, T(damping[l]), f + l);
+    }
+  }
+
+  void springs(const T* x, const T* v, T share, T* f) const {
+    const T stiffness = T(p.stiffness);
+    for (int64_t h = 0; h < p.held; ++h) {
+      const int64_t at = 3 * L * int64_t(p.held_vertex[h]);
+      for (int c = 0; c < 3; ++c) {
+        const V start = load(p.targets + ((b * p.held + h) * 3 + c) * L);
+        const V end = load(p.targets + (((blocks + b) * p.held + h) * 3 + c) * L);
+        const V rate = load(p.rate + ((b * p.held + h) * 3 + c) * L);
+        const V stretch = load(x + at + c * L) - (start + share * (end - start)) +
+                          damping * (load(v + at + c * L) - rate);
+        store(f + at + c * L, load(f + at + c * L) - stiffness * stretch);
+      }
+    }
+  }
+
+  // All forces at `share` of the way between the drive's start and end.
+  void forces(const T* x, const T* v, T share, T* f) {
+    weigh(f);
+    const V3 start = load3(p.wind + b * 3 * L), end = load3(p.wind + (blocks + b) * 3 * L);
+    const V3 wind = {start.x + share * (end.x - start.x), start.y + share * (end.y - start.y),
+                     start.z + share * (end.z - start.z)};
+    faces(x, v, wind, f);
+    hinges(x, v, f);
+    if (p.stiffness > 0) springs(x, v, share, f);
+    if (p.contact.thickness > 0) contacts(x, v, f);
+  }
+
+  // One sweep of the strain limits; `moves` is scratch.
+  void limit(T* x, T* v, T step, T* moves) const {
+    const V low = splat(T(p.lowest)), high = splat(T(p.highest)), tiny = splat(std::numeric_limits<T>::min());
+    std::memset(moves, 0, sizeof(T) * p.vertices * 3 * L);
+    for (int64_t e = 0; e < p.faces; ++e) {
+      const int64_t at[3] = {3 * L * int64_t(p.face[3 * e]), 3 * L * int64_t(p.face[3 * e + 1]),
+                             3 * L * int64_t(p.face[3 * e + 2])};
+      const T* g = p.gradients + 6 * e;
+      const V3 x0 = load3(x + at[0]), x1 = load3(x + at[1]), x2 = load3(x + at[2]);
+      auto derive = [&](const T* d) -> V3 {
+        return {x0.x * d[0] + x1.x * d[1] + x2.x * d[2], x0.y * d[0] + x1.y * d[1] + x2.y * d[2],
+                x0.z * d[0] + x1.z * d[1] + x2.z * d[2]};
+      };
+      const V3 xu = derive(g), xv = derive(g + 3);
+      const V a = dot(xu, xu), c = dot(xv, xv), d = dot(xu, xv);
+      const V middle = (a + c) * T(0.5), half = root((a - c) * (a - c) * T(0.25) + d * d);
+      const V large = middle + half, small = maximum(middle - half, tiny);
+      const V s1 = root(large), s2 = root(small);
+      const V f1 = minimum(maximum(s1, low), high) / s1, f2 = minimum(maximum(s2, low), high) / s2;
+      const V gap = large - small;
+      const V beta = gap > T(1e-9) ? (f1 - f2) / maximum(gap, splat(T(1e-9))) : V{};
+      const V alpha = f1 - 1 - beta * large;
+      const V3 du = combine(xu, alpha + beta * a, xv, beta * d), dv = combine(xu, beta * d, xv, alpha + beta * c);
+      const T* arm = p.arms + 6 * e;
+      const T share = p.areas[e] / 3;
+      for (int k = 0; k < 3; ++k)
+        add3(moves + at[k], combine(du, splat(share * arm[2 * k]), dv, splat(share * arm[2 * k + 1])));
+    }
+    const T* inverse = p.inverse_mass + b * p.vertices * L;
+    for (int64_t i = 0; i < p.vertices; ++i) {
+      const T weight = inverse[i * L] == 0 ? T(0) : 1 / p.vertex_areas[i];
+      for (int64_t k = 3 * L * i; k < 3 * L * (i + 1); k += L) {
+        const V move = load(moves + k) * weight;
+        store(x + k, load(x + k) + move);
+        store(v + k, load(v + k) + move / step);
+      }
+    }
+  }
+
+  // Leapfrog: half a kick, drift and kick in turn, half a kick.
+  void advance(T* x, T* v, T* f, double h, int64_t steps) {
+    const T* inverse = p.inverse_mass + b * p.vertices * L;
+    for (int64_t s = 0; s <= steps; ++s) {
+      forces(x, v, T(double(s) / double(steps)), f);
+      const T kick = T(s == 0 || s == steps ? h / 2 : h), drift = s < steps ? T(h) : T(0);
+      for (int64_t i = 0; i < p.vertices; ++i) {
+        const V w = kick * load(inverse + i * L);
+        for (int64_t c = 3 * L * i; c < 3 * L * (i + 1); c += L) {
+          const V speed = load(v + c) + w * load(f + c);
+          store(v + c, speed);
+          store(x + c, load(x + c) + drift * speed);
+        }
+      }
+      if (s < steps)
+        for (int64_t sweep = 0; sweep < p.sweeps; ++sweep) limit(x, v, T(h), f);
+    }
+  }
+};
+
+}  // namespace
