@@ -123,7 +123,8 @@ def run(
                 state = stepper.frame(system, state)
                 failed = ~state.healthy()
                 for place in torch.nonzero(failed).flatten().tolist():
-                    failures.setdefault(place, ("diverged", f"it diverged before {state.time:.3f} s"))
+                    if failures.get(place, ("",))[0] != "diverged":
+                        failures[place] = ("diverged", f"it diverged before {state.time:.3f} s")
                 state = _restarted(state, start, failed)
             if frame >= time.settling:
                 monitor.look(system, state)

@@ -26,6 +26,7 @@ from pathlib import Path
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
+from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import ArcsimScene, read_material, read_scene
 from sim.contact import Contact
@@ -155,6 +156,8 @@ def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
     if name is not None:
+        if name not in material.names():
+            raise UnknownNameError.of("material", name, material.names(), where=table.where)
         base = named(name)
     elif file is not None:
         base = _material_file(folder / file)

@@ -1,0 +1,97 @@
+"""Members are drawn from named streams: each depends on the recipe's seed and its index alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from sim.effects import EFFECTS
+from sim.material import named
+from sim.run.members import Crew
+from sim.run.reading import parse
+from sim.scene import upright
+
+CAMEL = named("camel-ponte-roma")
+
+
+def test_draws_cover_the_search_space_uniformly(make_recipe: Callable) -> None:
+    crew = Crew(make_recipe())
+    members = [crew.member(index) for index in range(400)]
+    speed = np.array([m.parameters["wind_speed"] for m in members])
+    density = np.array([m.parameters["density"] for m in members])
+    factors = np.array([m.scene.material.bending / CAMEL.bending for m in members])
+    # A uniform distribution's mean over n draws has a standard deviation of width/√(12 n): four of them.
+    for values, low, high in ((speed, 0, 10), (density, 0.10, 0.17), (factors, 0.1, 10)):
+        assert low <= values.min()
+        assert values.max() <= high
+        assert abs(values.mean() - (low + high) / 2) < 4 * (high - low) / np.sqrt(12 * values.size)
+    # The fifteen coefficients are drawn apart: correlations are those of chance (four standard deviations of 1/√n).
+    correlation = np.corrcoef(factors.reshape(400, 15).T) - np.eye(15)
+    assert np.abs(correlation).max() < 4 / np.sqrt(400)
+
+
+def test_a_new_draw_does_not_move_the_others(make_recipe: Callable) -> None:
+    plain, more = (
+        Crew(make_recipe()).member(2),
+        Crew(make_recipe(material="damping = { low = 0.0, high = 1e-3 }")).member(2),
+    )
+    assert more.parameters["damping"] != plain.parameters["damping"]
+    for name in ("wind_speed", "density", "bending"):
+        assert more.parameters[name] == plain.parameters[name]
+    np.testing.assert_array_equal(more.scene.position, plain.scene.position)
+
+
+def test_handles_start_where_they_are_held(make_recipe: Callable) -> None:
+    crew = Crew(make_recipe(scene='attachment = "hoist"'))
+    held = list(crew.handles.vertices)
+    assert len(held) == 5
+    start = crew.member(0).scene.position
+    np.testing.assert_allclose(start[held], [[0, 0, j / 4] for j in range(5)], atol=1e-12)
+    # 90 draws of the declared 1 mm: four standard errors of a standard deviation, 1/√(2 n) each.
+    noise = (start - upright(crew.mesh))[5:]
+    assert noise.std() == pytest.approx(1e-3, rel=4 / np.sqrt(2 * noise.size))
+
+
+def test_wind_blows_towards_its_angle_from_x_to_y(small: Callable) -> None:
+    text = small().replace("speed = { low = 0.0, high = 10.0 }", "speed = 2.0\ntoward = 1.5707963267948966")
+    scene = Crew(parse(text, name="r", folder=Path(), where="r")).member(0).scene
+    np.testing.assert_allclose(scene.wind, [0, 2, 0], atol=1e-12)
+
+
+def test_gusts_are_each_members_own(make_recipe: Callable) -> None:
+    crew = Crew(make_recipe(more="[effects.gusts]\nintensity = 0.2"))
+    members = [crew.member(index) for index in range(3)]
+    times = torch.linspace(0, 0.2, 5).tolist()
+
+    def winds(chosen: list) -> torch.Tensor:
+        system, _ = crew.assemble(chosen)
+        return torch.stack([system.wind.velocity(t) for t in times])
+
+    together = winds(members)
+    for place, member in enumerate(members):
+        assert torch.equal(winds([member])[..., 0], together[..., place])
+    still = torch.tensor([m.scene.wind for m in members]).T
+    assert float((together[0] - still).abs().max()) > 0.1
+
+
+def test_seeds_of_members_are_theirs_alone(make_recipe: Callable) -> None:
+    crew, other = Crew(make_recipe()), Crew(make_recipe(top=""))
+    seeds = [crew.seed(index) for index in range(100)]
+    assert len(set(seeds)) == 100
+    assert [other.seed(index) for index in range(100)] == seeds
+    assert all(0 <= seed < 2**63 for seed in seeds)
+
+
+@pytest.mark.parametrize("effect", ["porosity", "shear", "hem-mass", "hysteresis", "added-mass", "pole-wake"])
+def test_effects_are_named_by_their_registry(make_recipe: Callable, effect: str) -> None:
+    parameters = "\n".join(f'{key.replace("_", "-")} = "prior"' for key in EFFECTS[effect].parameters())
+    crew = Crew(make_recipe(more=f"[effects.{effect}]\n{parameters}"))
+    member = crew.member(0)
+    for key, described in EFFECTS[effect].parameters().items():
+        low, high = described.prior
+        assert low <= member.parameters[f"{effect}.{key}"] <= high
+    crew.assemble([member, crew.member(1)])

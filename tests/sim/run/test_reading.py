@@ -1,0 +1,130 @@
+"""Recipes are read strictly: what is not understood is refused with the place and the nearest that is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.provenance import canonical
+from sim.air import Stokes
+from sim.run.reading import load, names, parse
+from sim.run.recipe import Shape
+from sim.run.tables import Range, Scale
+
+MINIMAL = '[material]\nname = "camel-ponte-roma"\n[wind]\nspeed = 4.0\n'
+
+
+def read(text: str, folder: Path = Path()):
+    return parse(text, name="r", folder=folder, where="r.toml")
+
+
+def test_every_recipe_of_the_catalog_is_read() -> None:
+    assert {"flag-search-space", "hanging-cloth"} <= set(names())
+    for name in names():
+        canonical(load(name).identity())
+
+
+def test_the_search_space_is_the_papers() -> None:
+    recipe = load("flag-search-space")
+    assert recipe.material.base.name == "camel-ponte-roma"
+    assert recipe.material.bending_each == Range(low=0.1, high=10.0)
+    assert recipe.material.density == Range(low=0.10, high=0.17)
+    assert recipe.wind.speed == Range(low=0.0, high=10.0)
+    assert (recipe.time.frames, recipe.time.rate) == (60, 25.0)
+    assert recipe.scene.width / recipe.scene.height == 1.5
+
+
+def test_what_is_left_out_has_its_default_in_the_identity() -> None:
+    recipe = read(MINIMAL)
+    assert recipe.scene.shape is Shape.FLAG
+    assert recipe.identity() == read(MINIMAL + "[time]\nsettle = 4.0\nframes = 60\nrate = 25.0\n").identity()
+    assert recipe.identity() == read("count = 9\nbatch = 2\n" + MINIMAL).identity()
+    for change in ("seed = 1\n", 'precision = "float64"\n'):
+        assert read(change + MINIMAL).identity() != recipe.identity()
+    assert read(MINIMAL + "[contact]\n").identity() != recipe.identity()
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "word"),
+    [
+        (MINIMAL + "[tme]\nframes = 3\n", UnknownNameError, "did you mean 'time'"),
+        (MINIMAL + "[time]\nframse = 3\n", UnknownNameError, "did you mean 'frames'"),
+        (MINIMAL.replace("camel-ponte-roma", "camel-ponte-romo"), UnknownNameError, "camel-ponte-roma"),
+        (MINIMAL + "[scene]\nshape = 'flga'\n", UnknownNameError, "did you mean 'flag'"),
+        (MINIMAL + "[integrator]\nname = 'implicti'\n", UnknownNameError, "did you mean 'implicit'"),
+        (MINIMAL + "[integrator]\nair-shape = 'previous'\n", UnknownNameError, "air-shape"),
+        (MINIMAL + "[effects.gust]\nintensity = 0.1\n", UnknownNameError, "did you mean 'gusts'"),
+        (MINIMAL + "[effects.gusts]\nintensty = 0.1\n", UnknownNameError, "did you mean 'intensity'"),
+        (MINIMAL + "[effects.gusts]\nintensity = -0.1\n", InputError, "at least 0"),
+        (MINIMAL + "[effects.logged-gusts]\n", UsageError, "need a log"),
+        (MINIMAL + "[scene]\nshape = 'hanging-cloth'\nattachment = 'hoist'\n", UsageError, "no hoist"),
+        (MINIMAL + "[scene]\ncolumns = 0\n", InputError, "columns is 0"),
+        (MINIMAL + "[scene]\nwidth = -1.0\n", InputError, "width is -1"),
+        (MINIMAL + "[time]\nrate = 0\n", InputError, "rate is 0"),
+        ("seed = -1\n" + MINIMAL, InputError, "seed is -1"),
+        ("batch = true\n" + MINIMAL, InputError, "batch is True"),
+        ("precision = 'float16'\n" + MINIMAL, UnknownNameError, "float"),
+        (MINIMAL.replace("4.0", "nan"), InputError, "finite"),
+        (MINIMAL.replace("4.0", "-4.0"), InputError, "at least 0"),
+        (MINIMAL.replace("4.0", "{ low = 5.0, high = 4.0 }"), InputError, "low ≤ high"),
+        (MINIMAL.replace("4.0", "{ low = 0.0, high = 4.0, scale = 'log' }"), InputError, "begin above 0"),
+        (MINIMAL.replace("4.0", "{ low = 0.0 }"), InputError, "low = …, high = …"),
+        (MINIMAL.replace("4.0", "{ low = 0.0, hihg = 1.0, high = 2.0 }"), UnknownNameError, "did you mean 'high'"),
+        (MINIMAL.replace("speed = 4.0", ""), InputError, "no wind speed"),
+        ("[wind]\nspeed = 4.0\n", InputError, "no material"),
+        (MINIMAL.replace("[wind]", "density = 0.0\n[wind]"), InputError, "above 0"),
+        (MINIMAL.replace("[wind]", "file = 'x.toml'\n[wind]"), UsageError, "both name and file"),
+        ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "no file is named"),
+        ("scene = 3\n" + MINIMAL, InputError, "not a table"),
+        ("[wind\n", InputError, "not TOML"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_its_place(text: str, error: type[FlagdataError], word: str) -> None:
+    with pytest.raises(error, match=word) as caught:
+        read(text)
+    assert caught.value.where is not None
+
+
+def test_a_recipe_that_is_not_there_is_told() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'hanging-cloth'"):
+        load("hanging-cloht")
+    with pytest.raises(NotFoundError):
+        load("nowhere.toml")
+
+
+def test_a_logarithmic_range_is_uniform_in_the_logarithm() -> None:
+    quantity = Range(low=0.1, high=10.0, scale=Scale.LOG)
+    assert quantity.at(0.5) == pytest.approx(1.0)
+    assert quantity.at(0.25) == pytest.approx(10**-0.5)
+    assert Range(low=2.0, high=4.0).at(0.25) == 2.5
+
+
+def test_winds_force_is_named() -> None:
+    recipe = read(MINIMAL.replace("speed", "force = 'stokes'\nviscosity = 2e-5\nspeed"))
+    assert recipe.wind.force == Stokes(viscosity=2e-5)
+    with pytest.raises(UnknownNameError, match="density"):
+        read(MINIMAL.replace("speed", "force = 'stokes'\ndensity = 1.0\nspeed"))
+
+
+def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
+    tables = {"density": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
+    (tmp_path / "mine.json").write_text(json.dumps(tables))
+    lines = [f"{key} = {json.dumps(value)}" for key, value in tables.items()]
+    (tmp_path / "mine.toml").write_text("\n".join([*lines, 'source = "measured"', "damping = 1e-3"]))
+    for name, damping in (("mine.json", 0.0), ("mine.toml", 1e-3)):
+        base = read(f'[material]\nfile = "{name}"\n[wind]\nspeed = 1\n', tmp_path).material.base
+        assert (base.density, base.damping) == (0.2, damping)
+        np.testing.assert_array_equal(base.bending, tables["bending"])
+    with pytest.raises(NotFoundError):
+        read('[material]\nfile = "yours.toml"\n[wind]\nspeed = 1\n', tmp_path)
+
+
+def test_an_effects_prior_may_be_asked_for_by_name(make_recipe: Callable) -> None:
+    effect = make_recipe(more='[effects.gusts]\nintensity = "prior"\nlength = 40.0').effects["gusts"]
+    assert effect.parameters["intensity"] == Range(low=0.0, high=0.3)
+    assert effect.length == 40.0
