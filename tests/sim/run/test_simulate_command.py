@@ -1,0 +1,93 @@
+"""`flagdata simulate`: results on stdout, the rest on stderr, exit codes; ArcSim scenes run with ArcSim's own steps."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata import cli
+from flagdata.ingest.meshes import read_folder
+from flagdata.lake import Lake
+from flagdata.lake.meshes import MeshSequence, read_meshes
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
+    Lake.create(tmp_path / "lake")
+
+    def call(*arguments: str | Path) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as done:
+            cli.main(["simulate", *map(str, arguments), "--lake", str(tmp_path / "lake")])
+        out, err = capsys.readouterr()
+        return int(done.value.code or 0), out, err
+
+    return call
+
+
+def test_artifacts_are_printed_one_a_line(run: Run, tmp_path: Path, small: Callable[..., str]) -> None:
+    recipe = tmp_path / "small.toml"
+    recipe.write_text(small())
+    code, out, err = run(recipe, "--count", "3", "--batch", "2")
+    assert code == 0
+    assert len(out.split()) == 3
+    assert "3 simulated" in err
+    assert "flags/s" in err
+    code, out, err = run(recipe, "--count", "3", "--json")
+    result = json.loads(out)
+    assert (code, result["schema"], result["added"], len(result["existing"])) == (0, "flagdata.simulate/1", [], 3)
+
+
+def test_a_failed_member_makes_the_command_fail_and_is_named(run: Run, tmp_path: Path, small: Callable) -> None:
+    recipe = tmp_path / "undamped.toml"
+    text = small(material="damping = 0.0").replace("settle = 0.1", "settle = 2.4")
+    recipe.write_text(
+        text.replace("low = 0.0, high = 10.0", "low = 6.0, high = 10.0").replace("columns = 6", "columns = 12")
+    )
+    code, out, err = run(recipe, "--count", "1", "--batch", "1")
+    assert (code, out) == (1, "")
+    assert "member 0 is not stored: crumpled" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "word"),
+    [
+        (["hanging-cloht"], 2, "did you mean 'hanging-cloth'"),
+        (["nowhere.toml"], 1, "no such recipe file"),
+        (["nowhere.json"], 1, "no such file"),
+        (["hanging-cloth", "--device", "cuda:97"], 2, "is not there"),
+        (["hanging-cloth", "--branch", "trail"], 1, "trail"),
+    ],
+)
+def test_what_cannot_be_done_is_told(run: Run, arguments: list[str], code: int, word: str) -> None:
+    assert run(*arguments)[0] == code
+    assert word in run(*arguments)[2]
+
+
+@pytest.mark.reference
+def test_an_arcsim_scene_becomes_arcsims_own_output(run: Run, tmp_path: Path, reference_data: Path) -> None:
+    # The folder's scene, its mesh and its material, put together as its user had them. Positions are written with six
+    # digits; a later frame differs by what a chaotic sheet makes of that (test_reference.py).
+    folder = reference_data / "arcsim" / "raw_fixed_mesh"
+    (tmp_path / "materials").mkdir()
+    shutil.copy(folder / "grid12x8.obj", tmp_path)
+    shutil.copy(reference_data / "materials" / "camel-ponte-roma.json", tmp_path / "materials")
+    scene = json.loads((folder / "conf.json").read_text())
+    scene["end_time"] = 0.16
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    code, out, _ = run(tmp_path / "scene.json", "--json")
+    assert code == 0
+    lake = Lake.open(tmp_path / "lake")
+    sequence = read_meshes(lake.object_path(lake.artifact(json.loads(out)["added"][0]).object or ""))
+    expected = read_folder(folder)
+    assert isinstance(sequence, MeshSequence)
+    assert isinstance(expected, MeshSequence)
+    np.testing.assert_array_equal(sequence.faces, expected.faces)
+    np.testing.assert_array_equal(sequence.time, expected.time[:5])
+    np.testing.assert_allclose(sequence.positions, expected.positions[:5], atol=2e-5)
