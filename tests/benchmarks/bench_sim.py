@@ -11,15 +11,18 @@ import platform
 import resource
 import statistics
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
+from sim.contact import Contact
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.stability import stable_step
 from sim.integrate.symplectic import Backend, Symplectic, advance
+from sim.limits import StrainLimits
 from sim.material import named
 from sim.scene import assemble, flag
 
@@ -72,11 +75,17 @@ def _mesh(columns: int) -> dict[str, Any]:
         / BATCH
         / 2,
     }
+    implicit = BackwardEuler(tolerance=1e-4)
+    report["implicit_5_ms_ms_a_flag_frame"] = 1e3 * _median(lambda: implicit.advance(system, state, FRAME), 3) / BATCH
     if columns == 30:
-        implicit = BackwardEuler(tolerance=1e-4)
-        report["implicit_5_ms_ms_a_flag_frame"] = (
-            1e3 * _median(lambda: implicit.advance(system, state, FRAME), 1) / BATCH
-        )
+        for name, added in (
+            ("contact", replace(system, contact=Contact())),
+            ("strain_limits", replace(system, limits=StrainLimits())),
+        ):
+            count = Symplectic().steps(added, FRAME)
+            seconds = _median(lambda s=added, n=count: advance(s, state, FRAME, steps=n, backend=Backend.KERNEL), 7)
+            report[f"ms_a_flag_frame_with_{name}"] = 1e3 * seconds / BATCH
+            report[f"steps_a_frame_with_{name}"] = count
     return report
 
 
