@@ -78,7 +78,7 @@ def test_a_member_is_the_same_in_any_company(tmp_path: Path, make_recipe: Callab
 
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., str]) -> None:
     recipe = tmp_path / "small.toml"
-    recipe.write_text(small().replace("count = 6", "count = 40").replace("batch = 4", "batch = 2"))
+    recipe.write_text(small().replace("count = 6", "count = 24").replace("batch = 4", "batch = 2"))
     killed = Lake.create(tmp_path / "killed")
     process = subprocess.Popen([sys.executable, str(WORKER), str(killed.path), str(recipe)])
     deadline = time.monotonic() + 60
@@ -87,15 +87,15 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., 
     process.kill()
     process.wait()
     before = objects(killed)
-    assert 4 <= len(before) < 40
+    assert 4 <= len(before) < 24
     subprocess.run([sys.executable, str(WORKER), str(killed.path), str(recipe)], check=True)
-    assert len(objects(killed)) == 40
+    assert len(objects(killed)) == 24
     assert {seed: stored for seed, stored in objects(killed).items() if seed in before} == before
-    assert len(killed.rows()) == 40
+    assert len(killed.rows()) == 24
 
 
 def test_what_fails_is_reported_and_not_stored(lake: Lake, make_recipe: Callable) -> None:
-    # With a hundredth of the declared damping a sheet crumples where there is wind (see `sim.run.diagnostics.CRUMPLED`).
+    # With a hundredth of the declared damping a sheet crumples where there is wind (`sim.run.diagnostics.CRUMPLED`).
     recipe = make_recipe(material='damping = { low = 1e-9, high = 1e-3, scale = "log" }')
     recipe = replace(recipe, count=8, time=replace(recipe.time, settle=2.4))
     report = simulate(lake, recipe)
