@@ -1,7 +1,8 @@
 """The simulator's answer to the question of `beam`: how fast small deflections of a strip of cloth grow in a stream.
 
-The strip is one cell wide, in the x–z plane, its stream along x. The simulator knows nothing of beams: the strip is a
-mesh of triangles and hinges like any cloth, and goes through scenes, effects and integrators as a user's cloth does.
+The strip is in the x–z plane, one cell high or more, its stream along x. The simulator knows nothing of beams: the
+strip is a mesh of triangles and hinges like any cloth, and goes through scenes, effects and integrators as a user's
+cloth does.
 """
 
 from __future__ import annotations
@@ -35,28 +36,35 @@ _DEFLECTION = 1e-7
 _SAMPLES = 120
 
 
-def assembled(members: Sequence[Strip], *, columns: int) -> tuple[System, State]:
-    """One member a strip, bent a little and at rest, in the simulator's usual drag.
+def assembled(
+    members: Sequence[Strip],
+    *,
+    columns: int,
+    rows: int = 1,
+    deflection: float = _DEFLECTION,
+    stretching: float = _STRETCHING,
+) -> tuple[System, State]:
+    """One member a strip, bent by `deflection` lengths and at rest, of in-plane stiffness `stretching` [N/m].
 
-    The cell beside the clamp is held, which clamps the strip at its middle; the rigidity of a row of cells with
-    alternating diagonals is a fifth of the table's (by hand, in the verification of the heavy elastica).
+    The cells beside the clamp are held, which clamps the strip at their middle; the rigidity of a grid with alternating
+    diagonals is a fifth of the table's (by hand, in the verification of the heavy elastica).
     """
     length = members[0].length
     cell = length / (columns - 0.5)
-    mesh = grid(width=cell * columns, height=cell, columns=columns, rows=1)
+    mesh = grid(width=cell * columns, height=rows * cell, columns=columns, rows=rows)
     x = mesh.rest[:, 0] - cell / 2
     clamp = tuple(int(i) for i in np.flatnonzero(x < cell))
     scenes = []
     for index, strip in enumerate(members):
         material = isotropic(
-            name=f"strip {index}", density=strip.mass, stretching=_STRETCHING, shear=_STRETCHING,
+            name=f"strip {index}", density=strip.mass, stretching=stretching, shear=stretching,
             bending=5 * strip.rigidity, damping=strip.damping,
         )  # fmt: skip
         free = np.clip(x, 0, None)
         # Stretched by the friction, so that it does not bounce; the bend has no curvature at the free end.
-        along = x + strip.friction * strip.speed * (length * free - free**2 / 2) / _STRETCHING
+        along = x + strip.friction * strip.speed * (length * free - free**2 / 2) / stretching
         share = np.clip((x - cell / 2) / (length - cell / 2), 0, None)  # the clamp stays flat
-        across = _DEFLECTION * length * share**2 * (6 - 4 * share + share**2) / 3
+        across = deflection * length * share**2 * (6 - 4 * share + share**2) / 3
         scenes.append(
             Scene(
                 mesh=mesh, position=np.stack([along, across, mesh.rest[:, 1]], axis=1), material=material,
@@ -76,10 +84,18 @@ def assembled(members: Sequence[Strip], *, columns: int) -> tuple[System, State]
 
 
 def deflections(
-    members: Sequence[Strip], *, columns: int, interval: float, samples: int, integrator: Integrator
+    members: Sequence[Strip],
+    *,
+    columns: int,
+    interval: float,
+    samples: int,
+    integrator: Integrator,
+    rows: int = 1,
+    deflection: float = _DEFLECTION,
+    stretching: float = _STRETCHING,
 ) -> NDArray[np.float64]:
     """(samples, vertex, member) out of the plane [m], every `interval` [s]."""
-    system, state = assembled(members, columns=columns)
+    system, state = assembled(members, columns=columns, rows=rows, deflection=deflection, stretching=stretching)
     frames = []
     for _ in range(samples):
         frames.append(state.position[:, 1].numpy().copy())
@@ -108,12 +124,22 @@ def last_mode(frames: NDArray[np.float64], interval: float) -> complex:
 
 
 def growth(
-    members: Sequence[Strip], *, columns: int, duration: float, integrator: Integrator | None = None
+    members: Sequence[Strip],
+    *,
+    columns: int,
+    duration: float,
+    rows: int = 1,
+    integrator: Integrator | None = None,
 ) -> NDArray[np.complex128]:
     """(member,) rate s of what is left after `duration` [s], w ∝ exp(s t), Im s ≥ 0, from the second half of it."""
     interval = duration / _SAMPLES
     frames = deflections(
-        members, columns=columns, interval=interval, samples=_SAMPLES, integrator=integrator or Symplectic()
+        members,
+        columns=columns,
+        rows=rows,
+        interval=interval,
+        samples=_SAMPLES,
+        integrator=integrator or Symplectic(),
     )[_SAMPLES // 2 :]
     return np.array([last_mode(frames[..., index], interval) for index in range(len(members))])
 
