@@ -63,7 +63,12 @@ def read_folder(
     if not path.is_dir():
         raise NotFoundError("no such folder", where=str(path), fix="name the folder with the .obj files")
     numbered = frame_files(path)
-    configuration = read_json(path / _CONFIGURATION) if rate is None or (path / _CONFIGURATION).is_file() else None
+    configured = (path / _CONFIGURATION).is_file()
+    if rate is None and not configured:
+        raise NotFoundError(
+            f"no {_CONFIGURATION}, so that the frame rate is not known", where=str(path), fix="give it by --rate"
+        )
+    configuration = read_json(path / _CONFIGURATION) if configured else None
     frame_time = _frame_time(configuration or {}, path) if rate is None else 1 / rate
     frames: list[Obj] = []
     for _, entry in numbered:

@@ -129,7 +129,7 @@ def _assembled(
     vertex, uv = pairs[:, 0] - 1, pairs[:, 1] - 1
     if (uv >= 0).all():
         rest = np.full((len(positions), 2), np.nan)
-        rest[vertex] = np.array(texture)[uv]
+        rest[vertex[::-1]] = np.array(texture)[uv[::-1]]  # the first mention counts, so that a seam is told where it is
         seam = (np.array(texture)[uv] != rest[vertex]).any(axis=1)
         if seam.any():
             line = corner_lines[int(np.flatnonzero(seam)[0]) // 3]
