@@ -4,54 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
-import torch
-from numpy.typing import NDArray
 
-from sim.integrate.symplectic import Symplectic, advance
-from sim.material import named
-from sim.motion import edge_motion
-from sim.scene import assemble, flag
-
-FRAME = 0.04
+from tests.verification.cases import edge_statistics, step_errors
 
 
 def test_a_flags_motion_converges_with_the_step(record_property) -> None:
     # While the motion is predictable (four frames), positions converge: first order from the velocity-dependent forces,
     # which see the velocity half a step back, with second-order parts of the same size at these steps.
-    system, start = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4, columns=12)], dtype=torch.float64)
-
-    def after(steps: int) -> torch.Tensor:
-        state = start
-        for _ in range(4):
-            state = advance(system, state, FRAME, steps=steps)
-        return state.position
-
-    exact = after(2560)
-    errors = [float((after(steps) - exact).norm(dim=1).mean()) for steps in (80, 160, 320)]
+    errors = step_errors((80, 160, 320), finest=2560)
     rates = [math.log2(a / b) for a, b in itertools.pairwise(errors)]
     record_property("rates", rates)
     assert errors[0] < 1e-3
     assert all(0.8 < rate < 2.4 for rate in rates), rates
-
-
-def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share: float) -> NDArray[np.float64]:
-    """(member, 3) of a settled flag's free edge: mean height [m], mean distance downwind [m], mean speed [m/s]."""
-    scene = flag(material=named("camel-ponte-roma"), wind_speed=wind, columns=columns)
-    edge = np.flatnonzero(scene.mesh.rest[:, 0] > 1.5 - 1e-6)
-    noise = np.random.default_rng(seed).normal(0, 1e-3, (members, *scene.position.shape))
-    system, state = assemble([replace(scene, position=scene.position + n) for n in noise])
-    steps = math.ceil(Symplectic().steps(system, FRAME) / share)
-    track = []
-    for frame in range(250):
-        state = advance(system, state, FRAME, steps=steps)
-        if frame >= 75:
-            track.append(state.position[edge].numpy())
-    assert bool(state.healthy().all())
-    runs = [edge_motion(np.stack(track)[..., b], rate=1 / FRAME) for b in range(members)]
-    return np.array([[run.position[2] - 0.5, run.position[0], run.speed] for run in runs])
 
 
 def test_droop_and_edge_speed_do_not_depend_on_the_step() -> None:
