@@ -6,6 +6,7 @@ from tests.evidence import run_all
 
 VALIDATIONS = {
     "clock-recovery": "tests.validation.clock_recovery",
+    "simulator": "tests.validation.simulator",
 }
 
 if __name__ == "__main__":
