@@ -1,10 +1,14 @@
 """Air that moves with the cloth: mass that counts for motion along the normals only.
 
-A vertex of mass m with unit normal n and added mass m_a obeys (m I + m_a n nᵀ) a = F, hence
+A vertex of mass m with normal n and added mass m_a obeys (m I + m_a n nᵀ) a = F, hence
 
-    m a = F − m_a / (m + m_a) n (n·F)                                       (Sherman–Morrison)
+    m a = F − m_a / (m + m_a n²) n (n·F)                                    (Sherman–Morrison)
 
 so that an explicit integrator goes on with the cloth's own mass and a changed force.
+
+The normals are means over the faces around a vertex, weighted by area and divided by the rest area: of length 1 where
+the cloth is flat, shorter across a fold that the mesh does not resolve, where the air has no one way to go. They are
+smooth in the positions, which unit normals are not.
 """
 
 from __future__ import annotations
@@ -15,30 +19,24 @@ from torch import Tensor
 from sim.cloth import Cloth, gather_sum
 
 
-def area_vectors(cloth: Cloth, position: Tensor) -> Tensor:
-    """A third of the deformed faces' area vectors around every vertex: (vertex, 3, batch) [m²]."""
+def rest_areas(cloth: Cloth) -> Tensor:
+    """(vertex,) a third of the faces' rest areas around each vertex [m²]."""
+    return torch.as_tensor(cloth.mesh.vertex_areas, dtype=cloth.dtype, device=cloth.device)
+
+
+def mean_normals(cloth: Cloth, position: Tensor) -> Tensor:
+    """Mean normals at the vertices (see above): (vertex, 3, batch)."""
     x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
-    third = torch.linalg.cross(x1 - x0, x2 - x0, dim=1) / 6
-    return gather_sum([third, third, third], cloth.face_slots)
+    sixth = torch.linalg.cross(x1 - x0, x2 - x0, dim=1) / 6
+    return gather_sum([sixth, sixth, sixth], cloth.face_slots) / rest_areas(cloth)[:, None, None]
 
 
-def vertex_normals(cloth: Cloth, position: Tensor) -> Tensor:
-    """Unit normals at the vertices, the faces' weighted by their areas: (vertex, 3, batch)."""
-    area = area_vectors(cloth, position)
-    length = (area * area).sum(1, keepdim=True).sqrt()
-    return area / length.clamp(min=torch.finfo(position.dtype).tiny)
-
-
-def normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """Time derivative ṅ of the unit normals at the vertices: (vertex, 3, batch) [1/s]."""
+def mean_normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
+    """Their time derivative: (vertex, 3, batch) [1/s]."""
     x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
     v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
     sixth = (torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)) / 6
-    rate = gather_sum([sixth, sixth, sixth], cloth.face_slots)
-    area = area_vectors(cloth, position)
-    size = (area * area).sum(1, keepdim=True).sqrt().clamp(min=torch.finfo(position.dtype).tiny)
-    normal = area / size
-    return (rate - (rate * normal).sum(1, keepdim=True) * normal) / size
+    return gather_sum([sixth, sixth, sixth], cloth.face_slots) / rest_areas(cloth)[:, None, None]
 
 
 def effective(force: Tensor, *, mass: Tensor, added: Tensor, normals: Tensor) -> Tensor:
@@ -48,7 +46,8 @@ def effective(force: Tensor, *, mass: Tensor, added: Tensor, normals: Tensor) ->
         force: (vertex, 3, batch) [N].
         mass: (vertex, batch) the cloth's [kg].
         added: (vertex, batch) the air's [kg].
-        normals: (vertex, 3, batch).
+        normals: (vertex, 3, batch), of any length.
     """
-    share = (added / (mass + added)).unsqueeze(1)
+    mass, added = mass.unsqueeze(1), added.unsqueeze(1)
+    share = added / (mass + added * (normals * normals).sum(1, keepdim=True))
     return force - share * (normals * force).sum(1, keepdim=True) * normals

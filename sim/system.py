@@ -148,7 +148,7 @@ class System:
         """The force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch) [N]."""
         if not self.loads:
             return force
-        normals = inertia.vertex_normals(self.cloth, position)
+        normals = inertia.mean_normals(self.cloth, position)
         return inertia.effective(force, mass=self.cloth.mass, added=self.added_mass, normals=normals)
 
     @property
@@ -210,6 +210,7 @@ class System:
         *,
         memory: tuple[Tensor, ...] = (),
         air_position: Tensor | None = None,
+        effect_velocity: Tensor | None = None,
     ) -> Tensor:
         """Gravity, air, effects, ties and frictions: (vertex, 3, batch) [N].
 
@@ -218,11 +219,13 @@ class System:
             time: of the effects [s].
             memory: of the frictions.
             air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
+            effect_velocity: the velocity the effects see, if another than `velocity` (see `integrate.symplectic`).
         """
         seen = position if air_position is None else air_position
         wind = self.local(wind, time, seen)
         total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, seen, velocity, wind)
-        return self._with_added(total, wind, time, position, velocity, memory)
+        moving = velocity if effect_velocity is None else effect_velocity
+        return self._with_added(total, wind, time, position, moving, memory)
 
     def _with_added(
         self, total: Tensor, wind: Tensor, time: float, position: Tensor, velocity: Tensor, memory: tuple[Tensor, ...]
@@ -268,6 +271,7 @@ class System:
         velocity: Tensor,
         *,
         memory: tuple[Tensor, ...] = (),
+        effect_velocity: Tensor | None = None,
     ) -> Tensor:
         """All forces: (vertex, 3, batch) [N]. Rigid handles add none.
 
@@ -276,9 +280,12 @@ class System:
             share: where between its start (0) and its end (1).
             time: of the effects [s].
             memory: of the frictions.
+            effect_velocity: the velocity the effects see, if another than `velocity`.
         """
         wind = torch.lerp(*drive.wind, share)
-        total = self.internal(position, velocity) + self.external(wind, time, position, velocity, memory=memory)
+        total = self.internal(position, velocity) + self.external(
+            wind, time, position, velocity, memory=memory, effect_velocity=effect_velocity
+        )
         total = total + self._tie_damping(drive, time, position, velocity)
         if not self.sprung:
             return total
@@ -306,8 +313,9 @@ class System:
         velocity: Tensor,
         *,
         memory: tuple[Tensor, ...] = (),
+        effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """The part of `force` that the compiled kernel does not know: (vertex, 3, batch) [N]."""
+        """The part of `force` that the compiled kernel does not know: (vertex, 3, batch) [N]. Arguments as there."""
         wind = self.local(torch.lerp(*drive.wind, share), time, position)
         total = torch.zeros_like(position)
         if self.plain_air is None:
@@ -315,7 +323,8 @@ class System:
         if self.cloth.stiffening is not None:
             total = total + bending.added_force(self.cloth, position, velocity)
         total = total + self._tie_damping(drive, time, position, velocity)
-        return self._with_added(total, wind, time, position, velocity, memory)
+        moving = velocity if effect_velocity is None else effect_velocity
+        return self._with_added(total, wind, time, position, moving, memory)
 
     def _tie_damping(self, drive: Drive, time: float, position: Tensor, velocity: Tensor) -> Tensor:
         """Kelvin–Voigt damping of the ties, whose other ends move with the handles: (vertex, 3, batch) [N]."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated, TypeAlias
 
-import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
-from sim.inertia import normal_rates, vertex_normals
+from sim.inertia import mean_normal_rates, mean_normals, rest_areas
 from sim.state import State
 from sim.system import System
 
@@ -45,13 +44,8 @@ class AddedMass(ForceEffect):
         return (rest_areas(cloth)[:, None] * self.mass).expand_as(cloth.mass)
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        turning = (normal_rates(cloth, position, velocity) * velocity).sum(1, keepdim=True)
-        return -self.mass * rest_areas(cloth)[:, None, None] * turning * vertex_normals(cloth, position)
+        turning = (mean_normal_rates(cloth, position, velocity) * velocity).sum(1, keepdim=True)
+        return -self.mass * rest_areas(cloth)[:, None, None] * turning * mean_normals(cloth, position)
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         return super().apply(replace(system, loads=(*system.loads, self)), state)
-
-
-def rest_areas(cloth: Cloth) -> Tensor:
-    """(vertex,) [m²]."""
-    return torch.as_tensor(cloth.mesh.vertex_areas, dtype=cloth.dtype, device=cloth.device)

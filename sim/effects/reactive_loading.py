@@ -27,13 +27,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import torch
 from torch import Tensor
 
 from sim.cloth import Cloth, gather_sum
-from sim.effects.added_mass import AddedMass, MassPerArea, rest_areas
+from sim.effects.added_mass import AddedMass, MassPerArea
 from sim.effects.effect import ForceEffect
-from sim.inertia import normal_rates, vertex_normals
+from sim.inertia import mean_normal_rates, mean_normals, rest_areas
 from sim.state import State
 from sim.system import System
 
@@ -54,8 +53,8 @@ class ReactiveLoading(ForceEffect):
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         relative = velocity - wind
-        normal = vertex_normals(cloth, position)
-        turning = normal_rates(cloth, position, velocity)
+        normal = mean_normals(cloth, position)
+        turning = mean_normal_rates(cloth, position, velocity)
         across = (relative * normal).sum(1, keepdim=True)
         slip = across * normal - relative
 
@@ -74,12 +73,13 @@ class ReactiveLoading(ForceEffect):
 
 
 def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Gradients along the deformed faces of the linear shapes that are 1 at a corner: (face, 3, batch) each [1/m].
+    """Gradients along the faces of the linear shapes that are 1 at a corner: (face, 3, batch) each [1/m].
 
-    With N the face's doubled area vector and e_c the edge opposite to corner c: N × e_c / N².
+    Those of the flat cloth, carried along by its tangents x_u and x_v: exact where the cloth is not stretched, and
+    finite where a face collapses.
     """
-    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
-    doubled = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
-    scaled = doubled / (doubled * doubled).sum(1, keepdim=True).clamp(min=torch.finfo(position.dtype).tiny)
-    first, second = torch.linalg.cross(scaled, x2 - x1, dim=1), torch.linalg.cross(scaled, x0 - x2, dim=1)
+    corners = [position[cloth.faces[:, c]] for c in range(3)]
+    d = cloth.gradients[..., None, None]
+    along_u, along_v = (d[:, a, 0] * corners[0] + d[:, a, 1] * corners[1] + d[:, a, 2] * corners[2] for a in range(2))
+    first, second = (d[:, 0, c] * along_u + d[:, 1, c] * along_v for c in range(2))
     return first, second, -first - second

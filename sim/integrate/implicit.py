@@ -22,7 +22,7 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from sim import bending, contact, membrane
 from sim.cloth import gather_sum
-from sim.inertia import vertex_normals
+from sim.inertia import mean_normals
 from sim.integrate.backend import Backend, kernel_for
 from sim.state import State
 from sim.system import System
@@ -89,7 +89,7 @@ class BackwardEuler:
         folds = bending.Linearised.at(cloth, x) if len(cloth.hinges) else None
         factor = h * (h + cloth.damping)
         tied = system.tied(time, x)
-        normals = vertex_normals(cloth, x) if system.loads else None
+        normals = mean_normals(cloth, x) if system.loads else None
         contacts = _contacts(system, x, v)
         added = system.added_mass.unsqueeze(1)
 

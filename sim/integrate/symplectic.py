@@ -1,7 +1,9 @@
 """Small explicit steps with declared damping: leapfrog (kick–drift–kick).
 
-For conservative forces it is symplectic and of second order; forces that depend on velocity (damping, air) see the
-velocity half a step back, which is of first order in the step for those terms.
+For conservative forces it is symplectic and of second order; the base model's forces that depend on velocity (damping,
+air) see the velocity half a step back, which is of first order in the step for those terms. Effects see it carried on
+over that half step by the last acceleration: of second order, since some of them (reactive loading) give energy at the
+first.
 """
 
 from __future__ import annotations
@@ -70,16 +72,18 @@ def advance(system: System, state: State, duration: float, *, steps: int, backen
     inverse_mass = 1 / system.cloth.mass.unsqueeze(1)
     if system.clamped:
         inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
-    memory = state.memory
+    memory, acceleration = state.memory, 0.0 * v
     for index in range(steps + 1):
         share = index / steps
         time = state.time + share * duration
+        level = v + h / 2 * acceleration
         if kernel is None:
-            force = system.force(drive, share, time, x, v, memory=memory)
+            force = system.force(drive, share, time, x, v, memory=memory, effect_velocity=level)
         else:
-            extra = system.extra_force(drive, share, time, x, v, memory=memory)
+            extra = system.extra_force(drive, share, time, x, v, memory=memory, effect_velocity=level)
             force = kernel.forces(drive, share, x, v) + extra
-        v = v + (h / 2 if index in (0, steps) else h) * inverse_mass * system.effective(x, force)
+        acceleration = inverse_mass * system.effective(x, force)
+        v = v + (h / 2 if index in (0, steps) else h) * acceleration
         if index < steps:
             before, x = x, x + h * v
             x, v = system.limited(x, v, h)

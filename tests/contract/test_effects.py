@@ -77,7 +77,7 @@ def outcome(effect: Effect | None, batch: tuple[System, State], *, steps: int = 
 def implicit_outcome(effect: Effect | None, batch: tuple[System, State]) -> Tensor:
     """The same after two steps of 5 ms of backward Euler."""
     system, state = batch if effect is None else with_effect(effect, *batch)
-    final = BackwardEuler(step=5e-3, tolerance=1e-10).advance(system, state, 0.01)
+    final = BackwardEuler(step=5e-3, tolerance=1e-10, backend=Backend.TORCH).advance(system, state, 0.01)
     return torch.stack([final.position, final.velocity])
 
 
