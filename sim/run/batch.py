@@ -18,7 +18,7 @@ from sim.integrate.implicit import BackwardEuler
 from sim.integrate.stability import stiffest
 from sim.integrate.symplectic import Symplectic, advance
 from sim.run.diagnostics import Diagnosis, Monitor
-from sim.run.members import Crew, Member
+from sim.run.members import Crew, Member, Parameter
 from sim.run.recipe import Recipe
 from sim.state import State
 from sim.system import System
@@ -170,7 +170,7 @@ def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnos
     }
 
 
-def _plain(value: float | tuple[float, ...]) -> float | list[float]:
+def _plain(value: Parameter) -> float | str | list[float]:
     return list(value) if isinstance(value, tuple) else value
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 import torch
@@ -24,6 +26,7 @@ from sim.scene import Scene, assemble, upright
 from sim.state import State
 from sim.system import System
 
+Parameter: TypeAlias = float | str | tuple[float, ...]
 _GUST_RATE = 10.0  # Hz; the run is linear between samples
 _CALM = 0.01  # m/s; winds below it carry no eddies past within a run
 
@@ -43,7 +46,7 @@ class Member:
     index: int
     seed: int
     scene: Scene
-    parameters: Mapping[str, float | tuple[float, ...]]
+    parameters: Mapping[str, Parameter]
     effects: Mapping[str, Mapping[str, float]]
 
     @property
@@ -92,13 +95,14 @@ class Crew:
             return quantity.at(stream(seed, *path).random()) if isinstance(quantity, Range) else quantity
 
         spec, wind = self.recipe.material, self.recipe.wind
+        base = spec.bases[int(stream(seed, "material", "names").random() * len(spec.bases))]
         each = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
         material = _material(
-            spec,
-            density=drawn(_of(spec.density, spec.base.density), "material", "density"),
+            base,
+            density=drawn(_of(spec.density, base.density), "material", "density"),
             stretching=drawn(spec.stretching, "material", "stretching-factor"),
             bending=drawn(spec.bending, "material", "bending-factor") * each,
-            damping=drawn(_of(spec.damping, spec.base.damping), "material", "damping"),
+            damping=drawn(_of(spec.damping, base.damping), "material", "damping"),
         )
         speed, toward = drawn(wind.speed, "wind", "speed"), drawn(wind.toward, "wind", "toward")
         effects = {
@@ -111,7 +115,8 @@ class Crew:
             gravity=_gravity(self.recipe.scene), air=wind.force, evaluation=self.recipe.scene.evaluation,
             contact=self.recipe.contact,
         )  # fmt: skip
-        parameters: dict[str, float | tuple[float, ...]] = {
+        parameters: dict[str, Parameter] = {
+            "material": base.name,
             "wind_speed": speed,
             "wind_toward": toward,
             "wind_vertical": wind.vertical,
@@ -133,28 +138,27 @@ class Crew:
         return apply([self._effect(name, members) for name in self.recipe.effects], system, state)
 
     def corners(self) -> tuple[System, State]:
-        """Two members at the ends of all ranges: where the stable step is found, so that it depends on no draw."""
+        """Members at the ends of all ranges: where the stable step is found, so that it depends on no draw."""
         spec, wind = self.recipe.material, self.recipe.wind
-        density, damping = ends(_of(spec.density, spec.base.density)), ends(_of(spec.damping, spec.base.damping))
-        each = ends(spec.bending_each)
-        members = [
-            Member(
-                index=end, seed=0, parameters={},
-                scene=Scene(
-                    mesh=self.mesh, position=self._start(0), handles=self.handles, air=wind.force,
-                    evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact,
-                    material=_material(
-                        spec, density=density[0], damping=damping[1], stretching=ends(spec.stretching)[1],
-                        bending=np.full(BENDING_SHAPE, ends(spec.bending)[1] * each[1]),
-                    ),
-                ),
-                effects={
-                    name: {key: ends(value)[end] for key, value in effect.parameters.items()}
-                    for name, effect in self.recipe.effects.items()
-                },
+        stiffest = np.full(BENDING_SHAPE, ends(spec.bending)[1] * ends(spec.bending_each)[1])
+        members: list[Member] = []
+        for base, end in itertools.product(spec.bases, (0, 1)):
+            material = _material(
+                base,
+                density=ends(_of(spec.density, base.density))[0],
+                damping=ends(_of(spec.damping, base.damping))[1],
+                stretching=ends(spec.stretching)[1],
+                bending=stiffest,
             )
-            for end in (0, 1)
-        ]  # fmt: skip
+            scene = Scene(
+                mesh=self.mesh, position=self._start(0), material=material, handles=self.handles, air=wind.force,
+                evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact,
+            )  # fmt: skip
+            effects = {
+                name: {key: ends(value)[end] for key, value in effect.parameters.items()}
+                for name, effect in self.recipe.effects.items()
+            }
+            members.append(Member(index=len(members), seed=0, scene=scene, parameters={}, effects=effects))
         return self.assemble(members)
 
     def _start(self, seed: int) -> NDArray[np.float64]:
@@ -203,11 +207,11 @@ def _factors(spec: MaterialSpec, shares: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def _material(
-    spec: MaterialSpec, *, density: float, stretching: float, bending: NDArray[np.float64], damping: float
+    base: Material, *, density: float, stretching: float, bending: NDArray[np.float64], damping: float
 ) -> Material:
     return replace(
-        spec.base, density=density, damping=damping, stretching=spec.base.stretching * stretching,
-        bending=spec.base.bending * bending,
+        base, density=density, damping=damping, stretching=base.stretching * stretching,
+        bending=base.bending * bending,
     )  # fmt: skip
 
 

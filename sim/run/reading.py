@@ -6,8 +6,9 @@ member draws its own value.
     title, seed, count, batch, precision
     [scene]      shape = "flag" | "hanging-cloth" | "arcsim"; width, height, columns, attachment, start-noise;
                  file, root, accept (of an ArcSim scene); evaluation = "arcsim" | "corrected"; gravity
-    [material]   name (of catalogs/materials) or file (TOML, or ArcSim JSON); density, stretching-factor,
-                 bending-factor, bending-factors (drawn for each of the 15 coefficients), damping: quantities
+    [material]   name (of catalogs/materials), names (of which each member draws one) or file (TOML, or ArcSim
+                 JSON); density, stretching-factor, bending-factor, damping: quantities; bending-factors: a
+                 quantity drawn for each of the 15 coefficients
     [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit)
@@ -152,29 +153,34 @@ def _arcsim(scene: ArcsimScene, *, noise: float, evaluation: Evaluation) -> Scen
 
 
 def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
-    name, file = table.text("name", None), table.text("file", None)
-    if name is not None and file is not None:
-        raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
-    if name is not None:
-        if name not in material.names():
-            raise UnknownNameError.of("material", name, material.names(), where=table.where)
-        base = named(name)
-    elif file is not None:
-        base = _material_file(folder / file)
-    elif scene.arcsim is not None:
-        base = scene.arcsim.scene.material
-    else:
-        raise InputError("no material is named", where=table.where, fix='add name = "camel-ponte-roma", or a file')
+    bases = _bases(table, folder, scene)
     spec = MaterialSpec(
-        base=base,
-        density=table.quantity("density", base.density, above=0.0) if "density" in table else None,
+        bases=bases,
+        density=table.quantity("density", bases[0].density, above=0.0) if "density" in table else None,
         stretching=table.quantity("stretching-factor", 1.0, above=0.0),
         bending=table.quantity("bending-factor", 1.0, least=0.0),
         bending_each=table.quantity("bending-factors", 1.0, least=0.0),
-        damping=table.quantity("damping", base.damping, least=0.0) if "damping" in table else None,
+        damping=table.quantity("damping", bases[0].damping, least=0.0) if "damping" in table else None,
     )
     table.done()
     return spec
+
+
+def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]:
+    name, names_, file = table.text("name", None), table.texts("names"), table.text("file", None)
+    if sum(bool(given) for given in (name, names_, file)) > 1:
+        raise UsageError("more than one of name, names and file is given", where=table.where, fix="keep one of them")
+    chosen = (name,) if name is not None else names_
+    for each in chosen:
+        if each not in material.names():
+            raise UnknownNameError.of("material", each, material.names(), where=table.where)
+    if chosen:
+        return tuple(named(each) for each in chosen)
+    if file is not None:
+        return (_material_file(folder / file),)
+    if scene.arcsim is not None:
+        return (scene.arcsim.scene.material,)
+    raise InputError("no material is named", where=table.where, fix='add name = "camel-ponte-roma", or a file')
 
 
 def _material_file(path: Path) -> Material:

@@ -74,7 +74,7 @@ class MaterialSpec:
     """A material and what is changed of it.
 
     Attributes:
-        base: the material.
+        bases: the materials, of which each member draws one.
         density: [kg/m²]; None for the base's.
         stretching: factor on its table.
         bending: factor on its table.
@@ -82,7 +82,7 @@ class MaterialSpec:
         damping: [s]; None for the base's.
     """
 
-    base: Material
+    bases: tuple[Material, ...]
     density: Quantity | None = None
     stretching: Quantity = 1.0
     bending: Quantity = 1.0
@@ -174,8 +174,7 @@ class Recipe:
 
     def identity(self) -> dict[str, Any]:
         """All that shapes a member beside its index, defaults filled in, as JSON."""
-        scene, material, wind, base = self.scene, self.material, self.wind, self.material.base
-        tables = {"stretching": base.stretching.tolist(), "bending": base.bending.tolist()}
+        scene, material, wind = self.scene, self.material, self.wind
         return {
             "simulate": 1,
             "seed": self.seed,
@@ -187,11 +186,10 @@ class Recipe:
                 "left_out": list(scene.arcsim.left_out) if scene.arcsim else [],
             },
             "material": {
-                "base": base.name, "tables": digest(canonical(tables)),
-                "density": base.density if material.density is None else plain(material.density),
+                "bases": [_base(base) for base in material.bases], "density": plain(material.density),
                 "stretching_factor": plain(material.stretching), "bending_factor": plain(material.bending),
                 "bending_factors": plain(material.bending_each),
-                "damping": base.damping if material.damping is None else plain(material.damping),
+                "damping": plain(material.damping),
             },
             "wind": {
                 "speed": plain(wind.speed), "toward": plain(wind.toward), "vertical": wind.vertical,
@@ -211,6 +209,13 @@ class Recipe:
                 for name, effect in self.effects.items()
             },
         }  # fmt: skip
+
+
+def _base(base: Material) -> dict[str, Any]:
+    tables = {"stretching": base.stretching.tolist(), "bending": base.bending.tolist()}
+    return {
+        "name": base.name, "density": base.density, "damping": base.damping, "tables": digest(canonical(tables)),
+    }  # fmt: skip
 
 
 def _force(force: AirForce) -> dict[str, Any]:

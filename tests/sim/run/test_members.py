@@ -34,6 +34,19 @@ def test_draws_cover_the_search_space_uniformly(make_recipe: Callable) -> None:
     assert np.abs(correlation).max() < 4 / np.sqrt(400)
 
 
+def test_materials_are_drawn_alike_often(small: Callable) -> None:
+    text = small().replace('name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock", "camel-ponte-roma"]')
+    crew = Crew(parse(text, name="r", folder=Path(), where="r"))
+    drawn = [crew.member(index) for index in range(300)]
+    counts = np.unique([m.parameters["material"] for m in drawn], return_counts=True)[1]
+    # Binomial: 300/3 ± four standard deviations of √(300 · 1/3 · 2/3).
+    assert np.abs(counts - 100).max() < 4 * np.sqrt(300 * 2 / 9)
+    for member in drawn[:9]:
+        base = named(str(member.parameters["material"]))
+        np.testing.assert_array_equal(member.scene.material.stretching, base.stretching)
+    crew.assemble(drawn[:9])
+
+
 def test_a_new_draw_does_not_move_the_others(make_recipe: Callable) -> None:
     plain, more = (
         Crew(make_recipe()).member(2),

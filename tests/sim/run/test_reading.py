@@ -31,7 +31,7 @@ def test_every_recipe_of_the_catalog_is_read() -> None:
 
 def test_the_search_space_is_the_papers() -> None:
     recipe = load("flag-search-space")
-    assert recipe.material.base.name == "camel-ponte-roma"
+    assert [base.name for base in recipe.material.bases] == ["camel-ponte-roma"]
     assert recipe.material.bending_each == Range(low=0.1, high=10.0)
     assert recipe.material.density == Range(low=0.10, high=0.17)
     assert recipe.wind.speed == Range(low=0.0, high=10.0)
@@ -78,7 +78,8 @@ def test_what_is_left_out_has_its_default_in_the_identity() -> None:
         (MINIMAL.replace("speed = 4.0", ""), InputError, "no wind speed"),
         ("[wind]\nspeed = 4.0\n", InputError, "no material"),
         (MINIMAL.replace("[wind]", "density = 0.0\n[wind]"), InputError, "above 0"),
-        (MINIMAL.replace("[wind]", "file = 'x.toml'\n[wind]"), UsageError, "both name and file"),
+        (MINIMAL.replace("[wind]", "file = 'x.toml'\n[wind]"), UsageError, "more than one of name"),
+        (MINIMAL.replace("[wind]", "names = ['paper']\n[wind]"), UsageError, "more than one of name"),
         ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "no file is named"),
         ("scene = 3\n" + MINIMAL, InputError, "not a table"),
         ("[wind\n", InputError, "not TOML"),
@@ -117,7 +118,7 @@ def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
     lines = [f"{key} = {json.dumps(value)}" for key, value in tables.items()]
     (tmp_path / "mine.toml").write_text("\n".join([*lines, 'source = "measured"', "damping = 1e-3"]))
     for name, damping in (("mine.json", 0.0), ("mine.toml", 1e-3)):
-        base = read(f'[material]\nfile = "{name}"\n[wind]\nspeed = 1\n', tmp_path).material.base
+        (base,) = read(f'[material]\nfile = "{name}"\n[wind]\nspeed = 1\n', tmp_path).material.bases
         assert (base.density, base.damping) == (0.2, damping)
         np.testing.assert_array_equal(base.bending, tables["bending"])
     with pytest.raises(NotFoundError):
