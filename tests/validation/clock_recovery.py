@@ -15,7 +15,8 @@ import numpy as np
 
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import motion_energy
-from flagdata.ingest.anemometer import WindOptions, average, read_log
+from flagdata.align.windbins import wind_bins
+from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.demo.field import SENSOR, START, ZONE, FieldRecipe, film, write_log
@@ -37,7 +38,9 @@ def _estimate(recipe: FieldRecipe) -> tuple[LagEstimate, float]:
         recipe_file = Path(folder) / "cup-logger.toml"
         recipe_file.write_text(SENSOR)
         series = read_log(log, WindOptions(recipe=str(recipe_file), zone=ZONE)).series
-    estimate = estimate_offset(motion, average(series), search=LagSearch(), generator=stream(recipe.seed, "surrogates"))
+    bins = wind_bins(series)
+    search = LagSearch(stamp_sigma=bins.sigma)
+    estimate = estimate_offset(motion, bins.average, search=search, generator=stream(recipe.seed, "surrogates"))
     return estimate, offset
 
 
