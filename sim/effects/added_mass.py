@@ -18,10 +18,10 @@ MassPerArea: TypeAlias = Annotated[
     Value,
     strength(
         unit="kg/m²",
-        prior=(0.0, 0.4),
+        prior=(0.0, 0.3),
         admissible=NOT_NEGATIVE,
         source="potential flow: ρ λ/π for waves of length λ on a wide sheet, both sides, and π ρ H/4, the mean over a "
-        "slender strip of height H (Lighthill 1960): 0.04–0.4 for waves of 0.1–1 m",
+        "slender strip of height H (Lighthill 1960): 0.04–0.3 for waves of 0.1–0.8 m",
     ),
 ]
 
