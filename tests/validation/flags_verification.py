@@ -1,0 +1,234 @@
+"""The verification curves: simulated points, theory over them, and the observed order of convergence."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.special import jn_zeros
+
+from tests.verification.cases import (
+    FRAME,
+    G,
+    drooped_tips,
+    edge_statistics,
+    elastica_tip,
+    energy_drift,
+    fall,
+    hung_strip,
+    step_errors,
+    swing,
+    terminal_velocity,
+)
+
+MEASURED, THEORY, MARK = "#b5541c", "#1f5f8b", "#777777"
+_STRIP, _DENSITY = 0.15, 0.2
+_TABLES = (2e-4, 4e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.5e-2, 4e-2)
+_CELLS = (10, 15, 20, 30)
+_MEMBERS = 16
+
+
+def rates(sizes: list[float] | tuple[float, ...], errors: list[float]) -> list[float]:
+    """Observed orders: slopes of log error against log size between neighbours."""
+    pairs = itertools.pairwise(zip(sizes, errors, strict=True))
+    return [math.log(b[1] / a[1]) / math.log(b[0] / a[0]) for a, b in pairs]
+
+
+def _converging(sizes: list[float], errors: list[float]) -> dict[str, Any]:
+    return {"size": sizes, "error": errors, "rates": rates(sizes, errors)}
+
+
+def verify(seed: int) -> dict[str, Any]:
+    """All figures of the verification problems with closed forms, and of convergence."""
+    energy = [0.4, 0.2, 0.1, 0.05]
+    drift = {share: energy_drift(duration=1.0, share=share) for share in energy}
+    rows = [4, 8, 12, 16]
+    strips = [hung_strip(n) for n in rows]
+    counts = [100, 200, 400, 800]
+    falls = [fall(0.3, steps=n)[-1] for n in counts]
+    return {
+        "energy": {
+            "drift_largest_step": drift[energy[0]].tolist(),
+            "drift_smallest_step": drift[energy[-1]].tolist(),
+            **_converging(energy, [float(np.abs(drift[share]).max()) for share in energy]),
+        },
+        "hung_strip": {
+            "length": strips[0][1],
+            **_converging([1 / n for n in rows], [abs(length - expected) for length, expected in strips]),
+        },
+        "elastica": _elastica(),
+        "pendulum": _pendulum(),
+        "fall": {
+            "terminal": terminal_velocity(),
+            "curve": fall(0.6, steps=1200, looks=30).tolist(),
+            **_converging([0.3 / n for n in counts], [float(abs(f[2] - f[4])) for f in falls]),
+        },
+        "step": _converging(
+            [FRAME / n for n in (80, 160, 320, 640)], step_errors((80, 160, 320, 640), finest=5120).tolist()
+        ),
+        "mesh": _mesh(seed),
+        "statistics_step": _statistics_step(seed),
+    }
+
+
+def _elastica() -> dict[str, Any]:
+    tips = drooped_tips(_TABLES, columns=24, length=_STRIP, density=_DENSITY)
+    exact = np.array([elastica_tip(k / 5, _DENSITY * G, _STRIP) for k in _TABLES])
+    middle, columns = 2, (6, 12, 24)
+    errors = []
+    for n in columns:
+        found = drooped_tips(_TABLES[middle : middle + 1], columns=n, length=_STRIP, density=_DENSITY)[0]
+        errors.append(float(np.linalg.norm(found - exact[middle])) / _STRIP)
+    return {
+        "load": [_DENSITY * G * _STRIP**3 / (k / 5) for k in _TABLES],
+        "tips": (tips / _STRIP).tolist(),
+        "exact": (exact / _STRIP).tolist(),
+        "largest_error": float(np.linalg.norm(tips - exact, axis=1).max() / _STRIP),
+        **_converging([_STRIP / (n - 0.5) for n in columns], errors),
+    }
+
+
+def _pendulum() -> dict[str, Any]:
+    modes, rows = (1, 2, 3, 4, 5), (10, 20, 40)
+    found = {n: [swing(mode, rows=n) for mode in modes] for n in rows}
+    errors = {n: [abs(measured / exact - 1) for measured, exact in found[n]] for n in rows}
+    return {
+        "modes": list(modes),
+        "frequency": [measured / (2 * math.pi) for measured, _ in found[rows[-1]]],
+        "exact": [exact / (2 * math.pi) for _, exact in found[rows[-1]]],
+        "rows": list(rows),
+        "error": {str(n): errors[n] for n in rows},
+        "rates": [rates([1 / n for n in rows], [errors[n][i] for n in rows]) for i in range(len(modes))],
+    }
+
+
+def _summary(runs: NDArray[np.float64]) -> dict[str, list[float]]:
+    """Droop, downwind distance and speed of the free edge: means over replicates and their standard errors."""
+    error = runs.std(0, ddof=1) / math.sqrt(len(runs))
+    return {"mean": (runs.mean(0) * [-1, 1, 1]).tolist(), "error": error.tolist()}
+
+
+def _mesh(seed: int) -> dict[str, Any]:
+    each = [edge_statistics(n, seed=seed + n, wind=4.0, members=_MEMBERS, share=1.0) for n in _CELLS]
+    return {"cell": [1.5 / n for n in _CELLS], "statistics": [_summary(runs) for runs in each]}
+
+
+def _statistics_step(seed: int) -> dict[str, Any]:
+    shares = (1.0, 0.5, 0.25)
+    each = [edge_statistics(15, seed=seed + i, wind=4.0, members=_MEMBERS, share=s) for i, s in enumerate(shares)]
+    return {"share": list(shares), "statistics": [_summary(runs) for runs in each]}
+
+
+def _order(axes: Axes, result: dict[str, Any], order: int, *, xlabel: str, ylabel: str, title: str) -> None:
+    size, error = np.array(result["size"]), np.array(result["error"])
+    axes.loglog(size, error, "o-", color=MEASURED, ms=4, lw=1)
+    axes.loglog(size, 1.6 * error[-1] * (size / size[-1]) ** order, "--", color=THEORY, lw=1)
+    axes.text(
+        size[0],
+        1.6 * error[-1] * (size[0] / size[-1]) ** order,
+        f"order {order}",
+        color=THEORY,
+        fontsize=8,
+        ha="right",
+        va="bottom",
+    )
+    observed = ", ".join(f"{rate:.2f}" for rate in result["rates"])
+    axes.set(xlabel=xlabel, ylabel=ylabel)
+    axes.set_title(f"{title}\nobserved orders {observed}", fontsize=9)
+
+
+def draw_verification(result: dict[str, Any], path: Path) -> None:
+    """Two rows with the closed forms, one with convergence."""
+    figure = Figure(figsize=(13, 10.5), layout="constrained")
+    panels = figure.subplots(3, 4)
+    _draw_energy(panels[0, 0], result["energy"])
+    _order(panels[0, 1], result["energy"], 2, xlabel="step / stability limit", ylabel="largest energy error, relative",
+           title="1  undamped vibration, 1 s")  # fmt: skip
+    _order(panels[0, 2], result["hung_strip"], 2, xlabel="cell / length", ylabel="error of the length [m]",
+           title=f"2  hung strip, 1 m stretched to {result['hung_strip']['length']:.4f} m")  # fmt: skip
+    _draw_fall(panels[0, 3], result["fall"])
+    _draw_elastica(panels[1, 0], result["elastica"])
+    _order(panels[1, 1], result["elastica"], 2, xlabel="cell [m]", ylabel="error of the tip / length",
+           title="3  heavy elastica, k = 1 mN·m")  # fmt: skip
+    _draw_pendulum(panels[1, 2], panels[1, 3], result["pendulum"])
+    _order(panels[2, 0], result["fall"], 1, xlabel="step [s]", ylabel="error of the depth after 0.3 s [m]",
+           title="5  falling sheet")  # fmt: skip
+    _order(panels[2, 1], result["step"], 1, xlabel="step [s]", ylabel="mean vertex error after 4 frames [m]",
+           title="7  flag at 4 m/s, against a step of 7.8 µs")  # fmt: skip
+    _draw_statistics(panels[2, 2], [1e3 * c for c in result["mesh"]["cell"]], result["mesh"]["statistics"], "cell [mm]")
+    _draw_statistics(
+        panels[2, 3], result["statistics_step"]["share"], result["statistics_step"]["statistics"], "step / default step"
+    )
+    figure.savefig(path, dpi=90)
+
+
+def _draw_energy(axes: Axes, result: dict[str, Any]) -> None:
+    for key, index, colour in (("drift_largest_step", 0, MEASURED), ("drift_smallest_step", -1, THEORY)):
+        drift = 1e3 * np.array(result[key])
+        label = f"step {result['size'][index]:g} of the limit"
+        axes.plot(0.01 * np.arange(1, len(drift) + 1), drift, color=colour, lw=0.9, label=label)
+    axes.set(xlabel="time [s]", ylabel="energy error / energy [10⁻³]")
+    axes.set_title("1  undamped vibration: bounded error", fontsize=9)
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_fall(axes: Axes, result: dict[str, Any]) -> None:
+    time, speed, _, exact, _ = np.array(result["curve"]).T
+    axes.plot(time, exact, color=THEORY, lw=1.2, label="v_t tanh(g t/v_t)")
+    axes.plot(time, speed, "o", color=MEASURED, ms=3.5, mfc="none", label="simulated")
+    axes.axhline(result["terminal"], color=MARK, lw=0.8, ls=":")
+    axes.text(0.0, result["terminal"], f"v_t = √(ρₛ g/ρ) = {result['terminal']:.3f} m/s", fontsize=8, va="bottom")
+    axes.set(xlabel="time [s]", ylabel="downward speed [m/s]", ylim=(0, 1.15 * result["terminal"]))
+    axes.set_title("5  falling sheet, 0.15 kg/m², ρ = 1.2 kg/m³", fontsize=9)
+    axes.legend(frameon=False, fontsize=8, loc="lower right")
+
+
+def _draw_elastica(axes: Axes, result: dict[str, Any]) -> None:
+    loads = np.geomspace(0.9 * min(result["load"]), 1.1 * max(result["load"]), 60)
+    exact = np.array([elastica_tip(1.0, load, 1.0) for load in loads])
+    for column, (label, style) in enumerate((("out", "o"), ("down", "s"))):
+        axes.semilogx(loads, exact[:, column], color=THEORY, lw=1.2, label="elastica" if not column else None)
+        tips = np.array(result["tips"])[:, column]
+        axes.semilogx(result["load"], tips, style, color=MEASURED, mfc="none", ms=5, label=f"simulated, {label}")
+    axes.set(xlabel="load ρₛ g L³/B", ylabel="tip of the strip / length")
+    axes.set_title(f"3  heavy elastica, 24 cells: within {100 * result['largest_error']:.2f} % of L", fontsize=9)
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
+    modes = np.array(result["modes"])
+    exact = np.array([jn_zeros(0, int(n))[-1] for n in modes]) / (4 * math.pi) * math.sqrt(G)
+    axes.plot(modes, exact, "_", color=THEORY, ms=18, mew=1.4, label="(j₀ₙ/4π) √(g/L)")
+    axes.plot(
+        modes, result["frequency"], "o", color=MEASURED, mfc="none", ms=6, label=f"simulated, {result['rows'][-1]} rows"
+    )
+    axes.set(xlabel="mode", ylabel="frequency [Hz], L = 1 m", xticks=modes, ylim=(0, None))
+    axes.set_title("4  hanging sheet's pendulum modes", fontsize=9)
+    axes.legend(frameon=False, fontsize=8)
+    size = 1 / np.array(result["rows"])
+    table = np.array([result["error"][str(n)] for n in result["rows"]])
+    for index, mode in enumerate(modes):
+        errors.loglog(size, table[:, index], "o-", ms=4, lw=1, color=MEASURED, alpha=1 - 0.15 * index)
+        errors.text(size[0] * 1.05, table[0, index], f"n = {mode}", fontsize=7, va="center")
+    errors.loglog(size, 0.4 * table[-1, 0] * (size / size[-1]) ** 2, "--", color=THEORY, lw=1)
+    errors.text(size[1], 0.4 * table[-1, 0] * (size[1] / size[-1]) ** 2, "order 2", color=THEORY, fontsize=8, va="top")
+    observed = [rate for mode in result["rates"] for rate in mode]
+    errors.set(xlabel="cell / length", ylabel="frequency error, relative", xlim=(size[-1] / 1.2, size[0] * 1.5))
+    errors.set_title(f"4  pendulum modes\nobserved orders {min(observed):.2f} to {max(observed):.2f}", fontsize=9)
+
+
+def _draw_statistics(axes: Axes, x: list[float], statistics: list[dict[str, list[float]]], xlabel: str) -> None:
+    mean, error = (np.array([s[key] for s in statistics]) for key in ("mean", "error"))
+    names = (("droop [m]", "o"), ("downwind [m]", "s"), ("speed [m/s]", "D"))
+    for column, (name, marker) in enumerate(names):
+        axes.errorbar(x, mean[:, column], yerr=error[:, column], fmt=f"{marker}-",
+                      color=(MEASURED, "#444444", "#6a8f3c")[column], lw=1, ms=4, capsize=3, label=name)  # fmt: skip
+    axes.set(xlabel=xlabel, xlim=(0, 1.1 * max(x)), ylim=(0, None), ylabel="free edge, settled")
+    axes.set_title(f"7  statistics at 4 m/s, {_MEMBERS} runs of 7 s;\nbars: standard error", fontsize=9)
+    axes.legend(frameon=False, fontsize=8, loc="center left")
