@@ -50,6 +50,8 @@ SENSOR_EFFECTS = Registry(
         "anemometer-gain": "sim.effects.anemometer_gain:AnemometerGain",
         "anemometer-offset": "sim.effects.anemometer_offset:AnemometerOffset",
         "anemometer-dead-zone": "sim.effects.anemometer_dead_zone:AnemometerDeadZone",
+        "sensor-height": "sim.effects.sensor_height:SensorHeight",
+        "sensor-distance": "sim.effects.sensor_distance:SensorDistance",
         "clock-offset": "sim.effects.clock_offset:ClockOffset",
         "clock-drift": "sim.effects.clock_drift:ClockDrift",
         "frame-rate-error": "sim.effects.frame_rate_error:FrameRateError",

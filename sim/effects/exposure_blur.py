@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-import torch
 
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.effects.sensor import CameraEffect, Sampling
@@ -35,8 +34,8 @@ class ExposureBlur(CameraEffect):
     ] = 0.0
 
     def sampled(self, sampling: Sampling) -> Sampling:
-        nodes = torch.tensor(_NODES, dtype=sampling.instants.dtype)[:, None] / 2
-        weights = torch.tensor(_WEIGHTS, dtype=sampling.instants.dtype) / 2
+        nodes = sampling.instants.new_tensor(_NODES)[:, None] / 2
+        weights = sampling.instants.new_tensor(_WEIGHTS) / 2
         moved = sampling.instants.unsqueeze(3) + nodes * self.exposure
         return replace(
             sampling, instants=moved.flatten(2, 3), weights=(sampling.weights[:, None] * weights).flatten()

@@ -85,8 +85,8 @@ class Sampling:
         instants = self.instants.expand(-1, rows, -1, batch)
         after = torch.searchsorted(time, instants.detach().contiguous(), right=True).clamp(1, n - 1)
         share = (instants - time[after - 1]) / (time[after] - time[after - 1])
-        row = torch.arange(rows)[None, :, None, None]
-        member = torch.arange(batch)
+        row = torch.arange(rows, device=time.device)[None, :, None, None]
+        member = torch.arange(batch, device=time.device)
         # (frame, row, node, batch, 3): advanced indices come first.
         low, high = (trajectory.movedim(2, 3)[index, row, member] for index in (after - 1, after))
         seen = torch.lerp(low, high, share.unsqueeze(-1)).movedim(-1, 2)

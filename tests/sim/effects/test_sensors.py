@@ -21,6 +21,8 @@ from sim.effects.frame_rate_error import FrameRateError
 from sim.effects.overspeeding import Overspeeding
 from sim.effects.rolling_shutter import RollingShutter
 from sim.effects.sensor import Sampling
+from sim.effects.sensor_distance import SensorDistance
+from sim.effects.sensor_height import SensorHeight
 
 
 def column(values) -> torch.Tensor:
@@ -70,6 +72,20 @@ def test_gain_offset_and_dead_zone_do_what_they_say_in_the_order_they_are_given(
     gain, offset, dead = AnemometerGain(gain=1.1), AnemometerOffset(offset=-0.35), AnemometerDeadZone(threshold=0.5)
     read = offset.read(time, gain.read(time, dead.read(time, speed)))
     np.testing.assert_allclose(read[:, 0], [-0.35, 0.2, 2.95, -0.35], rtol=0, atol=1e-12)
+
+
+def test_a_sensor_at_half_the_height_reads_less_by_the_power_law() -> None:
+    read = SensorHeight(ratio=0.5, exponent=0.2).read(torch.arange(2.0), column([4.0, 8.0]))
+    np.testing.assert_allclose(read[:, 0], [4 * 0.5**0.2, 8 * 0.5**0.2], rtol=1e-12)
+
+
+def test_a_sensor_10_m_downstream_in_5_m_per_s_is_2_s_late() -> None:
+    time = np.arange(0.0, 40.0, 0.5)
+    speed = 5 + np.sin(2 * np.pi * time / 20)
+    read = SensorDistance(distance=10.0).read(torch.tensor(time), column(speed))[:, 0].numpy()
+    # Two whole periods: the mean is 5 m/s, the delay four samples, and the first two seconds hold the first speed.
+    np.testing.assert_allclose(read[4:], speed[:-4], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(read[:4], 5.0, rtol=0, atol=1e-9)
 
 
 def test_a_clock_that_gains_20_ppm_is_1_728_s_ahead_after_a_day() -> None:
