@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -19,16 +20,30 @@ if TYPE_CHECKING:
 @click.option("--count", type=click.IntRange(min=1), metavar="N", help="How many members, instead of the recipe's.")
 @click.option("--batch", type=click.IntRange(min=1), metavar="N", help="How many at a time, instead of the recipe's.")
 @click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda, cuda:1.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), metavar="N", help="Batches at a time; by default one for each core.",
+)  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
 @json_option
 @lake_option
 def simulate(
-    recipe: str, count: int | None, batch: int | None, device: str, branch: str, as_json: bool, lake_path: str
+    recipe: str,
+    count: int | None,
+    batch: int | None,
+    device: str,
+    workers: int | None,
+    branch: str,
+    as_json: bool,
+    lake_path: str,
 ) -> None:
     """Simulate cloth in the wind: mesh sequences, with their parameters, seeds and energies.
 
     RECIPE is a TOML file, a recipe of the catalog by name, or an ArcSim scene (.json), which is run with ArcSim's own
     steps.
+
+    Each batch is one commit: a run that is stopped goes on with what is missing when the command is given again. On
+    one machine the same recipe, seed and index give the same bits, whatever runs beside. A member that diverges or
+    crumples is reported and not stored, and the command ends with 1.
 
     \b
       flagdata simulate flag-search-space --lake lake --count 200
@@ -42,13 +57,20 @@ def simulate(
     loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
     lake = Lake.open(lake_path)
     with progress(loaded.count, label=loaded.name, unit="flag") as advance:
-        report = run(lake, loaded, branch=branch, device=device, progress=advance)
+        report = run(lake, loaded, branch=branch, device=device, workers=workers or _cores(device), progress=advance)
     if as_json:
         document("simulate", {"lake": str(lake.path), "recipe": loaded.name, **report.as_dict()})
     else:
         _print(report)
     if report.failed:
         sys.exit(1)
+
+
+def _cores(device: str) -> int:
+    """Of this machine that the process may use; one batch at a time on any other device."""
+    if not device.startswith("cpu"):
+        return 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _print(report: RunReport) -> None:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, TypeAlias
 
 import torch
@@ -15,6 +19,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.lake.meshes import write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
+from sim.kernel.build import library
 from sim.run.batch import Outcome, Stepper, run
 from sim.run.members import Crew
 from sim.run.recipe import Recipe
@@ -56,18 +61,25 @@ def simulate(
     *,
     branch: str = "main",
     device: str = "cpu",
+    workers: int = 1,
     progress: Progress | None = None,
 ) -> RunReport:
     """Simulate the members of a recipe that are not on the branch yet, and publish them batch by batch.
 
     A run that was stopped goes on where its last commit was. Members that fail are reported and not stored; a later run
-    tries them again.
+    tries them again. What a member becomes depends neither on the workers nor on what it is simulated with.
+
+    Args:
+        workers: batches at a time, each in a thread of its own; the compiled kernel lets them run side by side.
+        progress: may be called from any of these threads, never from two at once.
 
     Raises:
-        UsageError: a device that is not there, or a step or effect that does not fit the scene.
+        UsageError: no workers, a device that is not there, or a step or effect that does not fit the scene.
         InputError: a scene that cannot be simulated.
     """
     _check_device(device)
+    if workers < 1:
+        raise UsageError(f"{workers} workers", where="--workers", fix="give at least one")
     crew = Crew(recipe)
     stepper = Stepper.of(crew)
     identity = recipe.identity()
@@ -80,10 +92,8 @@ def simulate(
     added: list[str] = []
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
-    for first in range(0, len(pending), recipe.batch):
-        members = [crew.member(index) for index in pending[first : first + recipe.batch]]
-        tick = None if progress is None else _Ticks(progress, len(members), recipe.time.total)
-        outcomes = run(crew, stepper, members, size=recipe.batch, device=device, progress=tick)
+    batches = [pending[first : first + recipe.batch] for first in range(0, len(pending), recipe.batch)]
+    for outcomes in _outcomes(crew, stepper, batches, device=device, workers=workers, progress=progress):
         good = [o for o in outcomes if o.sequence is not None]
         failed += [_failure(o) for o in outcomes if o.failure is not None]
         if good:
@@ -93,6 +103,47 @@ def simulate(
         added=tuple(added), existing=tuple(existing), failed=tuple(failed), step=stepper.step, seconds=seconds,
         rate=len(pending) / seconds if pending else 0.0,
     )  # fmt: skip
+
+
+def _outcomes(
+    crew: Crew, stepper: Stepper, batches: list[list[int]], *, device: str, workers: int, progress: Progress | None
+) -> Iterator[list[Outcome]]:
+    """The batches' outcomes as they come, one batch waiting beside those that run.
+
+    Leaving the iteration early stops what is still running.
+    """
+    ticks = _Ticks(progress, crew.recipe.time.total)
+
+    def one(indices: list[int]) -> list[Outcome]:
+        members = [crew.member(index) for index in indices]
+        return run(crew, stepper, members, size=crew.recipe.batch, device=device, progress=ticks.of_batch(len(members)))
+
+    if device.startswith("cpu"):
+        library()  # built once, before several threads ask for it
+    waiting = iter(batches)
+    executor = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="simulate")
+    with _one_thread():
+        try:
+            running = {executor.submit(one, indices) for indices in islice(waiting, workers + 1)}
+            while running:
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+                    running |= {executor.submit(one, indices) for indices in islice(waiting, 1)}
+        finally:
+            ticks.stop()
+            executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Torch on one thread: the order of its sums, and so their last bits, depends on how many it has."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _publish(
@@ -148,13 +199,33 @@ def _check_device(device: str) -> None:
 
 
 class _Ticks:
-    """Turns frames of a batch into whole members."""
+    """Turns frames of batches into whole members, one call at a time, until it is stopped."""
 
-    def __init__(self, progress: Progress, members: int, frames: int) -> None:
-        self._progress, self._members, self._frames = progress, members, frames
-        self._seen = 0
+    def __init__(self, progress: Progress | None, frames: int) -> None:
+        self._progress, self._frames = progress, frames
+        self._lock = threading.Lock()
+        self._stopped = threading.Event()
 
-    def __call__(self, frames: int) -> None:
-        before = self._seen * self._members // self._frames
-        self._seen += frames
-        self._progress(self._seen * self._members // self._frames - before)
+    def stop(self) -> None:
+        """Let the batches that still run end at their next frame."""
+        self._stopped.set()
+
+    def of_batch(self, members: int) -> Callable[[int], None]:
+        """What one batch calls with the frames it has done.
+
+        Raises:
+            CancelledError: from that call, once all is stopped.
+        """
+        done = 0
+
+        def tick(frames: int) -> None:
+            nonlocal done
+            if self._stopped.is_set():
+                raise CancelledError
+            before = done * members // self._frames
+            done += frames
+            if self._progress is not None:
+                with self._lock:
+                    self._progress(done * members // self._frames - before)
+
+        return tick

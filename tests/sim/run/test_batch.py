@@ -177,3 +177,32 @@ def test_a_run_without_settling_begins_with_the_start(make_recipe: Callable, sma
     outcome = run(crew, Stepper.of(crew), [crew.member(0)], size=1)[0]
     assert outcome.sequence is not None
     np.testing.assert_array_equal(outcome.sequence.positions[0], outcome.member.scene.position.astype(np.float32))
+
+
+@pytest.mark.parametrize("attachment", ["corners", "hoist"])
+def test_recipes_of_all_shapes_run(attachment: str) -> None:
+    shape = "flag" if attachment == "hoist" else "hanging-cloth"
+    text = f"""
+        [scene]
+        shape = "{shape}"
+        attachment = "{attachment}"
+        columns = 5
+        start-noise = 1e-4
+        [material]
+        names = ["gray-interlock", "paper"]
+        [wind]
+        speed = {{ low = 0.0, high = 6.0 }}
+        toward = {{ low = 0.0, high = 6.28 }}
+        [contact]
+        [time]
+        settle = 0.2
+        frames = 3
+    """
+    crew = Crew(parse(text, name="r", folder=Path(), where="r"))
+    outcomes = run(crew, Stepper.of(crew), [crew.member(index) for index in range(4)], size=4)
+    for outcome in outcomes:
+        assert outcome.failure is None
+        assert outcome.sequence is not None
+        held = outcome.sequence.positions[:, list(crew.handles.vertices)]
+        # Springs of 1e3 N/m that carry at most 0.3 kg and the wind's few newtons give way by millimetres.
+        assert np.abs(held - held[:1]).max() < 0.03

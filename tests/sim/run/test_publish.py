@@ -76,6 +76,35 @@ def test_a_member_is_the_same_in_any_company(tmp_path: Path, make_recipe: Callab
     assert objects(parts) == objects(whole)
 
 
+@pytest.mark.parametrize("more", ["", '[integrator]\nname = "implicit"', "[effects.hysteresis]\ncouple = 1e-3"])
+def test_workers_side_by_side_make_the_same_members(tmp_path: Path, make_recipe: Callable, more: str) -> None:
+    recipe = replace(make_recipe(more=more), count=8, batch=2)
+    one, four = Lake.create(tmp_path / "one"), Lake.create(tmp_path / "four")
+    simulate(one, recipe)
+    seen: list[int] = []
+    report = simulate(four, recipe, workers=4, progress=seen.append)
+    assert objects(four) == objects(one)
+    assert sum(seen) == len(report.added) == 8
+    with pytest.raises(UsageError, match="0 workers"):
+        simulate(one, recipe, workers=0)
+
+
+def test_an_interrupted_run_keeps_what_was_committed(lake: Lake, make_recipe: Callable) -> None:
+    recipe = replace(make_recipe(), count=12, batch=2)
+
+    def interrupt(count: int) -> None:
+        if len(lake.rows()) >= 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(lake, recipe, workers=2, progress=interrupt)
+    kept = objects(lake)
+    assert 4 <= len(kept) < 12
+    simulate(lake, recipe)
+    assert {seed: stored for seed, stored in objects(lake).items() if seed in kept} == kept
+    assert len(objects(lake)) == 12
+
+
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., str]) -> None:
     recipe = tmp_path / "small.toml"
     recipe.write_text(small().replace("count = 6", "count = 24").replace("batch = 4", "batch = 2"))

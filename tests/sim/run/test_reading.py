@@ -11,7 +11,9 @@ import pytest
 
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical
-from sim.air import Stokes
+from sim.air import QuadraticNormal, Stokes
+from sim.arcsim import STAGES
+from sim.run.members import Crew
 from sim.run.reading import load, names, parse
 from sim.run.recipe import Shape
 from sim.run.tables import Range, Scale
@@ -129,3 +131,74 @@ def test_an_effects_prior_may_be_asked_for_by_name(make_recipe: Callable) -> Non
     effect = make_recipe(more='[effects.gusts]\nintensity = "prior"\nlength = 40.0').effects["gusts"]
     assert effect.parameters["intensity"] == Range(low=0.0, high=0.3)
     assert effect.length == 40.0
+
+
+SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 1 0\nv 0 1 1\nv 0 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+
+
+@pytest.fixture
+def scene_folder(tmp_path: Path) -> Path:
+    """An ArcSim scene of a square metre in two triangles, that runs with contact and strain limits."""
+    material = {"density": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
+    scene = {
+        "frame_time": 0.04, "frame_steps": 8, "duration": 1, "gravity": [0, 0, -9.8],
+        "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json", "strain_limits": [0.95, 1.05]}]}],
+        "handles": [{"nodes": [0, 3]}], "wind": {"velocity": [0, 3, 1], "density": 1.2},
+        "disable": ["collision", "separation", "popfilter"],
+    }  # fmt: skip
+    (tmp_path / "square.obj").write_text(SQUARE)
+    (tmp_path / "m.json").write_text(json.dumps(material))
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    return tmp_path
+
+
+ARCSIM = '[scene]\nshape = "arcsim"\nfile = "scene.json"\naccept = ["strainlimiting", "proximity"]\n'
+
+
+def test_an_arcsim_scene_may_be_the_start_of_a_recipe(scene_folder: Path) -> None:
+    recipe = read(ARCSIM + "[time]\nsettle = 1.0\n", scene_folder)
+    member = Crew(recipe).member(0)
+    np.testing.assert_allclose(member.scene.wind, [0, 3, 1], atol=1e-12)
+    assert member.scene.gravity == (0, 0, -9.8)
+    assert member.scene.material.density == 0.2
+    assert recipe.wind.force == QuadraticNormal(density=1.2)
+    assert recipe.identity()["scene"]["left_out"] == ["strainlimiting", "proximity"]
+    changed = read(ARCSIM + '[material]\nname = "paper"\n[wind]\nspeed = 2.0\n', scene_folder)
+    assert Crew(changed).member(0).scene.material.name == "paper"
+    assert Crew(changed).member(0).wind_speed == 2.0
+    assert changed.identity() != recipe.identity()
+
+
+def test_a_scene_is_known_by_its_content(scene_folder: Path) -> None:
+    before = read(ARCSIM, scene_folder).identity()
+    (scene_folder / "scene.json").rename(scene_folder / "other.json")
+    assert read(ARCSIM.replace("scene.json", "other.json"), scene_folder).identity() == before
+    (scene_folder / "square.obj").write_text(SQUARE.replace("v 0 1 1", "v 0 1 0.9"))
+    assert read(ARCSIM.replace("scene.json", "other.json"), scene_folder).identity() != before
+
+
+def test_a_scene_file_by_itself_runs_with_arcsims_steps(scene_folder: Path) -> None:
+    content = json.loads((scene_folder / "scene.json").read_text())
+    (scene_folder / "plain.json").write_text(json.dumps({**content, "disable": [*STAGES]}))
+    recipe = load(str(scene_folder / "plain.json"))
+    assert (recipe.integrator.name, recipe.integrator.step, recipe.time.settle) == ("implicit", 0.005, 0.0)
+    assert (recipe.time.frames, recipe.time.rate) == (26, 25.0)
+    with pytest.raises(InputError, match="stages strainlimiting, proximity"):
+        load(str(scene_folder / "scene.json"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ("vt 1 1", "vt 0.5 -1", "inverted"),
+        ("vt 1 1", "vt 0.5 0", "degenerate"),
+        ("f 1/1 3/3 4/4", "f 1/1 4/4 3/3", "inverted"),
+        ("f 1/1 3/3 4/4\n", "", "belong to no face"),
+    ],
+)
+def test_a_mesh_that_cannot_be_simulated_is_refused_with_the_reason(
+    scene_folder: Path, old: str, new: str, word: str
+) -> None:
+    (scene_folder / "square.obj").write_text(SQUARE.replace(old, new))
+    with pytest.raises(InputError, match=word):
+        read(ARCSIM, scene_folder)
