@@ -135,6 +135,7 @@ class Block {
   I base;
   std::array<contact::Search<T>, L> search_;
   std::vector<contact::Point<T>> near_;
+  std::vector<T> moved_;  // how far each vertex is from there
   std::vector<T> built_;  // positions at each lane's last search
 
  public:
@@ -309,10 +310,13 @@ class Block {
     V worst = V{};
     if (built_.empty()) {
       built_.assign(x, x + 3 * L * n);
+      moved_.assign(L * n, T(0));
     } else {
       for (int64_t i = 0; i < n; ++i) {
-        const V3 moved = sub(load3(x + 3 * L * i), load3(built_.data() + 3 * L * i));
-        worst = maximum(worst, dot(moved, moved));
+        const V3 move = sub(load3(x + 3 * L * i), load3(built_.data() + 3 * L * i));
+        const V square = dot(move, move);
+        worst = maximum(worst, square);
+        store(moved_.data() + L * i, root(square));
       }
     }
     const T* mass = p.mass + b * n * L;
@@ -322,10 +326,12 @@ class Block {
         for (int64_t i = 0; i < n; ++i) near_[i] = {x[3 * L * i + l], x[3 * L * i + L + l], x[3 * L * i + 2 * L + l]};
         search_[l].build(p.contact, near_.data());
         for (int64_t i = l; i < 3 * L * n; i += L) built_[i] = x[i];
+        for (int64_t i = l; i < L * n; i += L) moved_[i] = 0;
         worst[l] = 0;
       }
       if (!search_[l].pairs().empty())
-        contact::apply<T, L>(p.contact, search_[l], std::sqrt(worst[l]), x + l, v + l, mass + l, T(damping[l]), f + l);
+        contact::apply<T, L>(p.contact, search_[l], moved_.data() + l, std::sqrt(worst[l]), x + l, v + l, mass + l,
+                             T(damping[l]), f + l);
     }
   }
 

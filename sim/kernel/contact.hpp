@@ -83,7 +83,7 @@ class Search {
   static constexpr int kWidth = 16;
 
  public:
-  static T skin(const Settings<T>& s) { return T(3 * s.thickness); }
+  static T skin(const Settings<T>& s) { return T(4 * s.thickness); }
   const std::vector<Pair>& pairs() const { return pairs_; }
 
   // Whether the candidates still hold after moves of squared length up to `worst`.
@@ -156,11 +156,11 @@ void Search<T>::look(const Settings<T>& s, const Point<T>* x, int64_t f, T reach
   }
 }
 
-// Adds repulsion and friction to the forces of one lane. Arrays are (vertices, 3, lanes), offset to the lane. `moved` is
-// how far a vertex has moved at most since the search.
+// Adds repulsion and friction to the forces of one lane. Arrays are (vertices, 3, lanes), offset to the lane. `moved`
+// (vertices, lanes) is how far each vertex has moved since the search, `furthest` the most of them.
 template <typename T, int lanes>
-void apply(const Settings<T>& s, const Search<T>& search, T moved, const T* x, const T* v, const T* mass, T damping,
-           T* f) {
+void apply(const Settings<T>& s, const Search<T>& search, const T* moved, T furthest, const T* x, const T* v,
+           const T* mass, T damping, T* f) {
   struct Hit {
     int32_t vertex, face;
     T distance, w[3];
@@ -178,10 +178,12 @@ void apply(const Settings<T>& s, const Search<T>& search, T moved, const T* x, c
   static thread_local std::vector<Hit> hits;
   hits.clear();
   // A little more than needed, against rounding.
-  const T limit = T(1.0001) * (h + 2 * moved);
+  const T margin = T(1.001) * h, limit = margin + 2 * furthest;
   for (const auto& pair : search.pairs()) {
     if (pair.distance > limit) break;
     const int32_t* c = s.face + 3 * int64_t(pair.face);
+    const T face = std::max({moved[lanes * c[0]], moved[lanes * c[1]], moved[lanes * c[2]]});
+    if (pair.distance > margin + moved[lanes * pair.vertex] + face) continue;
     const Point<T> p = at(x, pair.vertex), p0 = at(x, c[0]), p1 = at(x, c[1]), p2 = at(x, c[2]);
     Hit hit;
     const T square = closest(p, p0, p1, p2, hit.w);
