@@ -151,7 +151,11 @@ def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
             label = "measured (tunnel)" if style == "s" else "reactive, M = ρL/2"
             axes.plot(length, [row[key] for row in thresholds], style, color=colour, mfc="none", label=label)
     sheets.plot(
-        length, [row["tunnel_speed_flutter"] / 2 for row in thresholds], "x", color="#222222", label="half of it"
+        length,
+        [row["tunnel_speed_flutter"] / 2 for row in thresholds],
+        "x",
+        color="#222222",
+        label="half of the tunnel's",
     )
     sheets.set(xlabel="length [m]", ylabel="onset of flutter [m/s]", title="paper sheets, d'Adamo 2024")
     pitch.set(xlabel="length [m]", ylabel="frequency there [Hz]")

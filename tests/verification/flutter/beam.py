@@ -42,6 +42,7 @@ class Strip:
         damping: d, a time.
         weight: g, per area.
         friction: c, both sides together: force per area and speed.
+        lag: τ by which the Coriolis load 2 M U w_xt is late, to first order: 2 M U (w_xt − τ w_xtt).
     """
 
     length: float = 1.0
@@ -52,6 +53,7 @@ class Strip:
     damping: float = 0.0
     weight: float = 0.0
     friction: float = 0.0
+    lag: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +105,8 @@ def eigenvalues(strip: Strip, *, terms: int = TERMS) -> NDArray[np.complex128]:
     tension = strip.weight * part["11 (1 − ξ)"] - strip.friction * speed * part["02 (1 − ξ)"]
     zeroth = part["22"] + (thrust + length * tension) * length**2 / strip.rigidity
     first = strip.damping / unit * part["22"] + 2 * air * speed * unit / (total * length) * part["01"]
-    flow = np.linalg.solve(part["00"], np.hstack([zeroth, first]))
+    second = part["00"] - 2 * air * speed * strip.lag / (total * length) * part["01"]
+    flow = np.linalg.solve(second, np.hstack([zeroth, first]))
     matrix = np.block([[np.zeros((terms, terms)), np.eye(terms)], [-flow]])
     values = np.linalg.eigvals(matrix) / unit
     return values[np.lexsort([values.imag, values.imag <= 0])].astype(np.complex128)
