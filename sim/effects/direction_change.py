@@ -28,7 +28,7 @@ class DirectionChange(WindEffect):
         strength(
             unit="rad",
             prior=(-0.8, 0.8),
-            source="standard deviation of the direction over 10 min: 0.1–0.4 rad by day (Pasquill classes D to A)",
+            source="standard deviation of the direction over 10 min: 0.17–0.44 rad (Pasquill classes D to A)",
         ),
     ] = 0.0
     start: Annotated[

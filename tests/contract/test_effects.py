@@ -111,6 +111,18 @@ def test_at_its_null_value_trajectories_are_those_of_the_base_model_to_the_bit(n
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_a_member_at_null_is_the_base_models_to_the_bit_whatever_the_others_have(name: str) -> None:
+    effect = drawn(name)
+    nulls = {label: effect.parameters()[label].null for label in effect.strengths()}
+    mixed = {label: torch.tensor([null, float(getattr(effect, label)[1])]) for label, null in nulls.items()}
+    mixed = {label: value.double() for label, value in mixed.items()}
+    for run in (outcome, implicit_outcome):
+        changed, base = run(replace(effect, **mixed), flag()), run(None, flag())
+        assert torch.equal(changed[..., 0], base[..., 0])
+        assert not torch.equal(changed[..., 1], base[..., 1])
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_away_from_its_null_value_it_acts_in_both_integrators(name: str) -> None:
     effect = drawn(name)
     assert not effect.absent
@@ -251,6 +263,18 @@ def test_a_flag_lives_through_half_a_second_at_both_ends_of_the_prior(name: str)
         for _ in range(5):
             state = integrator.advance(system, state, 0.1)
         assert state.healthy(speed_limit=40.0).all()
+        # Backward Euler takes effects explicitly, at steps fifty times as long.
+        system, state = with_effect(replace(drawn(name), **values), *assemble(scenes))
+        assert BackwardEuler(step=5e-3).advance(system, state, 0.1).healthy(speed_limit=40.0).all()
+
+
+def test_all_effects_together_run_and_agree_between_kernel_and_torch() -> None:
+    system, state = flag()
+    for name in NAMES:
+        system, state = with_effect(drawn(name), system, state)
+    kernel, torch_only = (advance(system, state, 0.0012, steps=6, backend=b) for b in (Backend.AUTO, Backend.TORCH))
+    torch.testing.assert_close(kernel.velocity, torch_only.velocity, rtol=0, atol=1e-9)
+    assert BackwardEuler(step=5e-3).advance(system, state, 0.02).healthy(speed_limit=40.0).all()
 
 
 @pytest.mark.parametrize("name", NAMES)
