@@ -144,3 +144,17 @@ def test_added_mass_does_not_change_motion_in_the_plane(make_system, plain, squa
     # The sheet stands in the y–z plane and falls freely within it.
     final = advance(system, state, 0.1, steps=20, backend=Backend.TORCH)
     np.testing.assert_allclose(final.velocity[:, :, 0], np.tile([0.0, 0.3, -0.4], (49, 1)), rtol=0, atol=1e-12)
+
+
+def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the_step(make_system, plain) -> None:
+    """σ v̇ = −c v along the sheet: v₀ e^(−c t/σ), here e^(−1). Effects see the velocity at the time of the force."""
+    mesh = grid(width=1.0, height=1.0, columns=2, rows=2)
+    system, state = make_system(mesh, [plain], air=NO_AIR)
+    sliding = torch.tensor([0.0, 3.0, 0.0], dtype=torch.float64)[:, None].expand_as(state.position)
+    system, state = apply([TangentialLinearDrag(coefficient=0.4)], system, replace(state, velocity=sliding))
+    errors = []
+    for steps in (40, 80):
+        final = advance(system, state, 0.5, steps=steps, backend=Backend.TORCH)
+        errors.append(float((final.velocity[:, 1] - 3 * np.exp(-1)).abs().max()))
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
