@@ -6,6 +6,7 @@ from tests.evidence import run_all
 
 VALIDATIONS = {
     "clock-recovery": "tests.validation.clock_recovery",
+    "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
     "simulator": "tests.validation.simulator",
 }

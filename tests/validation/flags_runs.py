@@ -46,7 +46,9 @@ class Ensemble:
         edge: (look, edge vertex, 3, group, replicate) positions of the free edge, from its lower end [m].
         first: (look, vertex, 3, group) all positions of each group's first replicate [m].
         energies: name → (look, group, replicate) [J], gravity's relative to the start; contact's is left out.
-        compression: (group, replicate) root mean square compression of the faces over the settled time.
+        compression: (group, replicate) root mean square compression of the faces, over the settled time while healthy;
+            NaN where there is none.
+        lasted: (group, replicate) how long each run was healthy [s]; those that diverged have NaN statistics.
     """
 
     values: NDArray[np.float64]
@@ -54,6 +56,7 @@ class Ensemble:
     first: NDArray[np.floating]
     energies: dict[str, NDArray[np.floating]]
     compression: NDArray[np.floating]
+    lasted: NDArray[np.floating]
 
     @property
     def settled(self) -> NDArray[np.floating]:
@@ -66,7 +69,13 @@ class Ensemble:
         settled = self.settled
         groups, replicates = settled.shape[3:]
         rows = [[edge_motion(settled[..., g, r], rate=RATE) for r in range(replicates)] for g in range(groups)]
-        return np.array([[(*m.position, m.speed, m.frequency) for m in row] for row in rows])
+        values = np.array([[(*m.position, m.speed, m.frequency) for m in row] for row in rows])
+        return np.where(self.diverged[..., None], np.nan, values)
+
+    @property
+    def diverged(self) -> NDArray[np.bool_]:
+        """(group, replicate)."""
+        return self.lasted < (len(self.edge) - 1) / RATE - 1e-9
 
 
 def against_wind(seed: int) -> Ensemble:
@@ -118,6 +127,7 @@ def _run(
         first=np.concatenate([part.first for part in parts], axis=3),
         energies=energies,
         compression=np.concatenate([part.compression for part in parts]),
+        lasted=np.concatenate([part.lasted for part in parts]),
     )
 
 
@@ -133,6 +143,7 @@ def _watch(system: System, state: State, method: Integrator, *, groups: int, loo
     free_edge = np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
     touchless = replace(system, contact=None)
     edge, first, energies, squares = [], [], [], []
+    lasted = np.zeros(state.position.shape[-1])
     for look in range(looks + 1):
         if look:
             state = method.advance(system, state, 1 / RATE)
@@ -142,9 +153,11 @@ def _watch(system: System, state: State, method: Integrator, *, groups: int, loo
             energies.append({name: value.double().numpy() for name, value in touchless.energies(state).items()})
             if look > SETTLED * RATE:
                 strains = principal_strains(system.cloth, state.position)[:, 0]
-                squares.append((strains.clamp(max=0) ** 2).mean(0).numpy())
-    if not bool(state.healthy().all()):
-        raise ArithmeticError("a flag of the validation's ensembles diverged")
+                square = (strains.clamp(max=0) ** 2).mean(0)
+                squares.append(torch.where(state.healthy(), square, torch.nan).numpy())
+        lasted = np.where(state.healthy().numpy(), look / RATE, lasted)
+    known = np.isfinite(squares)
+    compression = np.sqrt(np.where(known, squares, 0).sum(0) / np.where(known.any(0), known.sum(0), np.nan))
 
     def grouped(values: NDArray[np.floating]) -> NDArray[np.floating]:
         return values.reshape(*values.shape[:-1], groups, REPLICATES)
@@ -154,7 +167,8 @@ def _watch(system: System, state: State, method: Integrator, *, groups: int, loo
         edge=grouped(np.stack(edge)),
         first=np.stack(first),
         energies={name: grouped(np.stack([e[name] for e in energies])) for name in energies[0]},
-        compression=grouped(np.sqrt(np.mean(squares, axis=0))),
+        compression=grouped(compression),
+        lasted=grouped(lasted),
     )
 
 

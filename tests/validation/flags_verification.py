@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 from scipy.special import jn_zeros
 
 from tests.verification.cases import (
     FRAME,
+    SWING_SLOWING,
     G,
     drooped_tips,
     edge_statistics,
@@ -22,6 +25,7 @@ from tests.verification.cases import (
     energy_drift,
     fall,
     hung_strip,
+    mesh_differences,
     step_errors,
     swing,
     terminal_velocity,
@@ -30,8 +34,10 @@ from tests.verification.cases import (
 MEASURED, THEORY, MARK = "#b5541c", "#1f5f8b", "#777777"
 _STRIP, _DENSITY = 0.15, 0.2
 _TABLES = (2e-4, 4e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.5e-2, 4e-2)
-_CELLS = (10, 15, 20, 30)
+_CELLS = (10, 15, 20, 30, 40)
+_NESTED = (6, 12, 24, 48)
 _MEMBERS = 16
+_STATISTICS = ("droop [m]", "downwind [m]", "speed [m/s]", "frequency [Hz]")
 
 
 def rates(sizes: list[float] | tuple[float, ...], errors: list[float]) -> list[float]:
@@ -47,15 +53,15 @@ def _converging(sizes: list[float], errors: list[float]) -> dict[str, Any]:
 def verify(seed: int) -> dict[str, Any]:
     """All figures of the verification problems with closed forms, and of convergence."""
     energy = [0.4, 0.2, 0.1, 0.05]
-    drift = {share: energy_drift(duration=1.0, share=share) for share in energy}
-    rows = [4, 8, 12, 16]
+    drift = {share: energy_drift(duration=0.5, share=share) for share in energy}
+    rows = [4, 8, 16]
     strips = [hung_strip(n) for n in rows]
     counts = [100, 200, 400, 800]
     falls = [fall(0.3, steps=n)[-1] for n in counts]
     return {
         "energy": {
-            "drift_largest_step": drift[energy[0]].tolist(),
-            "drift_smallest_step": drift[energy[-1]].tolist(),
+            "drift_largest_step": energy_drift(duration=3.0, share=energy[0]).tolist(),
+            "drift_smallest_step": energy_drift(duration=3.0, share=energy[-1]).tolist(),
             **_converging(energy, [float(np.abs(drift[share]).max()) for share in energy]),
         },
         "hung_strip": {
@@ -72,6 +78,7 @@ def verify(seed: int) -> dict[str, Any]:
         "step": _converging(
             [FRAME / n for n in (80, 160, 320, 640)], step_errors((80, 160, 320, 640), finest=5120).tolist()
         ),
+        "mesh_early": _converging([1.5 / n for n in _NESTED[:-1]], mesh_differences(_NESTED).tolist()),
         "mesh": _mesh(seed),
         "statistics_step": _statistics_step(seed),
     }
@@ -95,11 +102,12 @@ def _elastica() -> dict[str, Any]:
 
 
 def _pendulum() -> dict[str, Any]:
-    modes, rows = (1, 2, 3, 4, 5), (10, 20, 40)
+    modes, rows = (1, 2, 3, 4), (20, 40, 80)
     found = {n: [swing(mode, rows=n) for mode in modes] for n in rows}
     errors = {n: [abs(measured / exact - 1) for measured, exact in found[n]] for n in rows}
     return {
         "modes": list(modes),
+        "slowing": SWING_SLOWING,
         "frequency": [measured / (2 * math.pi) for measured, _ in found[rows[-1]]],
         "exact": [exact / (2 * math.pi) for _, exact in found[rows[-1]]],
         "rows": list(rows),
@@ -109,9 +117,9 @@ def _pendulum() -> dict[str, Any]:
 
 
 def _summary(runs: NDArray[np.float64]) -> dict[str, list[float]]:
-    """Droop, downwind distance and speed of the free edge: means over replicates and their standard errors."""
+    """Droop, downwind distance, speed and frequency of the free edge: means and standard errors."""
     error = runs.std(0, ddof=1) / math.sqrt(len(runs))
-    return {"mean": (runs.mean(0) * [-1, 1, 1]).tolist(), "error": error.tolist()}
+    return {"mean": (runs.mean(0) * [-1, 1, 1, 1]).tolist(), "error": error.tolist()}
 
 
 def _mesh(seed: int) -> dict[str, Any]:
@@ -125,46 +133,69 @@ def _statistics_step(seed: int) -> dict[str, Any]:
     return {"share": list(shares), "statistics": [_summary(runs) for runs in each]}
 
 
-def _order(axes: Axes, result: dict[str, Any], order: int, *, xlabel: str, ylabel: str, title: str) -> None:
-    size, error = np.array(result["size"]), np.array(result["error"])
+@dataclass(frozen=True, kw_only=True)
+class _Order:
+    """How a convergence is drawn: its place, theory's order, labels, and the scale of the sizes shown."""
+
+    place: tuple[int, int]
+    order: int
+    xlabel: str
+    ylabel: str
+    title: str
+    scale: float = 1.0
+
+
+_ORDERS = {
+    "energy": _Order(place=(0, 1), order=2, xlabel="step / stability limit", ylabel="largest energy error, relative",
+                     title="1  undamped vibration, 0.5 s"),
+    "hung_strip": _Order(place=(0, 2), order=2, xlabel="cell / length", ylabel="error of the length [m]",
+                         title="2  hung strip, stretched by 4.5 %"),
+    "fall": _Order(place=(0, 4), order=1, xlabel="step [ms]", ylabel="error of the depth after 0.3 s [m]",
+                   title="5  falling sheet", scale=1e3),
+    "elastica": _Order(place=(1, 1), order=1, xlabel="cell [mm]", ylabel="error of the tip / length",
+                       title="3  elastica, k = 1 mN·m", scale=1e3),
+    "step": _Order(place=(1, 4), order=1, xlabel="step [ms]", ylabel="vertices from a step of 7.8 µs [m]",
+                   title="7  flag, 4 m/s, at 0.16 s", scale=1e3),
+    "mesh_early": _Order(place=(2, 0), order=1, xlabel="cell [mm]", ylabel="mean distance to half the cell [m]",
+                         title="7  flag, 4 m/s, at 0.16 s", scale=1e3),
+}  # fmt: skip
+
+
+def _draw_order(axes: Axes, how: _Order, result: dict[str, Any]) -> None:
+    size, error = how.scale * np.array(result["size"]), np.array(result["error"])
+    line = 1.6 * error[-1] * (size / size[-1]) ** how.order
     axes.loglog(size, error, "o-", color=MEASURED, ms=4, lw=1)
-    axes.loglog(size, 1.6 * error[-1] * (size / size[-1]) ** order, "--", color=THEORY, lw=1)
-    axes.text(
-        size[0],
-        1.6 * error[-1] * (size[0] / size[-1]) ** order,
-        f"order {order}",
-        color=THEORY,
-        fontsize=8,
-        ha="right",
-        va="bottom",
-    )
+    axes.loglog(size, line, "--", color=THEORY, lw=1)
+    axes.text(size[0], line[0], f"order {how.order} ", color=THEORY, fontsize=8, ha="right", va="bottom")
     observed = ", ".join(f"{rate:.2f}" for rate in result["rates"])
-    axes.set(xlabel=xlabel, ylabel=ylabel)
-    axes.set_title(f"{title}\nobserved orders {observed}", fontsize=9)
+    axes.set(xlabel=how.xlabel, ylabel=how.ylabel)
+    axes.set_title(f"{how.title}\nobserved orders {observed}", fontsize=9)
+    _mark_sizes(axes, size)
+
+
+def _mark_sizes(axes: Axes, size: NDArray[np.float64]) -> None:
+    axes.set_xticks(size, [f"{value:.3g}" for value in size])
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def draw_verification(result: dict[str, Any], path: Path) -> None:
-    """Two rows with the closed forms, one with convergence."""
-    figure = Figure(figsize=(13, 10.5), layout="constrained")
-    panels = figure.subplots(3, 4)
+    """Problems with closed forms, then convergence."""
+    figure = Figure(figsize=(15, 9.6), layout="constrained")
+    panels = figure.subplots(3, 5)
+    for name, how in _ORDERS.items():
+        _draw_order(panels[how.place], how, result[name])
     _draw_energy(panels[0, 0], result["energy"])
-    _order(panels[0, 1], result["energy"], 2, xlabel="step / stability limit", ylabel="largest energy error, relative",
-           title="1  undamped vibration, 1 s")  # fmt: skip
-    _order(panels[0, 2], result["hung_strip"], 2, xlabel="cell / length", ylabel="error of the length [m]",
-           title=f"2  hung strip, 1 m stretched to {result['hung_strip']['length']:.4f} m")  # fmt: skip
     _draw_fall(panels[0, 3], result["fall"])
     _draw_elastica(panels[1, 0], result["elastica"])
-    _order(panels[1, 1], result["elastica"], 2, xlabel="cell [m]", ylabel="error of the tip / length",
-           title="3  heavy elastica, k = 1 mN·m")  # fmt: skip
     _draw_pendulum(panels[1, 2], panels[1, 3], result["pendulum"])
-    _order(panels[2, 0], result["fall"], 1, xlabel="step [s]", ylabel="error of the depth after 0.3 s [m]",
-           title="5  falling sheet")  # fmt: skip
-    _order(panels[2, 1], result["step"], 1, xlabel="step [s]", ylabel="mean vertex error after 4 frames [m]",
-           title="7  flag at 4 m/s, against a step of 7.8 µs")  # fmt: skip
-    _draw_statistics(panels[2, 2], [1e3 * c for c in result["mesh"]["cell"]], result["mesh"]["statistics"], "cell [mm]")
-    _draw_statistics(
-        panels[2, 3], result["statistics_step"]["share"], result["statistics_step"]["statistics"], "step / default step"
-    )
+    cells = [1e3 * cell for cell in result["mesh"]["cell"]]
+    shares = result["statistics_step"]["share"]
+    for offset, names in enumerate((_STATISTICS[:2], _STATISTICS[2:])):
+        _draw_statistics(panels[2, 1 + offset], cells, result["mesh"]["statistics"], names, xlabel="cell [mm]")
+        _draw_statistics(
+            panels[2, 3 + offset], shares, result["statistics_step"]["statistics"], names,
+            xlabel="step / default, cell 100 mm",
+        )  # fmt: skip
     figure.savefig(path, dpi=90)
 
 
@@ -174,18 +205,18 @@ def _draw_energy(axes: Axes, result: dict[str, Any]) -> None:
         label = f"step {result['size'][index]:g} of the limit"
         axes.plot(0.01 * np.arange(1, len(drift) + 1), drift, color=colour, lw=0.9, label=label)
     axes.set(xlabel="time [s]", ylabel="energy error / energy [10⁻³]")
-    axes.set_title("1  undamped vibration: bounded error", fontsize=9)
+    axes.set_title("1  undamped vibration:\nbounded error", fontsize=9)
     axes.legend(frameon=False, fontsize=8)
 
 
 def _draw_fall(axes: Axes, result: dict[str, Any]) -> None:
     time, speed, _, exact, _ = np.array(result["curve"]).T
-    axes.plot(time, exact, color=THEORY, lw=1.2, label="v_t tanh(g t/v_t)")
+    axes.plot(time, exact, color=THEORY, lw=1.2, label=r"$v_t\,\tanh(g t/v_t)$")
     axes.plot(time, speed, "o", color=MEASURED, ms=3.5, mfc="none", label="simulated")
     axes.axhline(result["terminal"], color=MARK, lw=0.8, ls=":")
-    axes.text(0.0, result["terminal"], f"v_t = √(ρₛ g/ρ) = {result['terminal']:.3f} m/s", fontsize=8, va="bottom")
+    axes.text(0.0, result["terminal"], f"$v_t$ = √(ρₛ g/ρ) = {result['terminal']:.3f} m/s", fontsize=8, va="bottom")
     axes.set(xlabel="time [s]", ylabel="downward speed [m/s]", ylim=(0, 1.15 * result["terminal"]))
-    axes.set_title("5  falling sheet, 0.15 kg/m², ρ = 1.2 kg/m³", fontsize=9)
+    axes.set_title("5  falling sheet:\n0.15 kg/m², ρ = 1.2 kg/m³", fontsize=9)
     axes.legend(frameon=False, fontsize=8, loc="lower right")
 
 
@@ -197,7 +228,7 @@ def _draw_elastica(axes: Axes, result: dict[str, Any]) -> None:
         tips = np.array(result["tips"])[:, column]
         axes.semilogx(result["load"], tips, style, color=MEASURED, mfc="none", ms=5, label=f"simulated, {label}")
     axes.set(xlabel="load ρₛ g L³/B", ylabel="tip of the strip / length")
-    axes.set_title(f"3  heavy elastica, 24 cells: within {100 * result['largest_error']:.2f} % of L", fontsize=9)
+    axes.set_title(f"3  heavy elastica, 24 cells:\nwithin {100 * result['largest_error']:.2f} % of L", fontsize=9)
     axes.legend(frameon=False, fontsize=8)
 
 
@@ -209,26 +240,30 @@ def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
         modes, result["frequency"], "o", color=MEASURED, mfc="none", ms=6, label=f"simulated, {result['rows'][-1]} rows"
     )
     axes.set(xlabel="mode", ylabel="frequency [Hz], L = 1 m", xticks=modes, ylim=(0, None))
-    axes.set_title("4  hanging sheet's pendulum modes", fontsize=9)
+    axes.set_title("4  hanging sheet's\npendulum modes", fontsize=9)
     axes.legend(frameon=False, fontsize=8)
     size = 1 / np.array(result["rows"])
     table = np.array([result["error"][str(n)] for n in result["rows"]])
     for index, mode in enumerate(modes):
-        errors.loglog(size, table[:, index], "o-", ms=4, lw=1, color=MEASURED, alpha=1 - 0.15 * index)
+        errors.loglog(size, table[:, index], "o-", ms=4, lw=1, color=MEASURED, alpha=1 - 0.2 * index)
         errors.text(size[0] * 1.05, table[0, index], f"n = {mode}", fontsize=7, va="center")
     errors.loglog(size, 0.4 * table[-1, 0] * (size / size[-1]) ** 2, "--", color=THEORY, lw=1)
     errors.text(size[1], 0.4 * table[-1, 0] * (size[1] / size[-1]) ** 2, "order 2", color=THEORY, fontsize=8, va="top")
-    observed = [rate for mode in result["rates"] for rate in mode]
+    last = ", ".join(f"{mode[-1]:.2f}" for mode in result["rates"])
+    errors.axhline(result["slowing"], color=MARK, lw=0.8, ls=":")
+    errors.text(size[-1], result["slowing"], "slowing by its static stretch", fontsize=7, va="bottom", color=MARK)
     errors.set(xlabel="cell / length", ylabel="frequency error, relative", xlim=(size[-1] / 1.2, size[0] * 1.5))
-    errors.set_title(f"4  pendulum modes\nobserved orders {min(observed):.2f} to {max(observed):.2f}", fontsize=9)
+    errors.set_title(f"4  pendulum modes\nlast orders {last}", fontsize=9)
+    _mark_sizes(errors, size)
 
 
-def _draw_statistics(axes: Axes, x: list[float], statistics: list[dict[str, list[float]]], xlabel: str) -> None:
-    mean, error = (np.array([s[key] for s in statistics]) for key in ("mean", "error"))
-    names = (("droop [m]", "o"), ("downwind [m]", "s"), ("speed [m/s]", "D"))
-    for column, (name, marker) in enumerate(names):
-        axes.errorbar(x, mean[:, column], yerr=error[:, column], fmt=f"{marker}-",
-                      color=(MEASURED, "#444444", "#6a8f3c")[column], lw=1, ms=4, capsize=3, label=name)  # fmt: skip
-    axes.set(xlabel=xlabel, xlim=(0, 1.1 * max(x)), ylim=(0, None), ylabel="free edge, settled")
-    axes.set_title(f"7  statistics at 4 m/s, {_MEMBERS} runs of 7 s;\nbars: standard error", fontsize=9)
+def _draw_statistics(
+    axes: Axes, x: list[float], statistics: list[dict[str, list[float]]], names: tuple[str, ...], *, xlabel: str
+) -> None:
+    for name, colour in zip(names, (MEASURED, THEORY), strict=True):
+        column = _STATISTICS.index(name)
+        mean, error = (np.array([s[key][column] for s in statistics]) for key in ("mean", "error"))
+        axes.errorbar(x, mean, yerr=error, fmt="o-", color=colour, lw=1, ms=4, capsize=3, label=name)
+    axes.set(xlabel=xlabel, xlim=(0, 1.1 * max(x)), ylim=(0, None))
+    axes.set_title(f"7  settled free edge, 4 m/s:\n{_MEMBERS} runs of 7 s, ± standard error", fontsize=9)
     axes.legend(frameon=False, fontsize=8, loc="center left")

@@ -16,7 +16,7 @@ from scipy.signal import welch
 from sim.run.diagnostics import CRUMPLED
 from sim.scene import GRAVITY
 from tests.validation.flags_reference import ReferenceMotion
-from tests.validation.flags_runs import CAMEL, ENERGY_EVERY, RATE, SETTLED, Ensemble
+from tests.validation.flags_runs import CAMEL, ENERGY_EVERY, RATE, REPLICATES, SETTLED, Ensemble
 
 MOTION, THEORY, IMPLICIT, MARK = "#b5541c", "#1f5f8b", "#6a8f3c", "#444444"
 _QUANTITIES = ("droop", "downwind", "speed", "frequency")
@@ -45,12 +45,26 @@ def summary(ensemble: Ensemble) -> dict[str, Any]:
         "values": ensemble.values.tolist(),
         "replicates": statistics.shape[1],
         "seconds": (len(ensemble.settled) - 1) / RATE,
-        "compression": ensemble.compression.mean(axis=1).tolist(),
+        "compression": _plain(moments(ensemble.compression)[0]),
+        "diverged": ensemble.diverged.sum(axis=1).tolist(),
+        "lasted": ensemble.lasted.mean(axis=1).tolist(),
     }
     for name in _QUANTITIES:
-        runs = _quantity(statistics, name)
-        result[name] = {"mean": runs.mean(axis=1).tolist(), "deviation": runs.std(axis=1, ddof=1).tolist()}
+        mean, deviation = moments(_quantity(statistics, name))
+        result[name] = {"mean": _plain(mean), "deviation": _plain(deviation)}
     return result
+
+
+def moments(runs: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and standard deviation over the replicates (group, replicate) that are not NaN; NaN where fewer than two."""
+    rows = [row[np.isfinite(row)].astype(np.float64) for row in runs]
+    pairs = [(row.mean(), row.std(ddof=1)) if len(row) > 1 else (np.nan, np.nan) for row in rows]
+    mean, deviation = np.array(pairs).T
+    return mean, deviation
+
+
+def _plain(values: NDArray[np.float64]) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def broadside_speed() -> float:
@@ -62,7 +76,8 @@ def _scatter(axes: Axes, ensemble: Ensemble, name: str, colour: str, label: str,
     runs = _quantity(ensemble.statistics, name)
     x = ensemble.values + shift
     axes.plot(np.repeat(x, runs.shape[1]), runs.ravel(), ".", color=colour, alpha=0.35, ms=4)
-    axes.errorbar(x, runs.mean(1), yerr=runs.std(1, ddof=1), color=colour, lw=1.2, capsize=2, label=label)
+    mean, deviation = moments(runs)
+    axes.errorbar(x, mean, yerr=deviation, color=colour, lw=1.2, capsize=2, label=label)
 
 
 def tip_spectrum(ensemble: Ensemble, group: int, corner: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -186,7 +201,8 @@ def draw_damping(declared: Ensemble, implicit: Ensemble, references: list[Refere
             runs = _quantity(ensemble.statistics, name)
             x = 1e3 * ensemble.values
             axes.plot(np.repeat(x, runs.shape[1]), runs.ravel(), ".", color=colour, alpha=0.35, ms=4)
-            axes.errorbar(x, runs.mean(1), yerr=runs.std(1, ddof=1), color=colour, lw=1.2, capsize=2, label=label)
+            mean, deviation = moments(runs)
+            axes.errorbar(x, mean, yerr=deviation, color=colour, lw=1.2, capsize=2, label=label)
         for reference in references:
             if reference.wind == 4:
                 step, marker = float(reference.step.split()[0]), _MARKERS[reference.step]
@@ -194,7 +210,12 @@ def draw_damping(declared: Ensemble, implicit: Ensemble, references: list[Refere
                 axes.plot(step, value, marker, color="black", mfc="none", ms=7, label=f"ArcSim, h = {reference.step}")
         axes.set(ylabel=_LABELS[name], ylim=(0, None))
     for ensemble, colour in ((declared, MOTION), (implicit, IMPLICIT)):
-        panels[3].plot(1e3 * ensemble.values, ensemble.compression.mean(1), "o-", color=colour, lw=1.2, ms=4)
+        mean, deviation = moments(ensemble.compression)
+        panels[3].errorbar(1e3 * ensemble.values, mean, yerr=deviation, fmt="o-", color=colour, lw=1.2, ms=4, capsize=2)
+        for value, count in zip(ensemble.values, ensemble.diverged.sum(1), strict=True):
+            if count:
+                label = f"{count} of {REPLICATES} diverged"
+                panels[3].text(1e3 * value, 0.01, label, rotation=90, fontsize=7, color=colour, va="bottom", ha="right")
     panels[3].axhline(CRUMPLED, color=MARK, lw=0.8, ls="--")
     panels[3].text(0.3, CRUMPLED, " reported as crumpled above", fontsize=8, va="bottom")
     panels[3].set(ylabel="compression of the faces, r.m.s.", ylim=(0, None))
