@@ -54,7 +54,7 @@ class BackwardEuler:
     step: float = 5e-3
     air_shape: AirShape = AirShape.CURRENT
     tolerance: float = 1e-6
-    iterations: int = 5000
+    iterations: int = 20_000
     backend: Backend = Backend.AUTO
 
     def __post_init__(self) -> None:
@@ -149,7 +149,7 @@ class BackwardEuler:
         )
         v = v + change
         after, v = system.limited(x + h * v, v, h)
-        memory = system.remembered(state.memory, x, after)
+        memory = system.remembered(state.memory, after)
         return State(position=after, velocity=v, time=time + h, memory=memory)
 
 
