@@ -70,8 +70,8 @@ class Friction(Protocol):
         """What is remembered when nothing has happened."""
         ...
 
-    def update(self, cloth: Cloth, memory: Tensor, before: Tensor, after: Tensor) -> Tensor:
-        """What is remembered after a step between two positions (vertex, 3, batch) [m]."""
+    def update(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
+        """What is remembered after a step to a position (vertex, 3, batch) [m]."""
         ...
 
     def force(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
@@ -165,10 +165,10 @@ class System:
             return None
         return torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties]).sum(0).unsqueeze(1)
 
-    def remembered(self, memory: tuple[Tensor, ...], before: Tensor, after: Tensor) -> tuple[Tensor, ...]:
-        """What the frictions remember after a step between two positions (vertex, 3, batch) [m]."""
+    def remembered(self, memory: tuple[Tensor, ...], position: Tensor) -> tuple[Tensor, ...]:
+        """What the frictions remember after a step to a position (vertex, 3, batch) [m]."""
         return tuple(
-            friction.update(self.cloth, past, before, after)
+            friction.update(self.cloth, past, position)
             for friction, past in zip(self.frictions, self._memory(memory), strict=True)
         )
 

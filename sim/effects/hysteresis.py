@@ -55,20 +55,22 @@ class Hysteresis(Effect):
     ] = 10.0
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
-        """z = 0: (hinge, batch)."""
-        return position.new_zeros(len(cloth.hinges), position.shape[-1])
+        """z = 0, and the fold angles: (2, hinge, batch)."""
+        angle = bending.fold(cloth, position).angle
+        return torch.stack([torch.zeros_like(angle), angle])
 
-    def update(self, cloth: Cloth, memory: Tensor, before: Tensor, after: Tensor) -> Tensor:
-        """z after a step between two positions (vertex, 3, batch): (hinge, batch)."""
-        turned = bending.fold(cloth, after).angle - bending.fold(cloth, before).angle
-        change = CURVATURE_SPACING * cloth.hinge_column[:, None] * turned
+    def update(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
+        """z and the fold angles after a step to a position (vertex, 3, batch): (2, hinge, batch)."""
+        past, before = memory
+        angle = bending.fold(cloth, position).angle
+        change = CURVATURE_SPACING * cloth.hinge_column[:, None] * (angle - before)
         goal = torch.sign(change)
-        return goal + (memory - goal) * torch.exp(-change.abs() / self.curvature)
+        return torch.stack([goal + (past - goal) * torch.exp(-change.abs() / self.curvature), angle])
 
     def force(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
         """−½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3, batch) [N]."""
         lengths = torch.as_tensor(cloth.mesh.hinge_lengths, dtype=position.dtype, device=position.device)
-        moment = (-(lengths / 2)[:, None] * self.couple * memory).unsqueeze(1)
+        moment = (-(lengths / 2)[:, None] * self.couple * memory[0]).unsqueeze(1)
         return gather_sum([moment * g for g in bending.fold(cloth, position).gradient], cloth.hinge_slots)
 
     def apply(self, system: System, state: State) -> tuple[System, State]:

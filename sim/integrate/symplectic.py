@@ -85,7 +85,7 @@ def advance(system: System, state: State, duration: float, *, steps: int, backen
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (h / 2 if index in (0, steps) else h) * acceleration
         if index < steps:
-            before, x = x, x + h * v
+            x = x + h * v
             x, v = system.limited(x, v, h)
-            memory = system.remembered(memory, before, x)
+            memory = system.remembered(memory, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
