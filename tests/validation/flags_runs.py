@@ -65,10 +65,13 @@ class Ensemble:
 
     @property
     def statistics(self) -> NDArray[np.float64]:
-        """(group, replicate, 5) of the settled free edge: mean x, y, z [m], speed [m/s], frequency [Hz]."""
-        settled = self.settled
+        """(group, replicate, 5) of the settled free edge: mean x, y, z [m], speed [m/s], frequency [Hz].
+
+        From every other look, so that velocities are differences over 40 ms as in the reference's frames.
+        """
+        settled = self.settled[::2]
         groups, replicates = settled.shape[3:]
-        rows = [[edge_motion(settled[..., g, r], rate=RATE) for r in range(replicates)] for g in range(groups)]
+        rows = [[edge_motion(settled[..., g, r], rate=RATE / 2) for r in range(replicates)] for g in range(groups)]
         values = np.array([[(*m.position, m.speed, m.frequency) for m in row] for row in rows])
         return np.where(self.diverged[..., None], np.nan, values)
 

@@ -27,6 +27,8 @@ _LABELS = {
     "frequency": "frequency of the free edge,\nv r.m.s. / (2π x r.m.s.) [Hz]",
 }
 _MARKERS = {"0.5 ms": "s", "5 ms": "D"}
+_LENGTH = 1.5
+"""Of the flag along the wind [m]."""
 _SEGMENT = 4.0
 """Length of the pieces that spectra are averaged over [s]."""
 
@@ -103,14 +105,14 @@ def draw_wind(flags: Ensemble, implicit: Ensemble, references: list[ReferenceMot
         axes.set(xlabel="wind speed [m/s]", ylabel=_LABELS[name], ylim=(None if name == "droop" else 0, None))
     panels[0, 0].invert_yaxis()
     panels[0, 0].legend(frameon=False, fontsize=8)
-    panels[0, 0].text(
-        broadside_speed() + 0.1, 0.02, "√(ρₛ g/ρ)", transform=panels[0, 0].get_xaxis_transform(), fontsize=8
+    panels[0, 1].text(
+        broadside_speed() + 0.1, 0.02, "√(ρₛ g/ρ)", transform=panels[0, 1].get_xaxis_transform(), fontsize=8
     )
     peaks = _draw_spectra(panels[1, 1], flags)
     _draw_map(panels[1, 2], flags)
     figure.suptitle(
         f"Free edge after {SETTLED:g} s, dots: replicates of {summary(flags)['seconds']:g} s from starts with 1 mm of "
-        "noise; bars: standard deviation of one replicate", fontsize=10,
+        "noise, velocities over 40 ms; bars: standard deviation of one replicate", fontsize=10,
     )  # fmt: skip
     figure.savefig(path, dpi=95)
     return peaks
@@ -160,7 +162,10 @@ def _draw_map(axes: Axes, flags: Ensemble) -> None:
     image = axes.pcolormesh(
         frequency[1:], flags.values, np.log10(np.maximum(rows, 1e-9)), cmap="magma", vmin=-6, vmax=-1, shading="nearest"
     )
-    axes.set(xscale="log", xlabel="frequency [Hz]", ylabel="wind speed [m/s]")
+    axes.plot(flags.values / (2 * _LENGTH), flags.values, ":", color="cyan", lw=1.4)
+    axes.text(0.5 * 5 / _LENGTH, 5.1, "f L/U = ½ ", color="cyan", fontsize=9, ha="right")
+    axes.set(xscale="log", xlabel="frequency [Hz]", ylabel="wind speed [m/s]", title="upper fly corner across the wind")
+    axes.title.set_fontsize(9)
     axes.figure.colorbar(image, ax=axes, label="log₁₀ of frequency × density / m²")
 
 

@@ -31,8 +31,8 @@ from tests.verification.systems import build, settle
 G = 9.81
 FRAME = 0.04
 SWING_SLOWING = 0.2 * G / (4 * 2000.0)
-"""Half the static stretch ρ g L/(2 K) of the sheet of `swing`, over its length: about what its frequencies lose by it, so
-that the inextensible theory holds no closer."""
+"""Half the static stretch ρ g L/(2 K) of the sheet of `swing`, over its length: about what its frequencies lose by it:
+the inextensible theory holds no closer."""
 KICKED_MESH = grid(width=0.5, height=0.4, columns=5, rows=4)
 
 
