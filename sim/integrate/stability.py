@@ -68,8 +68,8 @@ def stiffest(system: System) -> Tensor:
         value = (field**2).sum((0, 1)).sqrt()
     value = value * _DEFICIT
     if system.contact is not None:
-        # The repulsion's stiffness k a v/h at a violation of half the thickness, on a vertex of mass ρ a. Layers that lie
-        # on each other stay further apart than that; the step's safety covers the rest.
+        # The repulsion's stiffness k a v/h at a violation of half the thickness, on a vertex of mass ρ a. Layers at
+        # rest on one another stay further apart; the step's safety covers the rest.
         value = value + system.contact.stiffness / 2 * torch.tensor([1 / m.density for m in cloth.materials]).to(value)
     return value
 
