@@ -78,7 +78,8 @@ def _print(report: RunReport) -> None:
         click.echo(artifact)
     for failure in report.failed:
         say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
-    speed = f"{report.rate:.2f} flags/s, steps of {report.step * 1e3:.3g} ms"
+    steps = [f"{step * 1e3:.3g}" for step in sorted(report.steps.values())]
+    speed = f"{report.rate:.2f} flags/s, steps of {'–'.join(dict.fromkeys((steps[0], steps[-1])))} ms"
     say(
         f"{len(report.added)} simulated in {report.seconds:.1f} s ({speed}), "
         f"{len(report.existing)} in the lake already, {len(report.failed)} failed"

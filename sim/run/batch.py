@@ -43,7 +43,7 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Stepper:
-    """Advances batches of a recipe by frames, in steps that depend on the recipe alone and not on the batch.
+    """Advances batches by frames, in steps that depend on the recipe and a material of it, not on what members drew.
 
     Attributes:
         method: None for the explicit method in `steps` equal steps a frame.
@@ -55,8 +55,8 @@ class Stepper:
     steps: int
 
     @classmethod
-    def of(cls, crew: Crew) -> Stepper:
-        """The method and the steps of a recipe.
+    def of(cls, crew: Crew, base: int = 0) -> Stepper:
+        """The method and the steps of a recipe for the members of one of its materials, by its place among them.
 
         Raises:
             UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges.
@@ -67,7 +67,7 @@ class Stepper:
             step = spec.step or 5e-3
             method = BackwardEuler(step=step, air_shape=spec.air_shape)
             return cls(recipe=recipe, method=method, steps=max(1, math.ceil(frame / step - 1e-9)))
-        system, _ = crew.corners()
+        system, _ = crew.corners(base)
         with torch.no_grad():
             return cls(recipe=recipe, method=None, steps=Symplectic(step=spec.step).steps(system, frame))
 
@@ -101,7 +101,7 @@ def run(
     device: torch.device | str = "cpu",
     progress: Callable[[int], object] | None = None,
 ) -> list[Outcome]:
-    """Simulate some members together.
+    """Simulate some members of one material together.
 
     The batch always has `size` members, the last repeated as often as it takes: results then depend on a member and
     the size alone, to the last bit.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -38,6 +37,7 @@ class Member:
     Attributes:
         index: 0, 1, … within the recipe.
         seed: of its own streams; follows from the recipe's seed and the index.
+        base: place of its material among the recipe's.
         scene: what is simulated.
         parameters: what it drew and what was fixed, by name, SI; for the catalog.
         effects: name → parameter → value.
@@ -45,6 +45,7 @@ class Member:
 
     index: int
     seed: int
+    base: int
     scene: Scene
     parameters: Mapping[str, Parameter]
     effects: Mapping[str, Mapping[str, float]]
@@ -83,6 +84,10 @@ class Crew:
         """The seed of a member."""
         return child_seed(self.recipe.seed, "member", index)
 
+    def base(self, index: int) -> int:
+        """The place of a member's material among the recipe's."""
+        return int(stream(self.seed(index), "material", "names").random() * len(self.recipe.material.bases))
+
     def member(self, index: int) -> Member:
         """A member, which depends on the recipe's seed and the index alone.
 
@@ -95,7 +100,8 @@ class Crew:
             return quantity.at(stream(seed, *path).random()) if isinstance(quantity, Range) else quantity
 
         spec, wind = self.recipe.material, self.recipe.wind
-        base = spec.bases[int(stream(seed, "material", "names").random() * len(spec.bases))]
+        place = self.base(index)
+        base = spec.bases[place]
         each = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
         material = _material(
             base,
@@ -126,7 +132,7 @@ class Crew:
             "bending": tuple(material.bending.ravel().tolist()),
         }
         parameters |= {f"{name}.{key}": value for name, chosen in effects.items() for key, value in chosen.items()}
-        return Member(index=index, seed=seed, scene=scene, parameters=parameters, effects=effects)
+        return Member(index=index, seed=seed, base=place, scene=scene, parameters=parameters, effects=effects)
 
     def assemble(self, members: Sequence[Member], *, device: torch.device | str = "cpu") -> tuple[System, State]:
         """The batch of these members with their effects, and its start.
@@ -137,12 +143,13 @@ class Crew:
         system, state = assemble([m.scene for m in members], dtype=self.recipe.dtype, device=device)
         return apply([self._effect(name, members) for name in self.recipe.effects], system, state)
 
-    def corners(self) -> tuple[System, State]:
-        """Members at the ends of all ranges: where the stable step is found, so that it depends on no draw."""
+    def corners(self, place: int) -> tuple[System, State]:
+        """Members of a material at the ends of all ranges: where its stable step is found, whatever they draw."""
         spec, wind = self.recipe.material, self.recipe.wind
         stiffest = np.full(BENDING_SHAPE, ends(spec.bending)[1] * ends(spec.bending_each)[1])
         members: list[Member] = []
-        for base, end in itertools.product(spec.bases, (0, 1)):
+        base = spec.bases[place]
+        for end in (0, 1):
             material = _material(
                 base,
                 density=ends(_of(spec.density, base.density))[0],
@@ -158,7 +165,7 @@ class Crew:
                 name: {key: ends(value)[end] for key, value in effect.parameters.items()}
                 for name, effect in self.recipe.effects.items()
             }
-            members.append(Member(index=len(members), seed=0, scene=scene, parameters={}, effects=effects))
+            members.append(Member(index=end, seed=0, base=place, scene=scene, parameters={}, effects=effects))
         return self.assemble(members)
 
     def _start(self, seed: int) -> NDArray[np.float64]:

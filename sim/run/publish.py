@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class RunReport:
         added: artifact ids published now.
         existing: artifact ids that were there already.
         failed: what was not stored: index, seed, kind and what of each.
-        step: of the integrator [s].
+        steps: material → step of the integrator [s].
         seconds: wall time of the simulation.
         rate: simulated members, failed ones included, a second.
     """
@@ -44,14 +44,14 @@ class RunReport:
     added: tuple[str, ...]
     existing: tuple[str, ...]
     failed: tuple[Mapping[str, Any], ...]
-    step: float
+    steps: Mapping[str, float]
     seconds: float
     rate: float
 
     def as_dict(self) -> dict[str, Any]:
         return {
             "added": list(self.added), "existing": list(self.existing), "failed": [dict(f) for f in self.failed],
-            "step": self.step, "seconds": self.seconds, "rate": self.rate,
+            "steps": dict(self.steps), "seconds": self.seconds, "rate": self.rate,
         }  # fmt: skip
 
 
@@ -81,42 +81,59 @@ def simulate(
     if workers < 1:
         raise UsageError(f"{workers} workers", where="--workers", fix="give at least one")
     crew = Crew(recipe)
-    stepper = Stepper.of(crew)
     identity = recipe.identity()
     known = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
     ids = {index: _artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
     existing = [ids[index] for index in ids if ids[index] in known]
     pending = [index for index in ids if ids[index] not in known]
+    steppers = [Stepper.of(crew, base) for base in range(len(recipe.material.bases))]
     if progress is not None:
         progress(len(existing))
     added: list[str] = []
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
-    batches = [pending[first : first + recipe.batch] for first in range(0, len(pending), recipe.batch)]
-    for outcomes in _outcomes(crew, stepper, batches, device=device, workers=workers, progress=progress):
+    batches = _batches(crew, steppers, pending)
+    for stepper, outcomes in _outcomes(crew, batches, device=device, workers=workers, progress=progress):
         good = [o for o in outcomes if o.sequence is not None]
         failed += [_failure(o) for o in outcomes if o.failure is not None]
         if good:
             added += _publish(lake, recipe, identity, good, stepper, branch=branch)
     seconds = time.perf_counter() - begun
     return RunReport(
-        added=tuple(added), existing=tuple(existing), failed=tuple(failed), step=stepper.step, seconds=seconds,
+        added=tuple(added), existing=tuple(existing), failed=tuple(failed), seconds=seconds,
+        steps={base.name: stepper.step for base, stepper in zip(recipe.material.bases, steppers, strict=True)},
         rate=len(pending) / seconds if pending else 0.0,
     )  # fmt: skip
 
 
+def _batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> list[tuple[Stepper, list[int]]]:
+    """Members of one material together, since each material has its own steps."""
+    size = crew.recipe.batch
+    batches: list[tuple[Stepper, list[int]]] = []
+    for base, stepper in enumerate(steppers):
+        own = [index for index in pending if crew.base(index) == base]
+        batches += [(stepper, own[first : first + size]) for first in range(0, len(own), size)]
+    return batches
+
+
 def _outcomes(
-    crew: Crew, stepper: Stepper, batches: list[list[int]], *, device: str, workers: int, progress: Progress | None
-) -> Iterator[list[Outcome]]:
+    crew: Crew,
+    batches: Sequence[tuple[Stepper, list[int]]],
+    *,
+    device: str,
+    workers: int,
+    progress: Progress | None,
+) -> Iterator[tuple[Stepper, list[Outcome]]]:
     """The batches' outcomes as they come, one batch waiting beside those that run.
 
     Leaving the iteration early stops what is still running.
     """
     ticks = _Ticks(progress, crew.recipe.time.total)
 
-    def one(indices: list[int]) -> list[Outcome]:
+    def one(stepper: Stepper, indices: list[int]) -> tuple[Stepper, list[Outcome]]:
         members = [crew.member(index) for index in indices]
-        return run(crew, stepper, members, size=crew.recipe.batch, device=device, progress=ticks.of_batch(len(members)))
+        tick = ticks.of_batch(len(members))
+        return stepper, run(crew, stepper, members, size=crew.recipe.batch, device=device, progress=tick)
 
     if device.startswith("cpu"):
         library()  # built once, before several threads ask for it
@@ -124,12 +141,12 @@ def _outcomes(
     executor = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="simulate")
     with _one_thread():
         try:
-            running = {executor.submit(one, indices) for indices in islice(waiting, workers + 1)}
+            running = {executor.submit(one, *batch) for batch in islice(waiting, workers + 1)}
             while running:
                 done, running = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
                     yield future.result()
-                    running |= {executor.submit(one, indices) for indices in islice(waiting, 1)}
+                    running |= {executor.submit(one, *batch) for batch in islice(waiting, 1)}
         finally:
             ticks.stop()
             executor.shutdown(cancel_futures=True)

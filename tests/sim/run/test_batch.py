@@ -98,6 +98,18 @@ def test_steps_follow_from_the_recipe_and_not_from_the_draws(make_recipe: Callab
     assert Stepper.of(Crew(make_recipe(top="# the same"))).steps == stepper.steps
 
 
+def test_each_material_of_a_recipe_has_its_own_steps() -> None:
+    names = ["camel-ponte-roma", "white-dots-on-blk"]
+
+    def crew(material: str) -> Crew:
+        text = f"[scene]\ncolumns = 6\n[material]\n{material}\n[wind]\nspeed = 2.0\n"
+        return Crew(parse(text, name="r", folder=Path(), where="r"))
+
+    mixed = [Stepper.of(crew(f"names = {names}"), base).steps for base in (0, 1)]
+    assert mixed == [Stepper.of(crew(f'name = "{name}"')).steps for name in names]
+    assert mixed[1] > 2 * mixed[0]
+
+
 def test_a_forced_step_beyond_the_limit_is_refused_with_it(make_recipe: Callable) -> None:
     with pytest.raises(UsageError, match=r"a step of 0\.02 s is unstable: the limit"):
         Stepper.of(Crew(make_recipe(more="[integrator]\nstep = 0.02")))
@@ -199,7 +211,13 @@ def test_recipes_of_all_shapes_run(attachment: str) -> None:
         frames = 3
     """
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
-    outcomes = run(crew, Stepper.of(crew), [crew.member(index) for index in range(4)], size=4)
+    members = [crew.member(index) for index in range(6)]
+    outcomes = [
+        outcome
+        for base in (0, 1)
+        for outcome in run(crew, Stepper.of(crew, base), [m for m in members if m.base == base], size=6)
+    ]
+    assert len(outcomes) == 6
     for outcome in outcomes:
         assert outcome.failure is None
         assert outcome.sequence is not None

@@ -18,6 +18,7 @@ from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, read_meshes
 from sim.run import Recipe, simulate
 from sim.run.members import Crew
+from sim.run.reading import parse
 
 WORKER = Path(__file__).with_name("simulate_worker.py")
 
@@ -65,6 +66,21 @@ def test_running_again_makes_nothing_and_more_members_only_the_new_ones(lake: La
     more = simulate(lake, recipe)
     assert len(more.added) == 3
     assert set(more.existing) == set(first.added)
+
+
+def test_members_of_several_materials_are_all_there(lake: Lake, small: Callable[..., str]) -> None:
+    text = small().replace('name = "camel-ponte-roma"', 'names = ["camel-ponte-roma", "gray-interlock", "paper"]')
+    recipe = replace(parse(text, name="mixed", folder=Path(), where="r"), count=9)
+    report = simulate(lake, recipe, workers=2)
+    assert (len(report.added), len(report.failed)) == (9, 0)
+    assert set(report.steps) == {"camel-ponte-roma", "gray-interlock", "paper"}
+    crew = Crew(recipe)
+    rows = {json.loads(row["report"])["index"]: row for row in lake.rows().to_pylist()}
+    assert sorted(rows) == list(range(9))
+    for index, row in rows.items():
+        name = crew.member(index).scene.material.name
+        assert json.loads(row["parameters"])["material"] == name
+        assert json.loads(row["report"])["step"] == report.steps[name]
 
 
 def test_a_member_is_the_same_in_any_company(tmp_path: Path, make_recipe: Callable) -> None:

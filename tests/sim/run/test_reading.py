@@ -13,6 +13,7 @@ from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNam
 from flagdata.provenance import canonical
 from sim.air import QuadraticNormal, Stokes
 from sim.arcsim import STAGES
+from sim.effects import EFFECTS
 from sim.run.members import Crew
 from sim.run.reading import load, names, parse
 from sim.run.recipe import Shape
@@ -129,7 +130,8 @@ def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
 
 def test_an_effects_prior_may_be_asked_for_by_name(make_recipe: Callable) -> None:
     effect = make_recipe(more='[effects.gusts]\nintensity = "prior"\nlength = 40.0').effects["gusts"]
-    assert effect.parameters["intensity"] == Range(low=0.0, high=0.3)
+    low, high = EFFECTS["gusts"].parameters()["intensity"].prior
+    assert effect.parameters["intensity"] == Range(low=low, high=high)
     assert effect.length == 40.0
 
 
