@@ -7,8 +7,8 @@ from importlib import import_module
 
 import click
 
-from flagdata.console import fail
-from flagdata.errors import FlagdataError, UnknownNameError
+from flagdata.console import document, fail
+from flagdata.errors import FlagdataError, UnknownNameError, UsageError
 
 # verb → (where its click command is, one line of help shown without importing it)
 VERBS: dict[str, tuple[str, str]] = {
@@ -33,6 +33,8 @@ VERBS: dict[str, tuple[str, str]] = {
     "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
     "demo": ("measure.demo.command:demo", "Make a small field recording and take it through everything."),
 }
+
+_HELP = "see the command's --help"
 
 
 class LazyGroup(click.Group):
@@ -73,6 +75,8 @@ def main(arguments: list[str] | None = None) -> None:
     except FlagdataError as error:
         sys.exit(fail(error, as_json="--json" in given))
     except click.ClickException as error:
+        if "--json" in given:
+            document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})
         error.show()
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):

@@ -31,7 +31,7 @@ class Pairs(Dataset[Sample]):
     """Pairs of a query, a map-style dataset. Made by `Source.pairs`.
 
     Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens a record when it
-    first needs it.
+    first needs it. With a `torch.utils.data.DataLoader` of your own, pass `collate_fn=flagdata.dataset.collate`.
 
     Attributes:
         table: the pairs' numbers, as arrays.

@@ -108,9 +108,8 @@ def resolve(
 
 
 def _clips(catalog: pa.Table, where: str | None, columns: tuple[str, ...]) -> pa.Table:
-    # The line break ends a comment that the filter may close with.
-    condition = f"kind = '{Kind.CLIP}'" + (f" and ({where}\n)" if where is not None else "")
-    return Selection(catalog, Request(where=condition, columns=columns)).table()
+    clips = catalog.filter(pc.field("kind") == Kind.CLIP.value)  # not a part of the filter, which could undo it
+    return Selection(clips, Request(where=where, columns=columns)).table()
 
 
 def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | ExplicitSplit) -> set[str]:

@@ -9,6 +9,7 @@ from flagdata.dataset.pairs import Pairs
 from flagdata.dataset.resolve import SideSize, resolve, side_sizes
 from flagdata.dataset.splits import ExplicitSplit, HashedSplit
 from flagdata.dataset.tolerance import Tolerance
+from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.schema import TRUTH_WINDOW
 
@@ -62,8 +63,10 @@ class Source:
             NotFoundError: no clip matches.
             RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
             UnknownNameError: no such ref, column or side.
-            UsageError: a filter that is not SQL, or a window that is no length of time.
+            UsageError: a filter that is not SQL, a window that is no length of time, or a seed that is no whole number.
         """
+        if not isinstance(seed, int):
+            raise UsageError(f"the seed {seed!r}", where="seed", fix="give a whole number")
         resolved = resolve(
             self.lake,
             where=where,

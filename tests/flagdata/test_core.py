@@ -133,3 +133,10 @@ def test_a_misspelt_verb_exits_2() -> None:
     done = subprocess.run([sys.executable, "-m", "flagdata.cli", "ingets"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "ingest" in done.stderr
+
+
+def test_usage_errors_are_one_json_document_too(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["ls", "--bogus", "--json"])
+    assert stop.value.code == 2
+    assert json.loads(capsys.readouterr().out)["kind"] == "usage"

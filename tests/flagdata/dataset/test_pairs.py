@@ -213,6 +213,17 @@ def test_what_is_not_there_is_said(source):
         source.pairs(at="v1")[48]
 
 
+@pytest.mark.parametrize("where", ["wind > 4) or (1=1", "1=1) --", ""])
+def test_a_filter_cannot_reach_beyond_the_clips(source, where):
+    with pytest.raises(UsageError):
+        source.pairs(where)
+
+
+def test_a_seed_is_a_whole_number(source):
+    with pytest.raises(UsageError, match="seed"):
+        source.pairs(seed=1.5)
+
+
 def test_a_filter_may_end_in_a_comment_and_hold_an_or(source):
     assert len(source.pairs("wind < 3.5 or wind > 9.5 -- both ends", at="v1")) == 12
 
