@@ -73,14 +73,13 @@ def test_what_cannot_be_done_is_told(run: Run, arguments: list[str], code: int, 
 @pytest.mark.reference
 def test_an_arcsim_scene_becomes_arcsims_own_output(run: Run, tmp_path: Path, reference_data: Path) -> None:
     # The folder's scene, its mesh and its material, put together as its user had them. Positions are written with six
-    # digits; a later frame differs by what a chaotic sheet makes of that (test_reference.py).
+    # digits; a chaotic sheet makes more of that from frame to frame: observed 1 µm at first, 8 µm after 1 s and 0.4 mm
+    # after 2 s (mean over the vertices, which move by a metre), allowed ten times as much.
     folder = reference_data / "arcsim" / "raw_fixed_mesh"
     (tmp_path / "materials").mkdir()
     shutil.copy(folder / "grid12x8.obj", tmp_path)
+    shutil.copy(folder / "conf.json", tmp_path / "scene.json")
     shutil.copy(reference_data / "materials" / "camel-ponte-roma.json", tmp_path / "materials")
-    scene = json.loads((folder / "conf.json").read_text())
-    scene["end_time"] = 0.16
-    (tmp_path / "scene.json").write_text(json.dumps(scene))
     code, out, _ = run(tmp_path / "scene.json", "--json")
     assert code == 0
     lake = Lake.open(tmp_path / "lake")
@@ -89,5 +88,8 @@ def test_an_arcsim_scene_becomes_arcsims_own_output(run: Run, tmp_path: Path, re
     assert isinstance(sequence, MeshSequence)
     assert isinstance(expected, MeshSequence)
     np.testing.assert_array_equal(sequence.faces, expected.faces)
-    np.testing.assert_array_equal(sequence.time, expected.time[:5])
-    np.testing.assert_allclose(sequence.positions, expected.positions[:5], atol=2e-5)
+    np.testing.assert_array_equal(sequence.time, expected.time)
+    distance = np.linalg.norm(sequence.positions - expected.positions, axis=2).mean(axis=1)
+    assert distance[:6].max() < 1e-5
+    assert distance[:26].max() < 1e-4
+    assert distance.max() < 5e-3
