@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow.compute as pc
 
 from flagdata.align.paired import host_clock
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import ConflictError, InputError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer import recipe as recipes
@@ -129,12 +129,12 @@ def ingest_camera(
 
     Raises:
         FlagdataError: as `open_camera`; the lake is unchanged.
-        ConflictError: the file changed while it was read.
+        ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
     options, labels = options or CameraIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()
-    present = find(lake, Kind.CAMERA, source, recipe, branch=branch)
+    present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
     if present is not None:
         return present
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
@@ -162,7 +162,7 @@ def ingest_camera(
             rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
         )  # fmt: skip
         transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, branch=branch)
+    return result_of(lake, transaction, artifact, report, labels, branch=branch)
 
 
 def ingest_wind(
@@ -177,12 +177,12 @@ def ingest_wind(
 
     Raises:
         FlagdataError: as `read_log`; the lake is unchanged.
-        ConflictError: the file changed while it was read.
+        ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
     options, labels = options or WindIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()
-    present = find(lake, Kind.WIND, source, recipe, branch=branch)
+    present = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
     if present is not None:
         return present
     log = read_log(path, options.wind)
@@ -210,7 +210,7 @@ def ingest_wind(
             rate=report["rate"], frame_count=None, stored=transaction.put(staged),
         )  # fmt: skip
         transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, branch=branch)
+    return result_of(lake, transaction, artifact, report, labels, branch=branch)
 
 
 def recipe_text(recipe: str) -> bytes:
@@ -252,8 +252,14 @@ class _Times:
         return (self.count - 1) * NANOSECONDS / (self.last - self.first) if self.count > 1 else None
 
 
-def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], *, branch: str) -> IngestResult | None:
-    """The artifact that this ingest would make, if it is on the branch."""
+def find(
+    lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str
+) -> IngestResult | None:
+    """The artifact that this ingest would make, if it is on the branch.
+
+    Raises:
+        ConflictError: it is, under another name or session than the one asked for.
+    """
     same = (
         (pc.field("kind") == kind.value)
         & (pc.field("source_hash") == source.hash)
@@ -263,7 +269,20 @@ def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], *, b
     if not rows:
         return None
     artifact = Artifact.from_row(rows[0])
+    _check_labels(artifact, labels)
     return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
+
+
+def _check_labels(artifact: Artifact, labels: Labels) -> None:
+    """Refuse labels that the artifact, which is there already, does not have."""
+    for label, asked, kept in (("name", labels.name, artifact.name), ("session", labels.session, artifact.session)):
+        if asked is not None and asked != kept:
+            raise ConflictError(
+                f"{artifact.source_name} is in the lake with {f'the {label} {kept!r}' if kept else f'no {label}'}, "
+                f"not {asked!r}",
+                where=artifact.id,
+                fix=f"leave out --{label}, or take the old one off with flagdata withdraw and ingest again",
+            )
 
 
 def _artifact(
@@ -299,13 +318,20 @@ def _artifact(
 
 
 def result_of(
-    lake: Lake, transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], *, branch: str
+    lake: Lake, transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels, *, branch: str
 ) -> IngestResult:
-    """What an ingest did whose transaction has ended."""
+    """What an ingest did whose transaction has ended.
+
+    Raises:
+        ConflictError: another process published it meanwhile, under another name or session than the one asked for.
+    """
     committed = transaction.result
     created = committed is not None and artifact.id in committed.added
-    kept = artifact if created else lake.artifact(artifact.id, at=branch)
-    return IngestResult(artifact=kept, created=created, report=report if created else json.loads(kept.report or "{}"))
+    if created:
+        return IngestResult(artifact=artifact, created=True, report=report)
+    kept = lake.artifact(artifact.id, at=branch)
+    _check_labels(kept, labels)
+    return IngestResult(artifact=kept, created=False, report=json.loads(kept.report or "{}"))
 
 
 def _span(start: int, end: int) -> dict[str, Any]:

@@ -68,12 +68,12 @@ def ingest_meshes(
 
     Raises:
         FlagdataError: as `read_folder` and `check_units`; the lake is unchanged.
-        ConflictError: a file changed while the folder was read.
+        ConflictError: a file changed while the folder was read, or the folder is in the lake under other labels.
     """
     options, labels = options or MeshIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()
-    present = find(lake, Kind.MESHES, source, recipe, branch=branch)
+    present = find(lake, Kind.MESHES, source, recipe, labels, branch=branch)
     if present is not None:
         return present
     metre = float(unit(options.unit).to_si(1.0))
@@ -102,7 +102,7 @@ def ingest_meshes(
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )
         transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, branch=branch)
+    return result_of(lake, transaction, artifact, report, labels, branch=branch)
 
 
 def scene_wind(scene: Any) -> dict[str, float] | None:

@@ -101,16 +101,38 @@ def test_ingesting_again_finds_what_is_there_and_writes_nothing(
     assert _everything(lake) == before
 
 
-def test_other_options_or_other_bytes_are_another_artifact_and_labels_are_not(lake: Lake, video: Path) -> None:
+def test_other_options_are_another_artifact(lake: Lake, video: Path) -> None:
     whole = ingest_camera(lake, video)
     cropped = ingest_camera(
         lake, video, CameraIngest(camera=CameraOptions(crop=CropBox(x=8, y=0, width=48, height=48)))
     )
     archived = ingest_camera(lake, video, CameraIngest(coding=Coding.H264))
-    labelled = ingest_camera(lake, video, labels=Labels(name="another", session="another"))
     assert len({whole.artifact.id, cropped.artifact.id, archived.artifact.id}) == 3
-    assert labelled.artifact.id == whole.artifact.id
-    assert not labelled.created
+
+
+@pytest.mark.parametrize("kind", [Kind.CAMERA, Kind.WIND])
+def test_other_labels_than_the_artifact_has_are_refused_and_the_same_ones_find_it(
+    lake: Lake, video: Path, wind_log: Path, kind: Kind
+) -> None:
+    def ingest(**labels: str) -> store.IngestResult:
+        ingest, source = (ingest_camera, video) if kind is Kind.CAMERA else (ingest_wind, wind_log)
+        return ingest(lake, source, labels=Labels(**labels))
+
+    first = ingest(session="a").artifact
+    before = _everything(lake)
+    with pytest.raises(ConflictError, match=r"the session 'a', not 'b'.*flagdata withdraw"):
+        ingest(session="b")
+    with pytest.raises(ConflictError, match=f"the name '{first.name}', not 'b'"):
+        ingest(name="b")
+    for labels in ({}, {"session": "a"}, {"name": str(first.name), "session": "a"}):
+        assert ingest(**labels).artifact.id == first.id
+    assert _everything(lake) == before
+
+
+def test_a_session_for_an_artifact_without_one_is_refused(lake: Lake, wind_log: Path) -> None:
+    ingest_wind(lake, wind_log)
+    with pytest.raises(ConflictError, match="no session, not 'field-1'"):
+        ingest_wind(lake, wind_log, labels=Labels(session="field-1"))
 
 
 def test_the_same_ingest_in_two_lakes_gives_the_same_object(tmp_path: Path, video: Path, wind_log: Path) -> None:
