@@ -200,8 +200,8 @@ def draw_damping(declared: Ensemble, implicit: Ensemble, references: list[Refere
     panels = figure.subplots(1, 4)
     for axes, name in zip(panels, ("downwind", "speed", "frequency"), strict=False):
         for ensemble, colour, label in (
-            (declared, MOTION, "leapfrog, against d"),
-            (implicit, IMPLICIT, "backward Euler, d = 0, against its step h"),
+            (declared, MOTION, "leapfrog: d"),
+            (implicit, IMPLICIT, "backward Euler, d = 0: h"),
         ):
             runs = _quantity(ensemble.statistics, name)
             x = 1e3 * ensemble.values
@@ -219,15 +219,16 @@ def draw_damping(declared: Ensemble, implicit: Ensemble, references: list[Refere
         panels[3].errorbar(1e3 * ensemble.values, mean, yerr=deviation, fmt="o-", color=colour, lw=1.2, ms=4, capsize=2)
         for value, count in zip(ensemble.values, ensemble.diverged.sum(1), strict=True):
             if count:
-                label = f"{count} of {REPLICATES} diverged"
+                lasted = ensemble.lasted[ensemble.values == value].mean()
+                label = f"{count} of {REPLICATES} diverged, after {lasted:.2g} s"
                 panels[3].text(1e3 * value, 0.01, label, rotation=90, fontsize=7, color=colour, va="bottom", ha="right")
     panels[3].axhline(CRUMPLED, color=MARK, lw=0.8, ls="--")
-    panels[3].text(0.3, CRUMPLED, " reported as crumpled above", fontsize=8, va="bottom")
+    panels[3].text(10, CRUMPLED, "reported as crumpled above", fontsize=8, va="top", ha="right")
     panels[3].set(ylabel="compression of the faces, r.m.s.", ylim=(0, None))
     for axes in panels:
         axes.set_xscale("symlog", linthresh=0.05)
         axes.set(xlabel="d or h [ms]", xlim=(-0.01, 15), xticks=[0, 0.1, 1, 10], xticklabels=["0", "0.1", "1", "10"])
-    panels[1].legend(frameon=False, fontsize=8)
+    panels[0].legend(frameon=False, fontsize=8, loc="lower right")
     figure.suptitle(
         "Damping, wind 4 m/s, contact off: Kelvin–Voigt d (declared), or what backward Euler does by its step h; axis "
         "linear below 0.05 ms", fontsize=10,
