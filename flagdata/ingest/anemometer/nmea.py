@@ -15,6 +15,7 @@ import numpy as np
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import possible
 from flagdata.ingest.anemometer.marks import Placed, TimeLine
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
@@ -113,18 +114,24 @@ class Nmea:
         channels = {
             name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
         }
+        found: list[Finding] = []
+        for name in channels:
+            if name.endswith(("direction", "magnetic")):
+                angle, impossible = possible.direction(name, channels[name], line)
+                channels[name] = np.mod(angle, 2 * np.pi)
+                found.extend(impossible)
         channels = {name: values for name, values in channels.items() if np.isfinite(values).any()}
         if not channels:
             raise InputError(
                 "every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix="check the sensor"
             )
-        channels, found = _platform(channels, stream, options, where)
+        channels, about = _platform(channels, stream, options, where)
         flags = np.array(stream.flags, dtype=np.uint16) | np.uint16(SampleFlag.TIME_UNSURE)
         talkers = ", ".join(sorted(stream.talkers))
         return Reading(
             time=placed.time, channels=channels, flags=flags, line=line,
             sensor=Sensor(name=f"NMEA 0183 talker {talkers}"), step=NANOSECONDS,
-            findings=(*_findings(stream, placed), *found),
+            findings=(*_findings(stream, placed), *found, *about),
         )  # fmt: skip
 
 
@@ -165,8 +172,8 @@ def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
     angle, speed, unit = number(fields[0]), number(fields[2]), SPEED_UNITS.get(fields[3])
     row: dict[str, float] = {}
     flag = SampleFlag.OK if fields[4] == "A" else SampleFlag.SENSOR_FAULT
-    if angle is not None and angle <= 360:
-        row[f"{kind}_wind_direction"] = float(np.radians(angle % 360))
+    if angle is not None:
+        row[f"{kind}_wind_direction"] = float(np.radians(angle))
     if speed is not None and unit is not None:
         row[f"{kind}_wind_speed"] = speed * UNITS[unit].scale
     else:
@@ -186,9 +193,9 @@ def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
         return
     row: dict[str, float] = {}
     if true is not None:
-        row["wind_direction"] = float(np.radians(true % 360))
+        row["wind_direction"] = float(np.radians(true))
     if magnetic is not None:
-        row["wind_direction_magnetic"] = float(np.radians(magnetic % 360))
+        row["wind_direction_magnetic"] = float(np.radians(magnetic))
     flag = SampleFlag.OK
     if speed is None:
         flag = SampleFlag.MISSING

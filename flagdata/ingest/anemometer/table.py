@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, TimeError, UnknownNameError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import possible
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
@@ -209,9 +210,14 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         layout, state = recipe.channels[name], column.state(order)
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
-        channels[name] = calibrated(column.value(order), name, layout)
-        channel_flags, found = cell_flags(name, layout, channels[name], state, line)
+        value = in_si(column.value(order), layout)
+        channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
+        if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
+            value, found = possible.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
+            findings.extend(found)
+            value = turned(value, layout)
+        channels[name] = value
         if name in WIND_CHANNELS:
             flags |= channel_flags
     for check in gathered.checks:
@@ -299,13 +305,15 @@ def instants(
     return time, found
 
 
-def calibrated(value: NDArray[np.float64], name: str, layout: ChannelLayout) -> NDArray[np.float64]:
-    """Cells of a column in SI, directions as 'from', clockwise, 0 to 2π."""
-    converted = unit(layout.unit).to_si(value * layout.gain + layout.offset)
-    if CHANNELS[name].unit != "rad" or not CHANNELS[name].frame.startswith("from"):
-        return converted
-    turned = converted + unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
-    return np.mod(turned, 2 * np.pi)
+def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
+    """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
+    return unit(layout.unit).to_si(value * layout.gain + layout.offset)
+
+
+def turned(angle: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
+    """A vane's angles [rad] as 'from', clockwise, 0 to 2π."""
+    mounted = unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
+    return np.mod(angle + mounted, 2 * np.pi)
 
 
 def cell_flags(

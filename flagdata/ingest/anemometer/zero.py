@@ -116,10 +116,11 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     speed = reading.channels.get("wind_speed")
     if speed is None or "wind_x" in reading.channels:
         return reading
-    zero = estimate(reading.time, speed)
+    possible = np.where((reading.flags & SampleFlag.OUT_OF_RANGE) != 0, np.nan, speed)
+    zero = estimate(reading.time, possible)
     shift = 0.0
     found: list[Finding] = []
-    if zero is not None and abs(zero.offset) > max(0.5 * resolution(speed), 1e-6):
+    if zero is not None and abs(zero.offset) > max(0.5 * resolution(possible), 1e-6):
         found.extend(_report(reading, zero, choice))
     if choice == "estimate":
         if zero is None:
@@ -142,7 +143,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     corrected = speed - shift
     if shift:
         # The scatter of a calm about its zero is no impossible wind: flagged as calm, its sign kept.
-        calm = (corrected < 0) & (np.abs(corrected) <= max(BAND, 4 * resolution(speed)))
+        calm = (corrected < 0) & (np.abs(corrected) <= max(BAND, 4 * resolution(possible)))
         flags = np.where(calm, flags | SampleFlag.DEAD_ZONE, flags).astype(np.uint16)
     channels = {**reading.channels, "wind_speed": corrected}
     return replace(reading, channels=channels).with_findings(tuple(found), flags=flags)
