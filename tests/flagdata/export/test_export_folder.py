@@ -21,9 +21,10 @@ from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 
 CLIPS = "kind = 'clip'"
+FILMED_FORMATS = [name for name in FORMATS if Kind.CLIP in Export(format=name).exporter().kinds]
 
 
-@pytest.mark.parametrize("name", list(FORMATS))
+@pytest.mark.parametrize("name", FILMED_FORMATS)
 def test_the_manifest_names_every_file_with_its_hash(name: str, known: Any, tmp_path: Path) -> None:
     result = export(known.lake, Export(format=name, where=CLIPS), tmp_path / "out")
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
@@ -44,7 +45,7 @@ def test_the_manifest_names_every_file_with_its_hash(name: str, known: Any, tmp_
     assert {"schema", "recipe_hash", "code_version", "options"} <= set(manifest)
 
 
-@pytest.mark.parametrize("name", list(FORMATS))
+@pytest.mark.parametrize("name", FILMED_FORMATS)
 def test_exporting_the_same_version_again_gives_the_same_bytes(name: str, known: Any, tmp_path: Path) -> None:
     manifests = []
     for folder in ("a", "b"):
@@ -53,7 +54,7 @@ def test_exporting_the_same_version_again_gives_the_same_bytes(name: str, known:
     assert manifests[0] == manifests[1]
 
 
-@pytest.mark.parametrize("name", list(FORMATS))
+@pytest.mark.parametrize("name", FILMED_FORMATS)
 def test_progress_counts_every_artifact_once(name: str, known: Any, tmp_path: Path) -> None:
     done: list[int] = []
     export(known.lake, Export(format=name, where=CLIPS), tmp_path / "out", advance=done.append)

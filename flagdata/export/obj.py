@@ -1,0 +1,57 @@
+"""Mesh sequences as folders of Wavefront OBJ files, one a frame, with the conf.json that ArcSim's tools look for."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from flagdata.errors import CorruptError
+from flagdata.export.source import Source
+from flagdata.ingest.meshes import write_folder
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
+from flagdata.schema import FRAME_RATE, Kind
+from flagdata.timebase import NANOSECONDS
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObjFolders:
+    """Folders <artifact>/NNNN_00.obj with v [m], vt [m] and f, numbered from 0, and conf.json.
+
+    An ingested ArcSim run has its own scene in conf.json; a simulated one `frame_time`, its wind, and under `flagdata`
+    its parameters and the time of its first frame.
+    """
+
+    kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.MESHES})
+
+    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+        frames = 0
+        for row in source.rows.to_pylist():
+            if row["object"] is None:
+                raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
+            source.lake.objects.check(row["object"])
+            sequence = read_meshes(source.lake.object_path(row["object"]))
+            write_folder(folder / row["artifact"], sequence, scene=_scene(sequence, row))
+            frames += len(sequence)
+            advance(1)
+        return {"sequences": len(source), "frames": frames, "units": {"v": "m", "vt": "m", "frame_time": "s"}}
+
+
+def _scene(sequence: MeshSequence | RaggedMeshSequence, row: Mapping[str, Any]) -> dict[str, Any]:
+    frame_time = 1 / (row["rate"] or FRAME_RATE)
+    own = sequence.attributes.get("scene")
+    if isinstance(own, Mapping):
+        return {**own, "frame_time": frame_time}
+    parameters: dict[str, Any] = json.loads(row["parameters"] or "{}")
+    scene: dict[str, Any] = {
+        "frame_time": frame_time,
+        "flagdata": {"first": int(sequence.time[0]) / NANOSECONDS, "seed": row["seed"], "parameters": parameters},
+    }
+    if "wind_speed" in parameters:
+        speed, toward = parameters["wind_speed"], parameters["wind_toward"]
+        velocity = [speed * math.cos(toward), speed * math.sin(toward), parameters["wind_vertical"]]
+        scene["wind"] = {"velocity": velocity}
+    return scene
