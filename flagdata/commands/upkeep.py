@@ -48,27 +48,29 @@ grace_option = click.option(
 @json_option
 @lake_option
 def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
-    """Re-hash every object; exits with 3 when one is missing or has changed."""
+    """Re-hash the catalog's files and every object; exits with 3 when one is missing or has changed."""
     from flagdata.lake import Lake
-    from flagdata.lake.health import object_names, sampled
+    from flagdata.lake.health import object_names, sampled, verify_catalog
     from flagdata.lake.health import verify as verified
 
     lake = Lake.open(lake_path)
+    findings = verify_catalog(lake)
     names = object_names(lake)
     chosen = names if sample is None else sampled(names, sample)
     with progress(len(chosen), label="verify", unit="object") as advance:
-        findings = verified(lake, chosen, advance=advance)
+        findings += verified(lake, chosen, advance=advance)
     _conclude("verify", findings, f"{len(chosen)} of {len(names)} objects re-hashed", as_json=as_json)
 
 
 @click.command()
-@click.option("--deep", is_flag=True, help="Re-hash every object, too.")
+@click.option("--deep", is_flag=True, help="Re-hash the catalog's files and every object, too.")
 @grace_option
 @json_option
 @lake_option
 def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
     """Find and explain what is wrong; exits with 3 when there is something to act on."""
     from flagdata.lake import Lake
+    from flagdata.lake.health import catalog_files
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
 
@@ -76,6 +78,7 @@ def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
     findings = examined(lake, grace=grace)
     checked = "structure checked, contents not (flagdata verify)"
     if deep:
+        findings += tuple(f for f in catalog_files(lake) if f.kind not in {known.kind for known in findings})
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
             findings += verified(lake, names, advance=advance)

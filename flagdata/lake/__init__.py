@@ -8,6 +8,7 @@ A lake is a folder of a local disk, or of a network file system that carries har
     zarr/<treehash>.zarr mesh sequences
     refs/tags/           tags, put once, never changed
     refs/branches/       branches: where each forked from its parent
+    refs/newest/         the number of the newest acknowledged commit, as a file name
     staging/             one folder a running transaction, with its lease; nothing in it is visible
 """
 

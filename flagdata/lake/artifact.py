@@ -177,12 +177,19 @@ class Artifact:
 
         Raises:
             InputError: a row whose values break the rules above.
-            CorruptError: a row whose identity is not that of its content.
+            CorruptError: a row whose identity is not that of its content, or that lacks what each row has.
         """
         names = {f.name for f in dataclasses.fields(cls)}
         values = {column: value for column, value in row.items() if column in names}
-        values["recipe"] = json.loads(row["recipe"]) if row.get("recipe") else {}
-        artifact = cls(**values)
+        try:
+            values["recipe"] = json.loads(row["recipe"]) if row.get("recipe") else {}
+            artifact = cls(**values)
+        except (TypeError, ValueError, AttributeError) as error:
+            raise CorruptError(
+                f"the row of {row['artifact']} is damaged: {error}",
+                where=f"artifact {row.get('name')!r}",
+                fix="run flagdata verify",
+            ) from None
         if artifact.id != row["artifact"]:
             raise CorruptError(
                 f"the row of {row['artifact']} describes another artifact, {artifact.id}",

@@ -9,6 +9,9 @@ checkpoint is written, which bounds the log that must be replayed. The old files
 them. (Each file costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a commit.) The library's own
 checkpoints are off: it does not flush them to the disk, so a power cut could leave one that is empty and a table that
 does not open.
+
+Each commit notes the SHA-256 of its file, which `verify` compares and `gc` relies on. (Not the checksums that Parquet
+can keep of its pages: the hash covers the whole file, footer too, costs readers nothing, and `sha256sum` prints it.)
 """
 
 from __future__ import annotations
@@ -33,6 +36,8 @@ from deltalake.transaction import AddAction, RemoveAction
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.lake.durable import flush_file, flush_folder
+from flagdata.lake.log import FILE_HASH, Log
+from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 
 P = ParamSpec("P")
@@ -45,7 +50,6 @@ _CONFIGURATION = {  # neither this package nor another's VACUUM may take what an
 }
 _INFO_PREFIX = "flagdata."
 ROW_ORDER = ("created", "start", "frame_first", "artifact")
-_LOG_NAME = "{:020d}.json"
 _TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
 _PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
@@ -100,19 +104,23 @@ def persist(attempt: Callable[[], T], *, where: Path) -> T:
 
 
 class Catalog:
-    """The Delta table under `path`; holds no open files. Rows are ordered by commit, then start, then frame."""
+    """The Delta table under `path`; holds no open files. Rows are ordered by commit, then start, then frame.
 
-    def __init__(self, path: Path) -> None:
+    `marks` is the folder where the newest version is noted, see `flagdata.lake.log`.
+    """
+
+    def __init__(self, path: Path, marks: Path) -> None:
         self.path = path
+        self._marks = marks
         self._log = path / "_delta_log"
+        self._entries = Log(self._log, marks)
         self._lock = threading.RLock()
-        self._newest = 0
         self._table: DeltaTable | None = None
         self._files: dict[str, pa.Table] = {}
         self._rows: tuple[int, pa.Table] | None = None
 
-    def __reduce__(self) -> tuple[type[Catalog], tuple[Path]]:
-        return (Catalog, (self.path,))
+    def __reduce__(self) -> tuple[type[Catalog], tuple[Path, Path]]:
+        return (Catalog, (self.path, self._marks))
 
     @_one_at_a_time
     def create(self, info: Mapping[str, str]) -> None:
@@ -128,18 +136,12 @@ class Catalog:
 
     @_one_at_a_time
     def head(self) -> int:
-        """The newest version; they have no holes and never expire, so it is enough to look for the next.
+        """The newest version.
 
         Raises:
-            CorruptError: there is no log.
+            LogGapError: an entry of the log, or all of it, is missing.
         """
-        version = max(self._newest, self._checkpoint())
-        if not (self._log / _LOG_NAME.format(version)).exists():
-            raise CorruptError("the catalog's log is gone", where=str(self._log), fix="restore it from a copy")
-        while (self._log / _LOG_NAME.format(version + 1)).exists():
-            version += 1
-        self._newest = version
-        return version
+        return self._entries.head()
 
     @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
@@ -216,16 +218,18 @@ class Catalog:
         Raises:
             CorruptError: a log entry that cannot be read.
         """
-        tracked = set()
-        for entry in self._log.glob("*.json"):
-            try:
-                actions = [json.loads(line) for line in entry.read_text().splitlines()]
-            except ValueError:
-                raise CorruptError("the log entry is damaged", where=str(entry), fix="restore it from a copy") from None
-            tracked.update(action["add"]["path"] for action in actions if "add" in action)
+        tracked = self._entries.files()
         rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked]
         entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
         return sorted([*rows, *entries])
+
+    def file_hashes(self) -> dict[Path, str | None]:
+        """Each file that some version is made of → its SHA-256 when it was written, `None` if that was not noted.
+
+        Raises:
+            CorruptError: a log entry that cannot be read.
+        """
+        return {self.path / name: digest for name, digest in self._entries.files().items()}
 
     @_one_at_a_time
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
@@ -268,7 +272,7 @@ class Catalog:
                 [added, *dropped],
                 "append",
                 table.schema(),
-                commit_properties=_properties(info),
+                commit_properties=_properties({**info, FILE_HASH.removeprefix(_INFO_PREFIX): file_hash(path)}),
                 post_commithook_properties=_HOOKS,
             )
         except CommitFailedError:
@@ -317,13 +321,15 @@ class Catalog:
 
     def _read(self, name: str) -> pa.Table:
         try:
-            return self._conform(pq.read_table(self.path / name))
+            table = self._conform(pq.read_table(self.path / name))
+            table.validate(full=True)  # text that is not UTF-8, for one
         except (OSError, pa.ArrowException) as error:
             raise CorruptError(
                 f"a file of the catalog cannot be read: {error}",
                 where=str(self.path / name),
                 fix="restore it from a copy",
             ) from None
+        return table
 
     def _conform(self, table: pa.Table) -> pa.Table:
         schema = catalog_schema()
@@ -336,16 +342,19 @@ class Catalog:
     def _evolve(self, table: DeltaTable, missing: Sequence[str]) -> None:
         schema = catalog_schema()
         fields = [deltalake.Field.from_arrow(schema.field(name).with_nullable(True)) for name in missing]
+        version = table.version() + 1
         try:
             table.alter.add_columns(
                 fields, commit_properties=_properties({"message": f"format {FORMAT_VERSION}: {', '.join(missing)}"})
             )
         except CommitFailedError:
             raise Moved from None
+        self._flush_log(version)
 
     def _flush_log(self, version: int) -> None:
-        flush_file(self._log / _LOG_NAME.format(version))
+        flush_file(self._entries.path(version))
         flush_folder(self._log)
+        self._entries.acknowledge(version)
 
 
 _HOOKS = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)

@@ -12,10 +12,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from flagdata.errors import CorruptError
+from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.leases import collecting, leases
-from flagdata.lake.marking import mark
+from flagdata.lake.marking import catalog_files, mark
 from flagdata.lake.objects import Objects, size_of
 
 
@@ -32,7 +33,7 @@ def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
     """What `collect` would delete now.
 
     Raises:
-        CorruptError: a ref cannot be read, so what it needs is unknown.
+        CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown.
     """
     with collecting(lake.staging):
         return _find(lake, grace)
@@ -42,7 +43,7 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
     """Delete the garbage and say what it was. Transactions wait while it works; none loses anything.
 
     Raises:
-        CorruptError: a ref cannot be read, so what it needs is unknown; nothing was deleted.
+        CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown; nothing was deleted.
     """
     with collecting(lake.staging), disk_errors("collecting", lake.path):
         found = _find(lake, grace)
@@ -56,8 +57,10 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
 def _find(lake: Lake, grace: timedelta) -> Garbage:
     states = leases(lake.staging)  # before the catalog: a lease that is gone by now has its rows committed
     marked = mark(lake, grace=grace)
-    if marked.findings:
-        first = marked.findings[0]
+    # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
+    damage = [f for f in (*marked.findings, *catalog_files(lake)) if f.severity is Severity.ERROR]
+    if damage:
+        first = damage[0]
         raise CorruptError(
             f"what is needed cannot be told: {first.what}", where=first.where, fix=first.fix or "run flagdata doctor"
         )

@@ -14,7 +14,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
 from flagdata.lake.leases import LeaseState, collecting, leases
-from flagdata.lake.marking import Marked, mark
+from flagdata.lake.log import LogGapError
+from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import STORES, StoredObject
 from flagdata.schema import FORMAT_VERSION
 
@@ -35,6 +36,8 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     # The catalog last: what was put by now is held by a lease seen above, or committed below, or left behind.
     marked = mark(lake, grace=grace)
     findings = [*marked.findings, *_rows(lake, marked)]
+    if LogGapError.kind in {finding.kind for finding in marked.findings}:
+        return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         held = {name for state in states if state.alive for name in state.objects}
         needed = marked.objects | held
@@ -69,17 +72,14 @@ def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] =
     return tuple(findings)
 
 
-def object_names(lake: Lake) -> list[str]:
-    """Every object that is stored or that a ref needs, sorted.
+def verify_catalog(lake: Lake) -> tuple[Finding, ...]:
+    """Re-hash the catalog's files and read every ref; a finding for what is missing, damaged, or cannot be checked."""
+    return (*mark(lake, grace=timedelta(0)).findings, *catalog_files(lake))
 
-    Raises:
-        CorruptError: a ref that cannot be read.
-    """
-    needed = {
-        name
-        for ref in ("main", *lake.refs.branches(), *lake.refs.tags())
-        for name in lake.rows(at=ref, columns=["object"])["object"].drop_null().to_pylist()
-    }
+
+def object_names(lake: Lake) -> list[str]:
+    """Every object that is stored or that a readable ref needs, sorted; `verify_catalog` tells of other refs."""
+    needed = mark(lake, grace=timedelta(0)).objects
     return sorted(needed | {stored.name for stored in lake.objects})
 
 

@@ -37,7 +37,7 @@ class Lake:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.catalog = Catalog(path / "catalog")
+        self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
         self.objects = Objects(path)
         self.refs = Refs(path / "refs")
         self.staging = path / "staging"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pyarrow as pa
 
@@ -12,6 +13,7 @@ from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lake import Lake
 from flagdata.lake.refs import MAIN
+from flagdata.provenance import file_hash
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +37,11 @@ def mark(lake: Lake, *, grace: timedelta) -> Marked:
     recent: list[pa.Table] = []
     findings: list[Finding] = []
     try:
+        lake.catalog.head()
+    except FlagdataError as error:
+        found = Finding(kind=error.kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+        return Marked(refs={}, objects=frozenset(), findings=(found,))
+    try:
         names = [MAIN, *lake.refs.branches(), *lake.refs.tags()]
     except FlagdataError as error:
         return Marked(refs={}, objects=frozenset(), findings=(_unreadable(error, error.where or "refs"),))
@@ -50,6 +57,40 @@ def mark(lake: Lake, *, grace: timedelta) -> Marked:
         findings.append(_unreadable(error, "recent versions"))
     objects = {name for table in (*refs.values(), *recent) for name in table["object"].drop_null().to_pylist()}
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
+
+
+def catalog_files(lake: Lake) -> tuple[Finding, ...]:
+    """Re-hash the files of the catalog, of all its versions: an error for each that is missing or has changed, a note
+    on how many were written before hashes were noted."""
+    try:
+        hashes = lake.catalog.file_hashes()
+    except FlagdataError as error:
+        return (
+            Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix),
+        )
+    findings = []
+    for path, noted in sorted(hashes.items()):
+        if not path.exists():
+            findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))
+        elif noted is not None and file_hash(path) != noted:
+            findings.append(_damaged("catalog-file-changed", "a file of the catalog has changed", path))
+    unchecked = list(hashes.values()).count(None)
+    if unchecked:
+        findings.append(
+            Finding(
+                kind="catalog-unhashed",
+                severity=Severity.NOTE,
+                what=f"{unchecked} of {len(hashes)} files of the catalog were written before their hashes were noted, "
+                "and are not checked",
+                where=str(lake.catalog.path),
+                count=unchecked,
+            )
+        )
+    return tuple(findings)
+
+
+def _damaged(kind: str, what: str, path: Path) -> Finding:
+    return Finding(kind=kind, severity=Severity.ERROR, what=what, where=str(path), fix="restore it from a copy")
 
 
 def _lost(head: pa.Table, known: list[str]) -> list[Finding]:

@@ -183,6 +183,20 @@ def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: 
     assert "error: dangling-row" in run("doctor").out
 
 
+def test_a_bit_that_flipped_in_the_catalog_is_told_by_verify_and_by_a_deep_doctor(
+    run: Run, lake: Lake, put_text: Put
+) -> None:
+    put_text(lake, "a")
+    path = next((lake.path / "catalog").glob("*.parquet"))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    for verb in (("verify",), ("doctor", "--deep")):
+        ended = run(*verb, "--json")
+        assert ended.code == 3
+        assert "catalog-file-changed" in {finding["kind"] for finding in ended.document["findings"]}
+
+
 def test_gc_says_what_it_deletes_and_a_dry_run_deletes_nothing(run: Run, lake: Lake) -> None:
     with lake.transaction("no row") as tx:
         path = tx.staging(".mcap")

@@ -17,7 +17,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect, garbage
 from flagdata.lake.difference import difference
-from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify
+from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify, verify_catalog
 from flagdata.lake.leases import collecting, keeping_collectors_out, leases
 from flagdata.schema import Kind
 
@@ -121,6 +121,70 @@ def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, 
     with pytest.raises(CorruptError):
         collect(lake, grace=NOW)
     assert lake.object_path(name).exists()
+
+
+@pytest.mark.parametrize("lost", [0, 2, 3])
+def test_a_lost_entry_of_the_log_is_told_by_all_and_nothing_is_collected(lake: Lake, put_text: Put, lost: int) -> None:
+    artifacts = [put_text(lake, text) for text in "abc"]
+    entry = lake.path / "catalog" / "_delta_log" / f"{lost:020d}.json"
+    content = entry.read_bytes()
+    entry.unlink()
+    fresh = Lake.open(lake.path)
+    for refused in (fresh.rows, fresh.catalog.history, lambda: put_text(fresh, "d")):
+        with pytest.raises(CorruptError, match=entry.name) as told:
+            refused()
+        assert (told.value.kind, told.value.where) == ("log-gap", str(entry))
+    assert [(f.kind, f.severity, f.where) for f in doctor(fresh, grace=NOW)] == [
+        ("log-gap", Severity.ERROR, str(entry))
+    ]
+    assert kinds(verify_catalog(fresh)) == ["log-gap"]
+    with pytest.raises(CorruptError, match=entry.name):
+        collect(fresh, grace=NOW)
+    entry.write_bytes(content)
+    assert fresh.rows()["name"].to_pylist() == ["a", "b", "c"]
+    assert all(object_of(fresh, artifact).exists() for artifact in artifacts)
+    assert doctor(fresh, grace=NOW) == ()
+
+
+def test_losing_the_last_commits_can_be_accepted_as_the_fix_says(lake: Lake, put_text: Put) -> None:
+    for text in "ab":
+        put_text(lake, text)
+    (lake.path / "catalog" / "_delta_log" / f"{2:020d}.json").unlink()
+    finding = doctor(lake, grace=NOW)[0]
+    marks = lake.path / "refs" / "newest"
+    assert finding.fix is not None
+    assert str(marks) in finding.fix
+    for path in marks.iterdir():
+        path.unlink()
+    assert lake.rows()["name"].to_pylist() == ["a"]
+    put_text(lake, "c")
+    assert lake.rows()["name"].to_pylist() == ["a", "c"]
+
+
+def flip(path: Path, position: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[position] ^= 1
+    path.write_bytes(data)
+
+
+def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_collection(
+    lake: Lake, put_text: Put
+) -> None:
+    put_text(lake, "a")
+    lake.withdraw([put_text(lake, "b").id], "so that one file is of an older version only")
+    name = abandon(lake, "orphan")
+    assert verify_catalog(lake) == ()
+    for path in (lake.path / "catalog").glob("*.parquet"):
+        for position in (4, path.stat().st_size // 2, -9):
+            flip(path, position)
+            damage = [f for f in verify_catalog(Lake.open(lake.path)) if f.kind == "catalog-file-changed"]
+            assert [(f.where, f.severity) for f in damage] == [(str(path), Severity.ERROR)]
+            with pytest.raises(CorruptError):
+                collect(Lake.open(lake.path), grace=NOW)
+            flip(path, position)
+    assert lake.object_path(name).exists()
+    path.unlink()
+    assert "catalog-file-missing" in kinds(verify_catalog(Lake.open(lake.path)))
 
 
 def test_a_branch_whose_ref_is_lost_is_told_and_its_objects_are_not_collected(lake: Lake, put_text: Put) -> None:

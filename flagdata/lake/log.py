@@ -1,0 +1,112 @@
+"""The Delta log's entries as files: that none is missing between the first and the newest one ever acknowledged.
+
+Entries are numbered from 0 without holes and never expire, so a hole is damage, and not noticed by a reader that takes
+what comes before it for all there is. The loss of the last entries leaves no hole; therefore each commit, once its
+entry is on the disk, also puts its number as a file name in the folder `refs/newest/`, outside the log, and takes lower
+ones away. The number to believe is the highest, so writers need no lock for it, and it never falls.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from flagdata.errors import CorruptError
+from flagdata.lake.durable import put_if_absent
+
+FILE_HASH = "flagdata.file_sha256"
+"""Key of a commit's info: SHA-256 of the one file of rows that the commit added."""
+
+_NAME = "{:020d}.json"
+_ENTRY = re.compile(r"(\d{20})\.json")
+_MARK = re.compile(r"\d{1,20}")
+
+
+class LogGapError(CorruptError):
+    """An entry of the catalog's log is missing, so what was committed is not known."""
+
+    kind = "log-gap"
+
+
+class Log:
+    """The entries in `folder` (`_delta_log`), and the marks of the newest acknowledged one in the folder `marks`."""
+
+    def __init__(self, folder: Path, marks: Path) -> None:
+        self.folder = folder
+        self.marks = marks
+
+    def path(self, version: int) -> Path:
+        """Where the entry of a version is."""
+        return self.folder / _NAME.format(version)
+
+    def head(self) -> int:
+        """The newest version.
+
+        Raises:
+            LogGapError: an entry before it, or one that was acknowledged after it, is missing, or there is none.
+        """
+        acknowledged = self.acknowledged()  # first: all entries up to it were on the disk before
+        present = self._present()
+        if not present:
+            raise LogGapError("the catalog's log is gone", where=str(self.folder), fix="restore it from a copy")
+        newest = max(present)
+        # A listing may leave out an entry that came while it was made, hence the second look.
+        missing = [v for v in range(max(newest, acknowledged) + 1) if v not in present and not self.path(v).exists()]
+        if missing:
+            raise self._gap(missing, newest=newest)
+        return max(newest, acknowledged)
+
+    def files(self) -> dict[str, str | None]:
+        """Name of each file that some version is made of → the SHA-256 that its commit noted, `None` in older lakes.
+
+        Raises:
+            CorruptError: an entry that cannot be read, by its name.
+        """
+        files: dict[str, str | None] = {}
+        for version in sorted(self._present()):
+            entry = self.path(version)
+            try:
+                actions = [json.loads(line) for line in entry.read_text().splitlines()]
+                info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
+                added = [action["add"]["path"] for action in actions if "add" in action]
+            except (ValueError, KeyError, TypeError):
+                raise CorruptError("the log entry is damaged", where=str(entry), fix="restore it from a copy") from None
+            for name in added:
+                files.setdefault(name, info.get(FILE_HASH))
+        return files
+
+    def acknowledge(self, version: int) -> None:
+        """Note for good that the entry of `version` is on the disk; durable when it returns."""
+        self.marks.mkdir(exist_ok=True)
+        put_if_absent(self.marks / str(version), b"")
+        for lower in self._marks():
+            if lower < version:
+                (self.marks / str(lower)).unlink(missing_ok=True)
+
+    def acknowledged(self) -> int:
+        """The newest version that was acknowledged; -1 in a lake that has had no commit since marks are made."""
+        return max(self._marks(), default=-1)
+
+    def _present(self) -> set[int]:
+        try:
+            found = [_ENTRY.fullmatch(path.name) for path in self.folder.iterdir()]
+        except FileNotFoundError:
+            return set()
+        return {int(match[1]) for match in found if match}
+
+    def _marks(self) -> list[int]:
+        try:
+            return [int(path.name) for path in self.marks.iterdir() if _MARK.fullmatch(path.name)]
+        except FileNotFoundError:
+            return []
+
+    def _gap(self, missing: list[int], *, newest: int) -> LogGapError:
+        names = ", ".join(self.path(version).name for version in missing[:3])
+        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+        fix = "restore it from a copy, and run neither gc nor another program on the lake before"
+        if missing[0] > newest:  # what is left is a whole, older catalog
+            fix += f"; to give up what was committed after version {newest} instead, empty the folder {self.marks}"
+        return LogGapError(
+            f"an entry of the catalog's log is missing: {names}{more}", where=str(self.path(missing[0])), fix=fix
+        )
