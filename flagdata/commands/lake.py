@@ -215,19 +215,42 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
 @click.argument("artifacts", nargs=-1, required=True)
 @click.option("--message", "-m", required=True, help="Why.")
 @click.option("--branch", "branch_name", default="main", show_default=True, help="The branch to take them off.")
+@click.option("--with-descendants", is_flag=True, help="And all that was made from them, directly or not.")
 @json_option
 @lake_option
-def withdraw(artifacts: tuple[str, ...], message: str, branch_name: str, as_json: bool, lake_path: str) -> None:
-    """Take artifacts off a branch. Tags keep showing them; gc frees what no ref shows any more."""
+def withdraw(
+    artifacts: tuple[str, ...],
+    message: str,
+    branch_name: str,
+    with_descendants: bool,
+    as_json: bool,
+    lake_path: str,
+) -> None:
+    """Take artifacts off a branch, a recording with its clips.
+
+    Tags keep showing them; gc frees what no ref shows any more.
+    """
     from flagdata.lake import Lake
 
     lake = Lake.open(lake_path)
-    ids = [lake.artifact(artifact, at=branch_name).id for artifact in artifacts]
-    version = lake.withdraw(ids, message, branch=branch_name)
+    named = {lake.artifact(artifact, at=branch_name).id for artifact in artifacts}
+    made = lake.descendants(named, at=branch_name) if with_descendants else frozenset()
+    done = lake.withdraw(sorted(named | made), message, branch=branch_name)
     if as_json:
-        document("withdraw", {"version": version, "withdrawn": ids})
-    else:
-        click.echo(f"version {version}: {len(set(ids))} withdrawn from {branch_name}")
+        along = {"clips": list(done.clips), "descendants": sorted(made)}
+        document("withdraw", {"version": done.version, "withdrawn": sorted(named), **along})
+        return
+    parts = [f"{len(named)} withdrawn from {branch_name}"]
+    if done.clips:
+        parts.append(f"{counted(len(done.clips), 'clip')} went along")
+    if made:
+        parts.append(f"{len(made)} made from them")
+    click.echo(f"version {done.version}: {', '.join(parts)}")
+
+
+def counted(count: int, noun: str) -> str:
+    """ "1 object", "2 objects": for nouns that take an s."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def size_text(size: float | None) -> str:

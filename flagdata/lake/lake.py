@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import cast
@@ -23,6 +23,7 @@ from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.objects import STORES, Objects
 from flagdata.lake.refs import MAIN, Refs, View
 from flagdata.lake.transaction import CommitResult, Transaction
+from flagdata.lake.withdrawal import Withdrawal, check_leaving, clips_of, descendants
 from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
@@ -217,8 +218,8 @@ class Lake:
                 transaction.add(Artifact.from_row(row))
         return cast(CommitResult, transaction.result)
 
-    def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> int:
-        """Take rows off a branch, in one commit; returns its version.
+    def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> Withdrawal:
+        """Take rows off a branch, in one commit; clips that are slices of a withdrawn recording go along with it.
 
         Tags made before keep showing them. Their objects stay for as long as a tag or another branch needs them, and
         then for the grace period of garbage collection.
@@ -228,33 +229,27 @@ class Lake:
 
         Raises:
             NotFoundError: one that was not committed on this branch itself (but maybe on its parent).
-            ConflictError: a row that stays on the branch was made from one of them.
+            ConflictError: a row that stays on the branch was made from one of them; see `descendants`.
         """
-        leaving = frozenset(artifacts)
-        info = {"message": message, "branch": branch, "withdrawn": str(len(leaving))}
+        asked = frozenset(artifacts)
 
-        def attempt() -> int:
+        def attempt() -> Withdrawal:
             head = self.catalog.head()
             shown = self.table(self.refs.view(branch, head))
-            own = set(shown.filter(pc.field("branch") == branch)["artifact"].to_pylist())
-            if leaving - own:
-                raise NotFoundError(
-                    f"{', '.join(sorted(leaving - own))} was not committed on branch {branch!r}",
-                    where=str(self.path),
-                    fix="give full ids of rows that flagdata ls shows with this branch",
-                )
-            for row in shown.select(["artifact", "name", "parents"]).to_pylist():
-                if row["artifact"] not in leaving and leaving & set(row["parents"]):
-                    raise ConflictError(
-                        f"{row['name']!r} ({row['artifact']}) was made from what would be withdrawn",
-                        where=str(self.path),
-                        fix="withdraw it too",
-                    )
+            clips = clips_of(shown, asked)
+            leaving = asked | clips
+            check_leaving(shown, leaving, branch=branch, where=str(self.path))
+            info = {"message": message, "branch": branch, "withdrawn": str(len(leaving))}
             drop = (pc.field("branch") == branch) & pc.field("artifact").isin(sorted(leaving))
-            return self.catalog.replace(self.catalog.rows(head).filter(~drop), base=head, info=info)
+            version = self.catalog.replace(self.catalog.rows(head).filter(~drop), base=head, info=info)
+            return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
 
         with disk_errors("withdrawing", self.path), keeping_collectors_out(self.staging):
             return persist(attempt, where=self.catalog.path)
+
+    def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
+        """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""
+        return descendants(self.table(self.view(at)), artifacts)
 
     def unpublished_files(self) -> list[Path]:
         """Files that a process left which died while it wrote to the catalog or the refs."""

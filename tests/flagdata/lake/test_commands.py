@@ -166,6 +166,29 @@ def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put
     assert run("diff", "v2").code == 2
 
 
+def test_withdraw_says_what_went_along(run: Run, lake: Lake, put_text: Put) -> None:
+    recording = put_text(lake, "recording")
+    with lake.transaction("a clip") as tx:
+        clip = Artifact(kind="clip", name="clip", object=recording.object, parents=(recording.id,))
+        tx.add(clip)
+    measured = put_text(lake, "measured", parents=(clip.id,))
+    refused = run("withdraw", recording.id[:10], "-m", "wrong")
+    assert refused.code == 1
+    assert "--with-descendants" in refused.err
+    done = run("withdraw", recording.id[:10], "-m", "wrong", "--with-descendants", "--json").document
+    assert (done["withdrawn"], done["descendants"]) == ([recording.id], sorted([clip.id, measured.id]))
+    assert run("ls", "--json").document["artifacts"] == []
+
+
+def test_withdraw_takes_a_recording_s_clips_without_being_told(run: Run, lake: Lake, put_text: Put) -> None:
+    recording = put_text(lake, "recording")
+    with lake.transaction("clips") as tx:
+        for i in range(200):
+            tx.add(Artifact(kind="clip", name="c", object=recording.object, parents=(recording.id,), frame_first=i))
+    done = run("withdraw", recording.id, "-m", "wrong")
+    assert (done.code, done.out) == (0, "version 3: 1 withdrawn from main, 200 clips went along\n")
+
+
 def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: Lake, put_text: Put) -> None:
     artifact = put_text(lake, "a")
     assert [run(verb).code for verb in ("verify", "doctor")] == [0, 0]

@@ -322,6 +322,42 @@ def test_withdrawal_spares_what_others_were_made_from_and_what_was_inherited(lak
     assert lake.rows(at="try").num_rows == 2
 
 
+def clips(lake: Lake, recording: Artifact, count: int) -> list[Artifact]:
+    made = [
+        Artifact(
+            kind=Kind.CLIP,
+            name=f"clip {i}",
+            object=recording.object,
+            parents=(recording.id,),
+            frame_first=30 * i,
+            frame_count=30,
+        )
+        for i in range(count)
+    ]
+    with lake.transaction("clips") as tx:
+        for clip in made:
+            tx.add(clip)
+    return made
+
+
+def test_clips_go_along_with_their_recording_and_what_was_made_from_it_otherwise_does_not(
+    lake: Lake, put_text: Put
+) -> None:
+    recording, other = put_text(lake, "recording"), put_text(lake, "other")
+    own, others = clips(lake, recording, 3), clips(lake, other, 2)
+    measured = put_text(lake, "measured", parents=(own[1].id,))
+    of_measured = put_text(lake, "of measured", parents=(measured.id, other.id))
+    with pytest.raises(ConflictError, match=r"measured.*--with-descendants"):
+        lake.withdraw([recording.id], "wrong camera")
+    assert lake.descendants([recording.id]) == {clip.id for clip in own} | {measured.id, of_measured.id}
+    done = lake.withdraw([recording.id, measured.id, of_measured.id], "wrong camera")
+    assert done.clips == tuple(sorted(clip.id for clip in own))
+    assert set(lake.rows()["artifact"].to_pylist()) == {other.id, *(clip.id for clip in others)}
+    one = lake.withdraw([others[0].id], "blurred")
+    assert (one.asked, one.clips) == ((others[0].id,), ())
+    assert doctor(lake, grace=DAY) == ()
+
+
 def test_a_difference_names_rows_and_objects_both_ways(lake: Lake, put_text: Put) -> None:
     gone = put_text(lake, "gone")
     lake.tag("before")
