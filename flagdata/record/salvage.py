@@ -26,11 +26,12 @@ from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import CompressionType, Writer
 
-from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
+from flagdata.errors import CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.record import messages
 from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, open_file, parse, read_summary
 from flagdata.record.metadata import SALVAGE
+from flagdata.record.output import Output
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso
 
@@ -66,6 +67,7 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     Raises:
         NotFoundError: no `source`.
         ConflictError: `target` exists.
+        FlagdataError: the disk refuses `target`, of which nothing is left then.
         CorruptError: `source` is not MCAP, or holds no whole message; no `target` is left then.
     """
     try:
@@ -75,10 +77,7 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     with stream:
         if stream.read(len(MAGIC)) != MAGIC:
             raise CorruptError("not an MCAP record", where=str(source), fix="check that it is the right file")
-        try:
-            out = target.open("xb")
-        except FileExistsError:
-            raise ConflictError("the target exists", where=str(target), fix="choose another path") from None
+        out = Output(target)
         try:
             with out:
                 copy = _Copy(out)

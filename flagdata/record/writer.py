@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
@@ -23,6 +22,7 @@ from flagdata.errors import ConflictError, InputError, LimitError, TimeError, Us
 from flagdata.ingest.anemometer.averaging import average
 from flagdata.record import messages
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
+from flagdata.record.output import Output
 from flagdata.record.video import VideoEncoder
 from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindSeries
@@ -78,6 +78,7 @@ class RecordWriter:
 
     Raises:
         ConflictError: `path` exists.
+        FlagdataError: the disk refuses it (no space, no permission, a file too large), now or at any later call.
     """
 
     def __init__(
@@ -96,10 +97,7 @@ class RecordWriter:
         self._chunking = chunking
         self._coding = coding
         self._video: VideoEncoder | None = None
-        try:
-            self._stream = path.open("xb")
-        except FileExistsError:
-            raise ConflictError("the record exists already", where=str(path), fix="choose another path") from None
+        self._stream = Output(path)
         self._writer = Writer(
             self._stream,
             chunk_size=CHUNK_BYTES[chunking],
@@ -124,8 +122,7 @@ class RecordWriter:
         with self._stream:
             if kind is None:
                 self._writer.finish()
-                self._stream.flush()
-                os.fsync(self._stream.fileno())
+                self._stream.sync()
 
     def frame(self, *, log_time: int, publish_time: int, timestamp: int, image: NDArray[np.uint8] | bytes) -> None:
         """Append one frame.

@@ -18,6 +18,7 @@ from flagdata.ingest.meshes.folder import read_folder
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import REPORT_SCHEMA, IngestResult, Labels, find, result_of
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.durable import disk_errors
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
@@ -85,7 +86,8 @@ def ingest_meshes(
     report = _report(sequence, found, reasons)
     with lake.transaction(f"ingest meshes {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".zarr")
-        write_meshes(staged, sequence)
+        with disk_errors("writing meshes", staged):
+            write_meshes(staged, sequence)
         artifact = Artifact(
             kind=Kind.MESHES,
             name=labels.name or source.name,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,19 @@ def test_a_single_failure_has_its_own_exit_code_and_one_document(run, tmp_path: 
     assert code == 1
     assert json.loads(out)["schema"] == "flagdata.error/1"
     assert "fix:" in err
+
+
+def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_unchanged(
+    run, lake: Lake, video: Path, small_files: Callable[[], AbstractContextManager[None]]
+) -> None:
+    with small_files():
+        code, out, err = run(video, "--json")
+    assert code == 1
+    assert "ulimit -f" in json.loads(out)["fix"]
+    assert "writing a record failed: File too large" in err
+    assert "Traceback" not in err
+    assert lake.rows().num_rows == 0
+    assert not [p for p in lake.path.rglob("*.mcap") if p.is_file()]
 
 
 @pytest.mark.parametrize(

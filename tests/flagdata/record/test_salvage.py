@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from flagdata.errors import ConflictError, CorruptError, NotFoundError
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Severity
 from flagdata.record import Chunking, Coding, Record, messages, salvage
 
@@ -208,6 +209,15 @@ def test_video_cut_off_still_decodes(tmp_path: Path, write: Callable[..., Path])
     salvage(tmp_path / "cut.mcap", tmp_path / "out.mcap")
     record = Record.open(tmp_path / "out.mcap")
     np.testing.assert_array_equal(record.frames(0, record.frame_count), whole[: record.frame_count])
+
+
+def test_a_disk_that_refuses_the_target_is_one_clear_error_and_leaves_none(
+    tmp_path: Path, sample: Path, small_files: Callable[[], AbstractContextManager[None]]
+) -> None:
+    target = tmp_path / "out.mcap"
+    with small_files(), pytest.raises(FlagdataError, match="writing a record failed: File too large"):
+        salvage(sample, target)
+    assert not target.exists()
 
 
 def test_what_cannot_be_salvaged_leaves_no_target(tmp_path: Path, sample: Path) -> None:
