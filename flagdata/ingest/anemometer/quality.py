@@ -23,6 +23,9 @@ STALE_SHORTEST = 5
 """Rows; a shorter run of repeats is never called stale."""
 STALE_SECONDS = 1.0
 """A shorter run is never called stale either: fast loggers read a smoothed signal several times over."""
+STUCK_SECONDS = 60.0
+STUCK_REPEATS = 60
+"""Wind that reads the same for as long as this [s], so many times, is stale whatever the rest of the log looks like."""
 
 
 def gaps(reading: Reading) -> tuple[Finding, ...]:
@@ -126,8 +129,9 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     n p^L (Feller, An Introduction to Probability Theory I, XIII.7). A run is stale from the L on at which that is
     `STALE_CHANCE`, if it lasts `STALE_SECONDS`. p is the share of repeats in the log, taken again without the runs
     found (three passes), and never below 5 %. It must be so with the p of the rows around the run too, since a night's
-    light wind repeats more than a day's. A sensor that is stuck most of the time shows in neither. Readings of a calm
-    (0, or dead zone) are no repeats. A recipe's `stale_after` replaces the rule.
+    light wind repeats more than a day's. A sensor that is stuck most of the time shows in neither: a run of
+    `STUCK_REPEATS` over `STUCK_SECONDS` is stale in any case. Readings of a calm (0, or dead zone) are no repeats. A
+    recipe's `stale_after` replaces the rules.
     """
     names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
     names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
@@ -164,25 +168,31 @@ def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], 
     if reading.rules.stale_after is not None:
         long = span > reading.rules.stale_after
         text = f"for longer than the {reading.rules.stale_after:g} s its recipe allows"
+        fix = None
     else:
         limit = _longest_by_chance(n, lengths)
         long = (lengths >= limit) & (span >= STALE_SECONDS)
         total = np.concatenate(([0], np.cumsum(same)))
         for index in np.flatnonzero(long):
             long[index] = lengths[index] >= _limit(n, _share_around(total, int(starts[index]), int(lengths[index])))
-        text = f"{limit} times or more, which chance and resolution do not explain"
+        stuck = (lengths >= STUCK_REPEATS) & (span >= STUCK_SECONDS)
+        long |= stuck
+        fewest = min(limit, STUCK_REPEATS) if stuck.any() else limit
+        text = f"{fewest} times or more, which chance and resolution do not explain"
+        fix = "if the air was that steady, say how long a reading may stand: stale-after in a recipe's [quality]"
     if not long.any():
         return nothing, ()
     stale_rows = np.concatenate([np.arange(s + 1, s + k + 1) for s, k in zip(starts[long], lengths[long], strict=True)])
     worst = int(np.argmax(np.where(long, lengths, 0)))
     seconds = float(reading.time[starts[worst] + lengths[worst]] - reading.time[starts[worst]]) / NANOSECONDS
-    count = len(stale_rows)
+    count, number = len(stale_rows), int(long.sum())
     return stale_rows, (
         Finding(
             kind="stale-repeats", severity=Severity.WARNING, count=count, value=seconds,
             where=f"line {reading.line[starts[long][0] + 1]}",
-            what=f"{count} rows in {int(long.sum())} runs repeat the reading before them {text}; the longest run lasts "
-            f"{seconds:.2f} s; left out of averages",
+            what=f"{count} rows in {number} {'run' if number == 1 else 'runs'} repeat the {' and '.join(names)} before "
+            f"them {text}; the longest run lasts {seconds:.2f} s; left out of averages",
+            fix=fix,
         ),
     )  # fmt: skip
 

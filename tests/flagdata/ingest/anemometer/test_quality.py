@@ -74,6 +74,24 @@ def test_a_moving_direction_shows_that_a_steady_speed_is_not_stale() -> None:
     assert not quality.stale(log)[0].any()
 
 
+@pytest.mark.parametrize("changing", [0, 5, 20])
+def test_a_sensor_frozen_for_all_or_most_of_a_log_is_stale(changing: int) -> None:
+    n = 200
+    speed = np.concatenate([gusts(20)[:changing], np.full(n - changing, 4.0)])
+    log = reading(T0 + np.arange(n) * S, wind_speed=speed, wind_direction=np.full(n, 4.7))
+    flags, found = quality.stale(log)
+    assert np.flatnonzero(flags).tolist() == list(range(changing + 1, n))
+    assert kinds(found) == ["stale-repeats"]
+    assert found[0].value == pytest.approx(n - changing - 1)
+    assert "wind_speed and wind_direction" in found[0].what
+
+
+def test_a_fast_log_that_stands_for_less_than_a_minute_is_judged_by_chance_alone() -> None:
+    # 50 s of 203 Hz at one value, as an idle sensor shows, and nothing else to compare with
+    log = reading(T0 + np.arange(10_000) * (S // 200), wind_speed=np.full(10_000, 3.0))
+    assert not quality.stale(log)[0].any()
+
+
 def test_calm_is_not_stale() -> None:
     log = reading(T0 + np.arange(300) * S, wind_speed=np.zeros(300))
     flags, found = quality.dead_zone(log)
