@@ -6,7 +6,8 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 import click
 from click.core import ParameterSource
@@ -357,14 +358,11 @@ def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult
         return _meshes(lake, source, kind, options)
     if kind.kind != "camera":
         return ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch)
-    with progress(None, label=source.name, unit="frame") as advance:
-        result = ingest_camera(
+    with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
+        return ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
-            progress=advance,
+            progress=advance, crop_picture=picture.write if options.crop_picture else None,
         )  # fmt: skip
-    if options.crop_picture is not None:
-        _write_crop_picture(lake, result, options.crop_picture)
-    return result
 
 
 def _meshes(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:
@@ -377,20 +375,43 @@ def _meshes(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestRes
         )  # fmt: skip
 
 
-def _write_crop_picture(lake: Lake, result: IngestResult, path: Path) -> None:
-    from flagdata.ingest.store import CROP_PICTURE
-    from flagdata.record import Record
+class _CropPicture:
+    """The file of --crop-picture; one that was written is removed when the block fails.
 
-    if result.artifact.object is None:
-        raise InputError("the artifact has no object", where=result.artifact.id, fix="run flagdata doctor")
-    _write(path, Record.open(lake.object_path(result.artifact.object)).attachment(CROP_PICTURE))
+    Args:
+        path: nothing is there yet; `None` where no picture was asked for.
+    """
 
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._written = False
 
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", where=str(path), fix="choose another path") from None
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None and self._written and self._path is not None:
+            self._path.unlink(missing_ok=True)
+
+    def write(self, data: bytes) -> None:
+        """Write the picture.
+
+        Raises:
+            InputError: the disk refuses it.
+        """
+        if self._path is None:
+            return
+        try:
+            with self._path.open("xb") as stream:
+                self._written = True
+                stream.write(data)
+        except OSError as error:
+            raise InputError(
+                f"the crop picture cannot be written: {error.strerror}", where=str(self._path),
+                fix="choose another path",
+            ) from None  # fmt: skip
 
 
 def _sniff(sources: Sequence[Path], options: _Given, *, given: frozenset[str], as_json: bool) -> None:
@@ -432,8 +453,8 @@ def _look(source: Path, options: _Given, *, given: frozenset[str]) -> dict[str, 
     if options.camera.camera.crop == "auto":
         proposal = propose_crop(source, options.camera.camera)
         entry["crop"] = {"box": list(proposal.box.as_tuple()), "share": proposal.share}
-        if options.crop_picture is not None:
-            _write(options.crop_picture, proposal.picture)
+        with _CropPicture(options.crop_picture) as picture:
+            picture.write(proposal.picture)
     return entry
 
 

@@ -25,7 +25,7 @@ from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.provenance import digest, recipe_hash
-from flagdata.record import Coding, RecordWriter
+from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.record.writer import ATTACHMENT_LIMIT, JPEG_QUALITY
 from flagdata.schema import CHANNELS, Kind
@@ -118,6 +118,7 @@ def ingest_camera(
     branch: str = "main",
     reasons: Sequence[str] = (),
     progress: Progress | None = None,
+    crop_picture: Callable[[bytes], object] | None = None,
 ) -> IngestResult:
     """Ingest a camera file or a folder of pictures; frames are streamed, in constant memory.
 
@@ -126,6 +127,8 @@ def ingest_camera(
     Args:
         reasons: why the file is taken to be a camera's, for the report.
         progress: called with 1 for each frame written.
+        crop_picture: called with the picture (PNG) of a crop found from motion before a frame is read; what it raises
+            leaves the lake unchanged. For an artifact that is there already, it is called with the attachment.
 
     Raises:
         FlagdataError: as `open_camera`; the lake is unchanged.
@@ -136,6 +139,8 @@ def ingest_camera(
     recipe = options.recipe()
     present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
     if present is not None:
+        if crop_picture is not None:
+            crop_picture(Record.open(lake.object_path(str(present.artifact.object))).attachment(CROP_PICTURE))
         return present
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
@@ -144,6 +149,8 @@ def ingest_camera(
             metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe)}
             with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
                 if stream.proposal is not None:
+                    if crop_picture is not None:
+                        crop_picture(stream.proposal.picture)
                     record.attach(
                         CROP_PICTURE, stream.proposal.picture, media_type="image/png", log_time=stream.info.start
                     )

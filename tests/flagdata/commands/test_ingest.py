@@ -195,6 +195,33 @@ def test_crop_auto_writes_the_picture_that_was_asked_for(run, video: Path, tmp_p
     assert (tmp_path / "crop.png").read_bytes() == (tmp_path / "seen.png").read_bytes()
 
 
+def test_a_crop_picture_that_cannot_be_written_leaves_the_lake_unchanged(
+    run, lake: Lake, video: Path, tmp_path: Path
+) -> None:
+    picture = tmp_path / "nowhere" / "crop.png"
+    code, _, err = run(video, "--crop", "auto", "--crop-picture", picture)
+    assert code == 1
+    assert "the crop picture cannot be written" in err
+    assert lake.rows().num_rows == 0
+    picture.parent.mkdir()
+    assert run(video, "--crop", "auto", "--crop-picture", picture)[0] == 0
+    again = tmp_path / "again.png"
+    assert run(video, "--crop", "auto", "--crop-picture", again)[1].startswith("already in the lake")
+    assert again.read_bytes() == picture.read_bytes()
+
+
+def test_no_crop_picture_is_left_by_an_ingest_that_failed(
+    run, lake: Lake, video: Path, tmp_path: Path, small_files: Callable[[], AbstractContextManager[None]]
+) -> None:
+    picture = tmp_path / "crop.png"
+    with small_files():
+        code, _, err = run(video, "--crop", "auto", "--crop-picture", picture)
+    assert code == 1
+    assert "File too large" in err
+    assert not picture.exists()
+    assert lake.rows().num_rows == 0
+
+
 def test_artifacts_go_to_the_branch_that_was_named(run, lake: Lake, wind_log: Path) -> None:
     lake.branch("trial")
     code, _, _ = run(wind_log, "--branch", "trial")
