@@ -93,7 +93,8 @@ class CameraOptions:
             keeps each source frame at its own stamp.
         crop: a box, "whole" (all of the image), "square" (the largest centred square) or "auto" (where the motion is).
             Any of them is scaled into the output without distortion and padded with black where it is not square.
-        exposure: exposure time [s]; half of it is added to each stamp, which then is mid-exposure. `None` when unknown.
+        exposure: exposure time [s], no longer than the true step from frame to frame; half of it is added to each
+            stamp, which then is mid-exposure. `None` when unknown.
         tolerance: largest distance of a source frame from the grid instant it may stand for [s]. `None` takes half a
             grid period or 3/4 of a source period, whichever is more, but no more than 3 grid periods.
         size: side of the square frames that come out [px].

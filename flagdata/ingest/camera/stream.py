@@ -22,6 +22,9 @@ from flagdata.ingest.camera.video import VideoSource
 from flagdata.signals import CameraInfo, Frame
 from flagdata.timebase import NANOSECONDS
 
+_EXPOSURE_SLACK = 0.01
+"""An exposure may be given rounded: 0.0167 s for 1/60 s."""
+
 
 class CameraStream:
     """A `FrameStream`: opened by `open_camera`, read once, in constant memory, closed by its `with` block.
@@ -64,6 +67,7 @@ class CameraStream:
             size=options.size,
         )  # fmt: skip
         self._period = nanoseconds(1, tick=timing.tick * timing.period, scale=self._scale)
+        self._check_exposure(str(path))
         self._shift = round((options.exposure or 0.0) / 2 * NANOSECONDS)
         self.info = CameraInfo(
             container=facts.container,
@@ -81,6 +85,23 @@ class CameraStream:
             crop=crop.as_tuple(),
         )
         self._opening += self._standing_findings()
+
+    def _check_exposure(self, where: str) -> None:
+        """Refuse an exposure that no frame of this camera can have had: it ends before the next one begins.
+
+        Where the rate varies, the longest step counts, since cameras slow down to expose for longer.
+        """
+        if self._options.exposure is None:
+            return
+        timing = self._source.facts.timing
+        interval = self._period / NANOSECONDS
+        if timing.variable:
+            interval = float(timing.longest * timing.tick * self._scale)
+        if self._options.exposure > interval * (1 + _EXPOSURE_SLACK):
+            raise UsageError(
+                f"an exposure of {self._options.exposure:g} s is longer than the {interval:.4g} s from frame to frame",
+                where=where, fix="give it in seconds (1/500 s is 0.002), or true_fps if the container lies",
+            )  # fmt: skip
 
     @property
     def findings(self) -> tuple[Finding, ...]:

@@ -160,6 +160,8 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
         (["{video}", "--crop", "auto", "--crop-picture", "{video}"], "exists"),
         (["{video}", "--crop", "1,2,3"], "not a crop"),
         (["{video}", "--rate", "fast"], "not a number"),
+        (["{video}", "--exposure", "5"], "an exposure of 5 s is longer than the 0.02 s from frame to frame"),
+        (["{video}", "--exposure", "0.0021", "--true-fps", "500"], "longer than the 0.002 s"),
         (["{video}", "--as", "vidoe"], "unknown format"),
         (["{log}", "--sensor", "generic-cvs"], "did you mean 'generic-csv'"),
         (["{log}", "--date", "1/5/2026"], "not a date"),
@@ -220,6 +222,15 @@ def test_no_crop_picture_is_left_by_an_ingest_that_failed(
     assert "File too large" in err
     assert not picture.exists()
     assert lake.rows().num_rows == 0
+
+
+def test_an_exposure_up_to_the_true_step_from_frame_to_frame_shifts_stamps_by_its_half(
+    run, lake: Lake, video: Path
+) -> None:
+    # 50 Hz in the container: 0.02 s; run at 500 Hz: 0.002 s.
+    assert run(video, "--exposure", "0.02")[0] == 0
+    assert lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000 + 10_000_000
+    assert run(video, "--exposure", "0.002", "--true-fps", "500")[0] == 0
 
 
 def test_artifacts_go_to_the_branch_that_was_named(run, lake: Lake, wind_log: Path) -> None:
