@@ -119,6 +119,12 @@ def parse(text: str, *, default: tzinfo | None = None, where: str | None = None)
     return from_wall(wall, place, where=where) + nanosecond
 
 
+def names_zone(text: str) -> bool:
+    """Whether an ISO 8601 time names its own zone; false for what is no such time."""
+    match = _ISO.match(text.strip())
+    return match is not None and match[8] is not None
+
+
 def iso(instant: int) -> str:
     """ISO 8601 text of UTC nanoseconds, with as many decimals (0, 3, 6 or 9) as it takes to be exact."""
     seconds, nanosecond = divmod(int(instant), NANOSECONDS)

@@ -46,6 +46,7 @@ class _Given:
     labels: Labels
     branch: str
     crop_picture: Path | None
+    zoned_start: bool
 
 
 @click.command()
@@ -131,8 +132,8 @@ def ingest(
 ) -> None:
     """Bring camera files, anemometer logs and mesh sequences in.
 
-    Whether a SOURCE is a camera's, an anemometer's or a folder of meshes is decided by its content. Each is one commit:
-    what fails leaves the lake as it was, and the others go on.
+    Whether a SOURCE is a camera's, an anemometer's or a folder of meshes is decided by its content, and an option goes
+    to the sources of its kind. Each is one commit: what fails leaves the lake as it was, and the others go on.
 
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
@@ -140,11 +141,12 @@ def ingest(
       flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
       flagdata ingest arcsim-output --name reference-4ms
     """
+    from flagdata.timebase import names_zone
+
     given = frozenset(
         parameter for parameter in context.params
         if context.get_parameter_source(parameter) is ParameterSource.COMMANDLINE
     )  # fmt: skip
-    _one_source_only(given, sources)
     if crop_picture is not None and crop.strip().lower() != "auto":
         raise UsageError("--crop-picture without --crop auto", where=str(crop_picture), fix="add --crop auto")
     if crop_picture is not None and crop_picture.exists():
@@ -163,6 +165,7 @@ def ingest(
         labels=_labels(name, session),
         branch=branch,
         crop_picture=crop_picture,
+        zoned_start=start is not None and names_zone(start),
     )  # fmt: skip
     if sniff:
         for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):
@@ -172,14 +175,6 @@ def ingest(
     from flagdata.lake import Lake
 
     _ingest(Lake.open(lake_path), sources, options, given=given, format_name=format_name, as_json=as_json)
-
-
-def _one_source_only(given: frozenset[str], sources: Sequence[Path]) -> None:
-    for parameter in ONE_SOURCE:
-        if parameter in given and len(sources) > 1:
-            raise UsageError(
-                f"{_option(parameter)} with {len(sources)} sources", fix="ingest the source it belongs to by itself"
-            )
 
 
 def _option(parameter: str) -> str:
@@ -205,7 +200,7 @@ def _camera_options(
     place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
     options = CameraOptions(
         start=timebase.parse(start, default=place, where="--start") if start is not None else None,
-        zone=zone_name,
+        zone=None if start is not None and timebase.names_zone(start) else zone_name,
         true_fps=true_fps,
         sequence_fps=sequence_fps,
         rate="native" if rate.strip().lower() == "native" else _number(rate, "--rate", "a rate in Hz, or native"),
@@ -292,12 +287,10 @@ def _ingest(
     kinds: list[Guess | FlagdataError] = []
     for source in sources:
         try:
-            guess = classify(source, format_name=format_name, recipe=options.wind.wind.recipe)
+            kinds.append(classify(source, format_name=format_name, recipe=options.wind.wind.recipe))
         except FlagdataError as error:
             kinds.append(error)
-        else:
-            _check_applies(guess, source, given)
-            kinds.append(guess)
+    _check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
     results: list[IngestResult] = []
     failures: list[tuple[Path, FlagdataError]] = []
     for source, kind in zip(sources, kinds, strict=True):
@@ -338,17 +331,26 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
         sys.exit(1)
 
 
-def _check_applies(guess: Guess, source: Path, given: frozenset[str]) -> None:
-    """Refuse options that mean nothing for this source, before anything is written."""
-    if guess.kind not in FOREIGN:
-        return
-    what, foreign = FOREIGN[guess.kind]
-    for parameter in foreign:
-        if parameter in given:
+def _check_applies(kinds: Sequence[str | None], options: _Given, *, given: frozenset[str]) -> None:
+    """Refuse options that mean nothing for any source, or that time or name more than one, before anything is written.
+
+    Args:
+        kinds: of the sources; one that could not be told may be any.
+    """
+    foreign = dict(FOREIGN)
+    if options.zoned_start:
+        what, parameters = foreign["camera"]
+        foreign["camera"] = (f"{what} whose --start names its zone", (*parameters, "zone"))
+    for parameter in sorted(given):
+        strange = [kind in foreign and parameter in foreign[kind][1] for kind in kinds]
+        if all(strange):
+            whose = " or ".join(sorted({foreign[kind][0] for kind in kinds if kind is not None}))
+            raise UsageError(f"{_option(parameter)} means nothing for {whose}", fix="leave it out")
+        if parameter in ONE_SOURCE and strange.count(False) > 1:
             raise UsageError(
-                f"{_option(parameter)} means nothing for {what}", where=str(source),
-                fix="leave it out, or ingest the sources it belongs to by themselves",
-            )  # fmt: skip
+                f"{_option(parameter)} with {strange.count(False)} sources",
+                fix="ingest the source it belongs to by itself",
+            )
 
 
 def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:
@@ -415,11 +417,22 @@ class _CropPicture:
 
 
 def _sniff(sources: Sequence[Path], options: _Given, *, given: frozenset[str], as_json: bool) -> None:
-    entries: list[dict[str, Any]] = []
-    failures: list[tuple[Path, FlagdataError]] = []
+    from flagdata.ingest.classify import guesses
+
+    ranked: list[tuple[Guess, ...] | FlagdataError] = []
     for source in sources:
         try:
-            entry = _look(source, options, given=given)
+            ranked.append(guesses(source))
+        except FlagdataError as error:
+            ranked.append(error)
+    _check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
+    entries: list[dict[str, Any]] = []
+    failures: list[tuple[Path, FlagdataError]] = []
+    for source, found in zip(sources, ranked, strict=True):
+        try:
+            if isinstance(found, FlagdataError):
+                raise found
+            entry = _look(source, found, options)
         except FlagdataError as error:
             if len(sources) == 1:
                 raise
@@ -435,15 +448,12 @@ def _sniff(sources: Sequence[Path], options: _Given, *, given: frozenset[str], a
     _exit_on(failures, sources)
 
 
-def _look(source: Path, options: _Given, *, given: frozenset[str]) -> dict[str, Any]:
+def _look(source: Path, ranked: Sequence[Guess], options: _Given) -> dict[str, Any]:
     """Guesses at a source; of a camera file, what its headers say and the crop if one was asked for."""
     from flagdata.ingest.camera import probe, propose_crop
-    from flagdata.ingest.classify import guesses
 
-    ranked = guesses(source)
     entry: dict[str, Any] = {"source": str(source), "guesses": [_guess(guess) for guess in ranked]}
     if ranked[0].kind != "camera":
-        _check_applies(ranked[0], source, given)
         return entry
     try:
         entry["camera"] = probe(source, options.camera.camera).as_dict()

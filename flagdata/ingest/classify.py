@@ -36,7 +36,7 @@ def classify(path: Path, *, format_name: str | None = None, recipe: str | None =
 
     Args:
         format_name: the user's word for it: "camera", "meshes" or an anemometer format; goes before the content.
-        recipe: a sensor recipe the user named, which makes it an anemometer's.
+        recipe: a sensor recipe the user named, for any source that is neither a camera's nor meshes by its content.
 
     Raises:
         InputError: something else (one mesh, a record, an archive), with what to do.
@@ -52,10 +52,11 @@ def classify(path: Path, *, format_name: str | None = None, recipe: str | None =
         if format_name not in FORMATS:
             raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, *FORMATS], where="--as")
         return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
-    if recipe is not None:
-        return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
     best = guesses(path)[0]
-    if best.kind in ("camera", "anemometer") or (best.kind == "meshes" and path.is_dir()):
+    by_content = best.kind == CAMERA or (best.kind == MESHES and path.is_dir())
+    if recipe is not None and not by_content:
+        return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
+    if by_content or best.kind == "anemometer":
         return best
     raise InputError(
         f"neither a camera file nor an anemometer log nor a folder of meshes: {'; '.join(best.reasons)}",

@@ -153,7 +153,9 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
         (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start means nothing"),
         (["{video}", "--date-order", "dmy"], "--date-order means nothing for a camera file"),
         (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
-        (["{video}", "{log}", "--zero-offset", "estimate"], "--zero-offset means nothing"),
+        (["{video}", "{log}", "--unit", "mm"], "--unit means nothing for a camera file or an anemometer log"),
+        (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
+        (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
         (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
         (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
         (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
@@ -186,6 +188,21 @@ def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(run, l
     code, _, _ = run(video, "--start", "2026-05-01T12:00:00", "--zone", "Europe/Amsterdam")
     assert code == 0
     assert lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000  # 10:00 UTC, summer time
+
+
+def test_each_option_goes_to_the_sources_of_its_kind(run, lake: Lake, video: Path, wind_log: Path) -> None:
+    code, _, err = run(
+        video, wind_log, "--sensor", "generic-csv", "--zero-offset", "report", "--zone", "Europe/Amsterdam",
+        "--start", "2026-05-01T10:00:01Z", "--exposure", "0.01", "--archive", "h264",
+    )  # fmt: skip
+    assert code == 0, err
+    recipes = {row["kind"]: json.loads(row["recipe"]) for row in lake.rows().to_pylist()}
+    assert recipes["wind"]["wind"]["zero_offset"] == "report"
+    assert recipes["wind"]["wind"]["recipe"] == "generic-csv"
+    assert recipes["wind"]["wind"]["zone"] == "Europe/Amsterdam"
+    assert recipes["camera"]["camera"]["exposure"] == 0.01
+    assert recipes["camera"]["camera"]["zone"] is None  # its start has a zone of its own
+    assert recipes["camera"]["stored"]["coding"] == "h264"
 
 
 def test_crop_auto_writes_the_picture_that_was_asked_for(run, video: Path, tmp_path: Path) -> None:
