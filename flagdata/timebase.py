@@ -6,6 +6,7 @@ impossible, the functions say so; they never pick silently.
 
 from __future__ import annotations
 
+import difflib
 import re
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from typing import Literal
@@ -42,7 +43,11 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
     try:
         return ZoneInfo(text)
     except (ZoneInfoNotFoundError, ValueError, OSError):
-        raise UnknownNameError.of("time zone", name, available_timezones(), where=where) from None
+        close = difflib.get_close_matches(text, sorted(available_timezones()), n=1)
+        raise UnknownNameError(
+            f"unknown time zone {name!r}", where=where,
+            fix=f"did you mean {close[0]!r}?" if close else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
+        ) from None  # fmt: skip
 
 
 def from_datetime(moment: datetime, *, nanosecond: int = 0) -> int:

@@ -14,7 +14,7 @@ from click.core import ParameterSource
 
 from flagdata.commands.ingest_report import print_result, print_sniffed
 from flagdata.console import document, fail, json_option, lake_option, progress, say
-from flagdata.errors import FlagdataError, InputError, UsageError
+from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
@@ -197,9 +197,13 @@ def _camera_options(
     from flagdata.ingest.store import CameraIngest
     from flagdata.record import Coding
 
-    place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+    try:
+        place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+        instant = timebase.parse(start, default=place, where="--start") if start is not None else None
+    except TimeError as error:
+        raise UsageError(error.what, where=error.where, fix=error.fix) from None
     options = CameraOptions(
-        start=timebase.parse(start, default=place, where="--start") if start is not None else None,
+        start=instant,
         zone=None if start is not None and timebase.names_zone(start) else zone_name,
         true_fps=true_fps,
         sequence_fps=sequence_fps,

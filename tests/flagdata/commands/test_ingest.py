@@ -156,6 +156,10 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
         (["{video}", "{log}", "--unit", "mm"], "--unit means nothing for a camera file or an anemometer log"),
         (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
         (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
+        (["{video}", "--start", "2026-02-30T10:00:00Z"], "day is out of range"),
+        (["{video}", "--start", "x"], "not an ISO 8601 time"),
+        (["{video}", "--zone", "+99:00"], "beyond"),
+        (["{log}", "--zone", "Qwxzy"], "give a name such as Europe/Amsterdam"),
         (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
         (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
         (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
@@ -183,7 +187,7 @@ def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
 
 def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(run, lake: Lake, video: Path) -> None:
     code, _, err = run(video, "--start", "2026-05-01T12:00:00")
-    assert code == 1
+    assert code == 2
     assert "no zone" in err
     code, _, _ = run(video, "--start", "2026-05-01T12:00:00", "--zone", "Europe/Amsterdam")
     assert code == 0
@@ -203,6 +207,12 @@ def test_each_option_goes_to_the_sources_of_its_kind(run, lake: Lake, video: Pat
     assert recipes["camera"]["camera"]["exposure"] == 0.01
     assert recipes["camera"]["camera"]["zone"] is None  # its start has a zone of its own
     assert recipes["camera"]["stored"]["coding"] == "h264"
+
+
+def test_an_unknown_zone_is_answered_in_a_line(run, video: Path) -> None:
+    code, _, err = run(video, "--zone", "Qwxzy")
+    assert code == 2
+    assert len(err) < 300
 
 
 def test_crop_auto_writes_the_picture_that_was_asked_for(run, video: Path, tmp_path: Path) -> None:
