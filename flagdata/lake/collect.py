@@ -2,7 +2,8 @@
 
 Kept are all objects that a branch or tag shows, that a row withdrawn less than the grace period ago points to, that a
 living transaction has put or looked up, and whatever is younger than the grace period. Staging folders go as soon as
-their owner is dead, which its lock proves. All files of the catalog that some version is made of stay.
+their owner is dead, which its lock proves; what lies there without a lease, after the grace period. All files of the
+catalog that some version is made of stay.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from flagdata.errors import CorruptError
 from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
-from flagdata.lake.leases import collecting, leases
+from flagdata.lake.leases import collecting, last_written, leases, unleased
 from flagdata.lake.marking import catalog_files, mark
-from flagdata.lake.objects import Objects, size_of
+from flagdata.lake.objects import Objects
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +68,17 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
     held = {name for state in states if state.alive for name in state.objects}
     limit = (datetime.now(UTC) - grace).timestamp()
     objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]
-    leftovers = [state.folder for state in states if not state.alive]
+    leftovers = [state.folder for state in states if state.leased and not state.alive]
+    leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]
     leftovers += [path for path in lake.unpublished_files() if path.stat().st_mtime <= limit]
     return Garbage(
         objects=tuple(o.name for o in objects),
         leftovers=tuple(leftovers),
-        size=sum(o.size for o in objects) + sum(size_of(path) for path in leftovers),
+        size=sum(o.size for o in objects) + sum(_bytes(path) for path in leftovers),
     )
+
+
+def _bytes(path: Path) -> int:
+    """Size of whatever it is; a link counts for itself, not for what it leads to."""
+    inside = path.rglob("*") if path.is_dir() and not path.is_symlink() else ()
+    return sum(entry.lstat().st_size for entry in (path, *inside) if entry.is_symlink() or entry.is_file())

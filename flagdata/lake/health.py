@@ -13,7 +13,7 @@ from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
-from flagdata.lake.leases import LeaseState, collecting, leases
+from flagdata.lake.leases import LeaseState, collecting, last_written, leases, unleased
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import STORES, StoredObject
@@ -33,6 +33,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     stored = list(lake.objects)
     with collecting(lake.staging):
         states = leases(lake.staging)
+        unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
     # The catalog last: what was put by now is held by a lease seen above, or committed below, or left behind.
     marked = mark(lake, grace=grace)
     findings = [*marked.findings, *_rows(lake, marked)]
@@ -43,7 +44,8 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         needed = marked.objects | held
         findings += [_orphan(found, grace) for found in stored if found.name not in needed]
     findings += _strays(lake)
-    findings += [_abandoned(state) for state in states if not state.alive]
+    findings += [_abandoned(state) for state in states if state.leased and not state.alive]
+    findings += [_unleased(path, written, grace) for path, written in unowned]
     try:
         findings += [_unpublished(path, grace) for path in lake.unpublished_files()]
     except FlagdataError as error:
@@ -158,8 +160,13 @@ def _orphan(stored: StoredObject, grace: timedelta) -> Finding:
         what=f"no row refers to {stored.name} ({stored.size} B): its ingest did not finish, or its rows were withdrawn",
         where=str(stored.path),
         value=float(stored.size),
-        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it once it is {grace} old",
+        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it {_later(grace)}",
     )
+
+
+def _later(grace: timedelta) -> str:
+    hours = grace.total_seconds() / 3600
+    return f"once it is {hours:g} h old" if hours < 48 else f"once it is {hours / 24:g} days old"
 
 
 def _strays(lake: Lake) -> list[Finding]:
@@ -171,7 +178,8 @@ def _strays(lake: Lake) -> list[Finding]:
             severity=Severity.WARNING,
             what="not an object: its name is not a content hash",
             where=str(path),
-            fix="move it away; flagdata did not put it there",
+            fix="flagdata did not put it there: move it out of the lake (and flagdata ingest it from there, if it is"
+            " a recording)",
         )
         for path in strays
     ]
@@ -189,6 +197,19 @@ def _abandoned(state: LeaseState) -> Finding:
     )
 
 
+def _unleased(path: Path, written: float, grace: timedelta) -> Finding:
+    old = written <= (datetime.now(UTC) - grace).timestamp()
+    return Finding(
+        kind="staging-unleased",
+        severity=Severity.WARNING if old else Severity.NOTE,
+        what="in staging with no lease, so that nothing tells whose it is",
+        where=str(path),
+        fix="move it away, or let flagdata gc delete it"
+        if old
+        else f"none needed; flagdata gc takes it {_later(grace)}",
+    )
+
+
 def _unpublished(path: Path, grace: timedelta) -> Finding:
     old = path.stat().st_mtime <= (datetime.now(UTC) - grace).timestamp()
     return Finding(
@@ -196,5 +217,5 @@ def _unpublished(path: Path, grace: timedelta) -> Finding:
         severity=Severity.WARNING if old else Severity.NOTE,
         what="written by a process that ended before it could publish it",
         where=str(path),
-        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it once it is {grace} old",
+        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it {_later(grace)}",
     )

@@ -34,9 +34,14 @@ _TURN = ".turn"
 
 @dataclass(frozen=True, kw_only=True)
 class LeaseState:
-    """A staging folder as another process sees it: its owner, whether it lives, and the objects it holds."""
+    """A staging folder as another process sees it: its owner, whether it lives, and the objects it holds.
+
+    Attributes:
+        leased: whether there is a lease at all; without, nothing proves that whoever made the folder is dead.
+    """
 
     folder: Path
+    leased: bool
     alive: bool
     owner: str
     objects: frozenset[str]
@@ -98,18 +103,36 @@ def collecting(staging: Path) -> Iterator[None]:
 def leases(staging: Path) -> list[LeaseState]:
     """All staging folders, by name."""
     states = []
-    for folder in sorted(p for p in staging.iterdir() if p.is_dir()):
+    for folder in sorted(p for p in staging.iterdir() if _is_folder(p)):
+        leased = True
         try:
             with (folder / _LEASE).open(encoding="utf-8") as file:
                 alive = not _try_lock(file.fileno())
                 lines = file.read().splitlines()
         except FileNotFoundError:
-            alive, lines = False, []
+            leased, alive, lines = False, False, []
             if not folder.exists():
                 continue
         owner = _owner(lines[0]) if lines else "owner unknown"
-        states.append(LeaseState(folder=folder, alive=alive, owner=owner, objects=frozenset(lines[1:])))
+        states.append(LeaseState(folder=folder, leased=leased, alive=alive, owner=owner, objects=frozenset(lines[1:])))
     return states
+
+
+def unleased(staging: Path) -> list[Path]:
+    """What lies in staging with no lease to tell whose it is: folders without one, and files, by name."""
+    folders = [state.folder for state in leases(staging) if not state.leased]
+    files = [path for path in staging.iterdir() if not _is_folder(path) and path.name not in (_COLLECT, _TURN)]
+    return sorted([*folders, *files])
+
+
+def last_written(path: Path) -> float:
+    """When a file, or anything in a folder, was written last [s since 1970]."""
+    inside = path.rglob("*") if _is_folder(path) else ()
+    return max(entry.lstat().st_mtime for entry in (path, *inside))
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
 
 
 def _owner(line: str) -> str:

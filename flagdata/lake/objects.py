@@ -170,8 +170,8 @@ class Objects:
 
     @staticmethod
     def remove(path: Path) -> None:
-        """Delete a file or folder of the store or of staging."""
-        if path.is_dir():
+        """Delete a file or folder of the store or of staging; of a link, the link."""
+        if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
             path.unlink(missing_ok=True)

@@ -200,7 +200,9 @@ def test_a_branch_whose_ref_is_lost_is_told_and_its_objects_are_not_collected(la
 def test_files_that_are_no_objects_are_strays_and_are_not_deleted(lake: Lake) -> None:
     stray = lake.path / "mcap" / "holiday.mcap"
     stray.write_text("mine")
-    assert kinds(doctor(lake)) == ["stray-file"]
+    findings = doctor(lake)
+    assert kinds(findings) == ["stray-file"]
+    assert "move it out of the lake" in str(findings[0].fix)
     collect(lake, grace=NOW)
     assert stray.exists()
 
@@ -394,6 +396,39 @@ def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake
     assert collected.objects == (orphan,)  # the dead hold nothing
     assert doctor(lake, grace=NOW) == ()
     assert lake.rows().num_rows == 1
+
+
+def test_what_lies_in_staging_without_a_lease_is_told_and_collected_after_the_grace_period(lake: Lake) -> None:
+    file, folder = lake.staging / "notes.txt", lake.staging / "mine"
+    folder.mkdir()
+    for path in (file, folder / "inner.mcap"):
+        path.write_text("mine")
+    young = doctor(lake, grace=DAY)
+    assert [(f.kind, f.severity, f.where) for f in young] == [
+        ("staging-unleased", Severity.NOTE, str(path)) for path in (folder, file)
+    ]
+    assert {f.fix for f in young} == {"none needed; flagdata gc takes it once it is 24 h old"}
+    assert collect(lake, grace=DAY).leftovers == ()
+    age(file, timedelta(days=3))
+    age(folder, timedelta(days=3))
+    assert not is_healthy(doctor(lake, grace=DAY))
+    assert collect(lake, grace=DAY).leftovers == (file,)  # in the folder something is young
+    age(folder / "inner.mcap", timedelta(days=3))
+    age(folder, timedelta(days=3))
+    assert collect(lake, grace=DAY).leftovers == (folder,)
+    assert doctor(lake, grace=NOW) == ()
+
+
+def test_a_link_in_staging_is_deleted_and_what_it_leads_to_is_not(lake: Lake, tmp_path: Path) -> None:
+    target = tmp_path / "mine"
+    target.mkdir()
+    (target / "thesis.txt").write_text("mine")
+    link = lake.staging / "link"
+    link.symlink_to(target)
+    assert kinds(doctor(lake, grace=NOW)) == ["staging-unleased"]
+    assert collect(lake, grace=NOW).leftovers == (link,)
+    assert (target / "thesis.txt").read_text() == "mine"
+    assert doctor(lake, grace=NOW) == ()
 
 
 def test_a_sample_is_of_the_size_asked_for_and_never_larger_than_all() -> None:
