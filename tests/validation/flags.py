@@ -84,8 +84,8 @@ def _sections(result: dict[str, Any], pictures: dict[str, Path]) -> list[Section
     return [
         Section(
             title="Shapes", pictures=[pictures["shapes"]],
-            text="The flag hangs in light wind and streams above the speed at which the wind carries its weight, "
-            f"{result['broadside_speed']:.2f} m/s for this cloth spread across the wind.",
+            text="The flag hangs in light wind and streams in strong. The scale between them is the wind whose push on "
+            f"the cloth, spread across it, equals its weight: {result['broadside_speed']:.2f} m/s here.",
         ),
         Section(
             title="Against the wind", pictures=[pictures["wind"], pictures["energy"]],

@@ -227,9 +227,9 @@ def _draw_elastica(axes: Axes, result: dict[str, Any]) -> None:
         axes.semilogx(loads, exact[:, column], color=THEORY, lw=1.2, label="elastica" if not column else None)
         tips = np.array(result["tips"])[:, column]
         axes.semilogx(result["load"], tips, style, color=MEASURED, mfc="none", ms=5, label=f"simulated, {label}")
-    axes.set(xlabel="load ρₛ g L³/B", ylabel="tip of the strip / length")
+    axes.set(xlabel="load ρₛ g L³/B", ylabel="tip of the strip / length", ylim=(0, 1.55))
     axes.set_title(f"3  heavy elastica, 24 cells:\nwithin {100 * result['largest_error']:.2f} % of L", fontsize=9)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
 
 
 def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
@@ -251,7 +251,7 @@ def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
     errors.text(size[1], 0.4 * table[-1, 0] * (size[1] / size[-1]) ** 2, "order 2", color=THEORY, fontsize=8, va="top")
     last = ", ".join(f"{mode[-1]:.2f}" for mode in result["rates"])
     errors.axhline(result["slowing"], color=MARK, lw=0.8, ls=":")
-    errors.text(size[-1], result["slowing"], "slowing by its static stretch", fontsize=7, va="bottom", color=MARK)
+    errors.text(size[-2], result["slowing"], "slowing by its static stretch", fontsize=7, va="top", color=MARK)
     errors.set(xlabel="cell / length", ylabel="frequency error, relative", xlim=(size[-1] / 1.2, size[0] * 1.5))
     errors.set_title(f"4  pendulum modes\nlast orders {last}", fontsize=9)
     _mark_sizes(errors, size)

@@ -162,8 +162,8 @@ def _draw_map(axes: Axes, flags: Ensemble) -> None:
     image = axes.pcolormesh(
         frequency[1:], flags.values, np.log10(np.maximum(rows, 1e-9)), cmap="magma", vmin=-6, vmax=-1, shading="nearest"
     )
-    axes.plot(flags.values / (2 * _LENGTH), flags.values, ":", color="cyan", lw=1.4)
-    axes.text(0.5 * 5 / _LENGTH, 5.1, "f L/U = ½ ", color="cyan", fontsize=9, ha="right")
+    axes.plot(flags.values / (2 * _LENGTH), flags.values, ":", color="black", lw=1.4)
+    axes.text(0.5 * 5 / _LENGTH, 5.1, "f L/U = ½ ", color="black", fontsize=9, ha="right")
     axes.set(xscale="log", xlabel="frequency [Hz]", ylabel="wind speed [m/s]", title="upper fly corner across the wind")
     axes.title.set_fontsize(9)
     axes.figure.colorbar(image, ax=axes, label="log₁₀ of frequency × density / m²")
