@@ -72,7 +72,10 @@ def judge(table: PairTable, tolerance: Tolerance, *, superseded: Mapping[str, st
         ),
         (
             np.isnan(table.wind_sigma) & ~np.isnan(table.wind) & ~np.isnan(table.clock_sigma),
-            lambda k: "too few wind samples to know the uncertainty of their mean",
+            lambda k: (
+                "the uncertainty of the mean wind is unknown: too few wind samples, or a sensor of unknown accuracy "
+                "that always reads the same"
+            ),
         ),
     )
     bad = np.any([mask for mask, _ in checks], axis=0)

@@ -5,14 +5,16 @@ earlier does not, and nothing after the end does. A sample speaks for the time s
 irregular logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
 
 The uncertainty is that of the mean wind of such minutes, of which the window is one draw: the standard error of a
-correlated series, the instrument and the clock, all independent. Not included: the response time of the sensor, its
+correlated series, the instrument and the clock, all independent. Of an instrument whose accuracy and resolution nobody
+knows, the step seen in its readings is the least that can be said; where not even that is seen, since every reading is
+the same, the uncertainty is unknown and never 0. Not included: the response time of the sensor, its
 distance from the flag, and what it missed while it gave no sample; coverage and staleness speak of that.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +39,8 @@ class WindTruth:
         wind: mean speed over the window [m/s], NaN when no usable sample is in it.
         sigma: standard uncertainty [m/s], the root sum of squares of the parts below; NaN when a part cannot be known.
         sigma_mean: standard error of the mean of a correlated series [m/s]; NaN with fewer than two blocks.
-        sigma_sensor: accuracy of the instrument, its resolution and its dead zone; does not shrink by averaging [m/s].
+        sigma_sensor: accuracy of the instrument, its resolution and its dead zone; does not shrink by averaging [m/s];
+            NaN where nothing is known of them and the readings show no step.
         sigma_clock: what the uncertainty of the common clock does to the mean [m/s].
         coverage: share of the window that usable samples speak for, 0 to 1.
         staleness: age of the newest usable sample at the end [s]; infinite when there is none before the end.
@@ -167,7 +170,7 @@ class TruthSeries:
         correlation = _correlation_time(self._blocks(past, last, begin))
         sigma_mean = _standard_error(self._blocks(first, last, begin), correlation)
         dead = float(np.average(self.dead[first:last], weights=held))
-        sigma_sensor = _sensor_sigma(self.sensor, wind, dead)
+        sigma_sensor = _sensor_sigma(self._known(first, last, past), wind, dead)
         sigma_clock = clock_sigma * self._slope(first, last, begin, end, clock_sigma)
         coverage = min(1.0, float(inside.sum()) / window)
         flags = {
@@ -175,7 +178,7 @@ class TruthSeries:
             "wind-stale": staleness > STALE,
             "sensor-accuracy-unknown": self.sensor.accuracy is None and self.sensor.accuracy_relative is None,
             "wind-dead-zone": dead > 0,
-            "wind-sigma-unknown": math.isnan(sigma_mean),
+            "wind-sigma-unknown": math.isnan(sigma_mean) or math.isnan(sigma_sensor),
         }
         return WindTruth(
             wind=wind,
@@ -188,6 +191,17 @@ class TruthSeries:
             count=last - first,
             flags=tuple(sorted(name for name, holds in flags.items() if holds)),
         )
+
+    def _known(self, first: int, last: int, past: int) -> Sensor:
+        """The instrument, with the step seen in its readings for a resolution where nobody knows its errors.
+
+        The step is that of the window, or, where nothing changes in it, of the history from `past` on.
+        """
+        sensor = self.sensor
+        if not (sensor.accuracy is None and sensor.accuracy_relative is None and sensor.resolution is None):
+            return sensor
+        step = _smallest_step(self.speed[first:last]) or _smallest_step(self.speed[past:last])
+        return replace(sensor, resolution=step or None)
 
     def _blocks(self, first: int, last: int, begin: int) -> Series:
         """Means over blocks of a second (or of the sampling period, if longer) from `begin`; empty ones are absent."""
@@ -217,11 +231,22 @@ class TruthSeries:
 
 
 def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
-    """Accuracy, a rectangular resolution step, and for the share `dead` a rectangular true speed in [0, threshold]."""
+    """Accuracy, a rectangular resolution step, and for the share `dead` a rectangular true speed in [0, threshold].
+
+    NaN where neither accuracy nor resolution is known.
+    """
+    if sensor.accuracy is None and sensor.accuracy_relative is None and sensor.resolution is None:
+        return math.nan
     accuracy = max(sensor.accuracy or 0.0, (sensor.accuracy_relative or 0.0) * wind)
     step = (sensor.resolution or 0.0) / math.sqrt(12)
     hidden = dead * (sensor.threshold or 0.0) / math.sqrt(3)
     return math.hypot(accuracy, step, hidden)
+
+
+def _smallest_step(speed: Series) -> float:
+    """Smallest difference between readings (n,) that occur [m/s], to a nanometre a second; 0 when all are equal."""
+    levels = np.unique(np.round(speed, 9))
+    return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
 
 
 def _correlation_time(values: Series) -> float:

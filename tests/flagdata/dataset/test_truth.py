@@ -31,7 +31,7 @@ def truth(wind, end, **options):
 
 
 def test_constant_wind_is_its_own_mean_with_no_scatter():
-    result = truth(series(np.arange(1, 121), 5.0), 100)
+    result = truth(series(np.arange(1, 121), 5.0, sensor=Sensor(name="exact", accuracy=0.0)), 100)
     assert result.wind == 5.0
     assert result.sigma == 0.0
     assert (result.coverage, result.staleness, result.count) == (1.0, 0.0, 60)
@@ -60,8 +60,9 @@ def test_window_is_open_at_its_start_and_closed_at_its_end():
 
 def test_nothing_after_the_end_is_used():
     seconds = np.arange(0, 121)
-    calm = truth(series(seconds, 3.0), 60)
-    storm = truth(series(seconds, np.where(seconds > 60, 30.0, 3.0)), 60)
+    speed = 3.0 + 0.5 * (seconds % 3)
+    calm = truth(series(seconds, speed), 60)
+    storm = truth(series(seconds, np.where(seconds > 60, 30.01, speed)), 60)
     assert calm == storm
 
 
@@ -179,6 +180,30 @@ def test_unknown_accuracy_is_said():
     assert "sensor-accuracy-unknown" in truth(series(np.arange(0, 121), 5.0), 100).flags
     known = Sensor(name="cup", accuracy=0.1)
     assert truth(series(np.arange(0, 121), 5.0, sensor=known), 100).flags == ()
+
+
+def test_of_an_unknown_sensor_the_step_of_its_readings_is_the_least_uncertainty():
+    seconds = np.arange(-300, 121)
+    # Rounded to 0.5 m/s and steady in the minute before 100 s: the scatter of the mean is 0 there.
+    result = truth(series(seconds, np.where(seconds < 0, 3.5 + 0.5 * (seconds % 2), 4.5)), 100)
+    assert result.sigma_mean == 0.0
+    assert result.sigma == pytest.approx(0.5 / math.sqrt(12), rel=1e-12)
+    assert result.flags == ("sensor-accuracy-unknown",)
+
+
+def test_the_step_comes_on_top_of_the_scatter_of_the_mean():
+    seconds = np.arange(0, 121)
+    result = truth(series(seconds, 4 + 0.1 * (seconds % 2)), 100)
+    assert result.sigma_sensor == pytest.approx(0.1 / math.sqrt(12), rel=1e-9)
+    assert result.sigma == pytest.approx(math.hypot(result.sigma_mean, result.sigma_sensor), rel=1e-12)
+
+
+@pytest.mark.parametrize("speed", [0.0, 4.0])
+def test_an_unknown_sensor_that_always_reads_the_same_has_no_known_uncertainty(speed):
+    result = truth(series(np.arange(0, 121), speed), 100)
+    assert result.wind == speed
+    assert math.isnan(result.sigma)
+    assert result.flags == ("sensor-accuracy-unknown", "wind-sigma-unknown")
 
 
 @pytest.mark.parametrize(
