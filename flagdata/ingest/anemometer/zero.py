@@ -22,6 +22,8 @@ BAND = 0.05
 """Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more."""
 LARGEST = 1.0
 """An idle reading beyond this is no zero offset but steady wind [m/s]."""
+LEAST_JUMP = 0.1
+"""A smaller step out of idling is no dead zone [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +112,9 @@ def check(reading: Reading, asked: ZeroOffset | None, *, where: str) -> None:
 def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     """Report the zero offset of `wind_speed`, and subtract it where `choice` says so.
 
+    A jump out of the calm that was found becomes the sensor's threshold, where its recipe states none and calm reads
+    about 0 after the shift: the uncertainty of a calm then tells what it may hide.
+
     Raises:
         RefusedError: an estimate was asked for and the log has no idle stretch.
     """
@@ -120,8 +125,6 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     zero = estimate(reading.time, possible)
     shift = 0.0
     found: list[Finding] = []
-    if zero is not None and abs(zero.offset) > max(0.5 * resolution(possible), 1e-6):
-        found.extend(_report(reading, zero, choice))
     if choice == "estimate":
         if zero is None:
             raise RefusedError(
@@ -137,6 +140,16 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
                 what=f"a zero offset of {shift:+.3f} m/s was given and subtracted from every speed",
             )
         )  # fmt: skip
+    sensor = reading.sensor
+    if zero is not None and abs(zero.offset) > max(0.5 * resolution(possible), 1e-6):
+        settled = abs(zero.offset - shift) <= BAND
+        jumped = zero.exits > 0 and np.isfinite(zero.jump) and zero.jump > LEAST_JUMP
+        found.append(_about_zero(reading, zero, shift, settled=settled))
+        if jumped:
+            found.append(_about_jump(reading, zero))
+        if jumped and settled and sensor.threshold is None:
+            # Calm now reads about 0, and what blows below the jump reads as calm: that is a threshold.
+            sensor = replace(sensor, threshold=zero.jump)
     flags = reading.flags
     if zero is not None and shift and abs(zero.offset - shift) <= BAND:
         flags = np.where(zero.idle, flags | SampleFlag.DEAD_ZONE, flags).astype(np.uint16)
@@ -146,30 +159,34 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         calm = (corrected < 0) & (np.abs(corrected) <= max(BAND, 4 * resolution(possible)))
         flags = np.where(calm, flags | SampleFlag.DEAD_ZONE, flags).astype(np.uint16)
     channels = {**reading.channels, "wind_speed": corrected}
-    return replace(reading, channels=channels).with_findings(tuple(found), flags=flags)
+    return replace(reading, channels=channels, sensor=sensor).with_findings(tuple(found), flags=flags)
 
 
-def _report(reading: Reading, zero: Zero, choice: ZeroOffset) -> list[Finding]:
-    done = "subtracted" if choice == "estimate" else "not subtracted"
-    fix = None if choice == "estimate" else f"subtract it: --zero-offset estimate, or --zero-offset {zero.offset:.3g}"
-    first = f"line {reading.line[np.argmax(zero.idle)]}"
-    found = [
-        Finding(
-            kind="zero-offset", severity=Severity.NOTE if choice == "estimate" else Severity.WARNING,
-            count=int(zero.idle.sum()), value=zero.offset, where=first,
-            what=f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}",
-            fix=fix,
-        )
-    ]  # fmt: skip
-    if zero.exits and np.isfinite(zero.jump) and zero.jump > 0.1:
-        leave = np.flatnonzero(zero.idle[:-1] & ~zero.idle[1:])
-        found.append(
-            Finding(
-                kind="dead-zone-jump", severity=Severity.WARNING, count=zero.exits, value=zero.jump,
-                where=f"line {reading.line[leave[0] + 1]}",
-                what=f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({zero.exits} times): lower speeds "
-                f"read as calm",
-                fix="do not use winds below that jump",
-            )
-        )  # fmt: skip
-    return found
+def _about_zero(reading: Reading, zero: Zero, shift: float, *, settled: bool) -> Finding:
+    """What calm air reads, and whether the `shift` subtracted [m/s] has settled it."""
+    fix = None
+    if settled:
+        done = "subtracted"
+    elif shift:
+        done = f"{shift:+.3f} m/s was subtracted, which leaves {zero.offset - shift:+.3f} m/s in calm air"
+        fix = f"correct it: --zero-offset estimate, or --zero-offset {zero.offset:.3g}"
+    else:
+        done = "not subtracted"
+        fix = f"subtract it: --zero-offset estimate, or --zero-offset {zero.offset:.3g}"
+    return Finding(
+        kind="zero-offset", severity=Severity.NOTE if settled else Severity.WARNING, count=int(zero.idle.sum()),
+        value=zero.offset, where=f"line {reading.line[np.argmax(zero.idle)]}",
+        what=f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}",
+        fix=fix,
+    )  # fmt: skip
+
+
+def _about_jump(reading: Reading, zero: Zero) -> Finding:
+    leave = np.flatnonzero(zero.idle[:-1] & ~zero.idle[1:])
+    return Finding(
+        kind="dead-zone-jump", severity=Severity.WARNING, count=zero.exits, value=zero.jump,
+        where=f"line {reading.line[leave[0] + 1]}",
+        what=f"the reading leaves calm in a jump of {zero.jump:.2f} m/s "
+        f"({zero.exits} {'time' if zero.exits == 1 else 'times'}): lower speeds read as calm",
+        fix="do not use winds below that jump",
+    )  # fmt: skip

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from flagdata.dataset.truth import TruthSeries
 from flagdata.errors import UsageError
+from flagdata.findings import Severity
 from flagdata.ingest.anemometer import quality, zero
 from flagdata.ingest.anemometer.order import in_order
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import QualityRules
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, WindLog
+from flagdata.signals import Sensor, WindLog, WindSeries
 
 S = 1_000_000_000
 T0 = 1_777_636_800 * S
@@ -177,6 +180,49 @@ def test_a_zero_offset_is_reported_but_not_applied_unless_asked() -> None:
     done = zero.settle(log, "estimate")
     assert done.channels["wind_speed"] == pytest.approx(speed - 0.3)
     assert bool(np.all(done.flags[:2000] == SampleFlag.DEAD_ZONE))
+
+
+def idle_then_gusts(offset: float) -> Reading:
+    """20 s idle at `offset`, then gusts that begin 0.4 m/s above it; a hundred rows a second."""
+    speed = np.concatenate([np.full(2000, offset), [offset + 0.4], offset + gusts(1999)])
+    return reading(T0 + np.arange(4000) * (S // 100), wind_speed=speed)
+
+
+@pytest.mark.parametrize("choice", [-0.35, -0.34, "estimate"])
+def test_a_zero_offset_that_was_subtracted_is_no_warning(choice: float | str) -> None:
+    done = zero.settle(idle_then_gusts(-0.35), choice)  # type: ignore[arg-type]
+    (about,) = [f for f in done.findings if f.kind == "zero-offset"]
+    assert about.severity is Severity.NOTE
+    assert about.fix is None
+    assert "not subtracted" not in about.what
+    assert about.value == pytest.approx(-0.35)
+
+
+def test_a_zero_offset_that_the_one_given_does_not_settle_is_said_with_what_is_left() -> None:
+    done = zero.settle(idle_then_gusts(-0.35), -0.1)
+    (about,) = [f for f in done.findings if f.kind == "zero-offset"]
+    assert about.severity is Severity.WARNING
+    assert "-0.250 m/s in calm air" in about.what
+
+
+@pytest.mark.parametrize("choice", [-0.35, "estimate"])
+def test_the_jump_out_of_a_calm_is_the_threshold_of_a_sensor_that_states_none(choice: float | str) -> None:
+    done = zero.settle(idle_then_gusts(-0.35), choice)  # type: ignore[arg-type]
+    assert done.sensor.threshold == pytest.approx(0.4)
+    # a minute of such a calm may hide anything below the jump: a rectangular 0 to 0.4 m/s
+    calm = done.take(np.arange(2000))
+    sensor = replace(calm.sensor, accuracy=0.0)
+    series = WindSeries(time=calm.time, channels=calm.channels, flags=calm.flags, sensor=sensor)
+    assert TruthSeries.of(series).before(int(calm.time[-1])).sigma_sensor == pytest.approx(0.4 / np.sqrt(3))
+
+
+def test_a_threshold_that_the_recipe_states_stays() -> None:
+    log = replace(idle_then_gusts(-0.35), sensor=Sensor(name="cup", threshold=0.6))
+    assert zero.settle(log, "estimate").sensor.threshold == 0.6
+
+
+def test_a_calm_that_still_reads_below_zero_gives_no_threshold() -> None:
+    assert zero.settle(idle_then_gusts(-0.35), "report").sensor.threshold is None
 
 
 def test_a_flutter_well_below_the_nyquist_limit_is_not_flagged() -> None:
