@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import possible, quality, zero
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.order import in_order
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.sniff import recognise
 from flagdata.ingest.anemometer.sniffing import SURE
 from flagdata.ingest.anemometer.source import TextFile, open_text
+from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
 
 
@@ -57,13 +58,42 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     for check in (quality.faults, quality.negative, quality.dead_zone, quality.stale, quality.at_nyquist):
         reading = _apply(reading, check)
     findings = (*reading.findings, *quality.gaps(reading))
-    if not any(np.isfinite(values).any() for values in reading.channels.values()):
-        raise InputError("not one value can be used", where=f"{path}, line {reading.line[0]}", fix="check the sensor")
+    findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
         host_time=reading.host_time,
     )  # fmt: skip
     return WindLog(series=series, format=name, findings=findings, reasons=reasons)
+
+
+def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
+    """A finding where no wind can be used, but the log measured something else.
+
+    Raises:
+        InputError: nothing else either; a direction alone is none.
+    """
+    winds = [values for name, values in reading.channels.items() if name in WIND_CHANNELS]
+    usable = (reading.flags & UNUSABLE) == 0
+    if any((np.isfinite(values) & usable).any() for values in winds):
+        return ()
+    others = sorted(
+        name
+        for name, values in reading.channels.items()
+        if name not in WIND_CHANNELS and CHANNELS[name].unit != "rad" and np.isfinite(values).any()
+    )
+    counts = ((flag, int(((reading.flags & flag) != 0).sum())) for flag in UNUSABLE)
+    why = ", ".join(f"{count} {flag.name.lower().replace('_', ' ')}" for flag, count in counts if count and flag.name)
+    what = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
+    if not others:
+        fix = "check the sensor and the recipe's columns; if calm air reads below zero, give --zero-offset"
+        raise InputError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
+    text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
+    return (
+        Finding(
+            kind="no-usable-wind", severity=Severity.ERROR, count=len(reading.time), where=f"line {reading.line[0]}",
+            what=text, fix="check the sensor and the recipe's columns",
+        ),
+    )  # fmt: skip
 
 
 def _apply(reading: Reading, check: Callable[[Reading], tuple[NDArray[np.uint16], tuple[Finding, ...]]]) -> Reading:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS
 
@@ -144,6 +144,8 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     for kind in np.unique(held[held > 0]).tolist():
         rows = np.flatnonzero(held == kind)
         present = [name for bit, name in enumerate(names) if kind >> bit & 1]
+        if WIND_CHANNELS.isdisjoint(present):
+            continue  # a direction without a speed is no reading of the wind
         repeats, finding = _stale_rows(reading.take(rows), present)
         flags[rows[repeats]] = SampleFlag.STALE
         found.extend(finding)

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from flagdata.dataset.truth import TruthSeries
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.findings import Severity
 from flagdata.ingest.anemometer import quality, zero
 from flagdata.ingest.anemometer.order import in_order
@@ -296,3 +296,29 @@ def test_sonic_components_give_speed_and_direction(read: Read) -> None:
     log = read(head + rows, zone="UTC", azimuth=np.pi / 2)
     assert log.series.channels["wind_speed"] == pytest.approx([5.0, 5.0])
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90 - 53.130102, 90.0])
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "why"),
+    [
+        ("wind_speed", "", "200 missing"),
+        ("wind_speed,wind_direction", ",270", "200 missing"),
+        ("wind_speed", "1e30", "200 out of range"),
+        ("wind_speed", "-0.3", "200 out of range"),
+    ],
+)
+def test_a_log_without_one_usable_wind_is_refused(read: Read, header: str, row: str, why: str) -> None:
+    rows = "".join(f"2026-05-01T12:{i // 60:02d}:{i % 60:02d}Z,{row}\n" for i in range(200))
+    with pytest.raises(
+        InputError, match=rf"nothing to measure: not one value of the wind in 200 rows .*\({why}\)"
+    ) as caught:
+        read(f"time,{header}\n{rows}")
+    assert caught.value.fix
+
+
+def test_a_log_without_one_usable_wind_is_kept_for_what_else_it_measured(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:{i // 60:02d}:{i % 60:02d}Z,,{20 + i % 3}\n" for i in range(200))
+    log = read(f"time,wind_speed,air_temperature\n{rows}")
+    (finding,) = [f for f in log.findings if f.kind == "no-usable-wind"]
+    assert (finding.severity, finding.count) == (Severity.ERROR, 200)
+    assert "air_temperature" in finding.what

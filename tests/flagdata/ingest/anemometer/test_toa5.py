@@ -54,7 +54,7 @@ def test_usual_column_names_find_their_channel(
     read: Read, name: str, unit: str, channel: str, value: float, si: float
 ) -> None:
     columns = [(name, unit, "Smp")] if channel == "wind_speed" else [WS, (name, unit, "Smp")]
-    log = read(table(columns, [[value] * len(columns)] * 3), zone="UTC")
+    log = read(table(columns, [[5, value][-len(columns) :]] * 3), zone="UTC")
     assert log.series.channels[channel] == pytest.approx([si] * 3)
 
 
