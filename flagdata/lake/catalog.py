@@ -36,7 +36,7 @@ from deltalake.transaction import AddAction, RemoveAction
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.lake.durable import flush_file, flush_folder
-from flagdata.lake.log import FILE_HASH, Log
+from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 
@@ -231,6 +231,14 @@ class Catalog:
         """
         return {self.path / name: digest for name, digest in self._entries.files().items()}
 
+    def changed_entries(self) -> list[Path]:
+        """Entries of the log whose bytes are not those that were committed, as far as that was noted.
+
+        Raises:
+            CorruptError: a log entry that cannot be read.
+        """
+        return self._entries.changed()
+
     @_one_at_a_time
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
         """One entry a version, newest first: version, timestamp (UTC ms), operation and what the writer said of it.
@@ -272,7 +280,7 @@ class Catalog:
                 [added, *dropped],
                 "append",
                 table.schema(),
-                commit_properties=_properties({**info, FILE_HASH.removeprefix(_INFO_PREFIX): file_hash(path)}),
+                commit_properties=_properties({**info, **self._hashes(version, path)}),
                 post_commithook_properties=_HOOKS,
             )
         except CommitFailedError:
@@ -281,6 +289,10 @@ class Catalog:
         except DeltaError as error:
             raise OSError(str(error)) from error
         self._flush_log(version)
+
+    def _hashes(self, version: int, path: Path) -> dict[str, str]:
+        hashes = {FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1))}
+        return {key.removeprefix(_INFO_PREFIX): digest for key, digest in hashes.items()}
 
     def _checkpoint(self) -> int:
         try:
@@ -295,11 +307,17 @@ class Catalog:
             if self._table is None or self._table.version() != version:
                 self._table = DeltaTable(self.path.as_uri(), version=version)
         except DeltaError as error:
+            self._entries.files()  # raises, where an entry is to blame
+            first = str(error).splitlines()[0]  # without the Delta library's stack
+            restore = "restore the folder from a copy"
+            checkpoints = any(self._log.glob("*.checkpoint.parquet"))
             raise CorruptError(
-                f"the catalog's log cannot be read: {error}",
+                f"the catalog's log cannot be read: {first}",
                 where=str(self._log),
                 fix="delete _last_checkpoint and *.checkpoint.parquet there: they save time, the .json files hold all;"
-                " if that does not help, restore the folder from a copy",
+                f" if that does not help, {restore}"
+                if checkpoints
+                else restore,
             ) from None
         unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
         if unknown:

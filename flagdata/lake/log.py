@@ -4,20 +4,28 @@ Entries are numbered from 0 without holes and never expire, so a hole is damage,
 what comes before it for all there is. The loss of the last entries leaves no hole; therefore each commit, once its
 entry is on the disk, also puts its number as a file name in the folder `refs/newest/`, outside the log, and takes lower
 ones away. The number to believe is the highest, so writers need no lock for it, and it never falls.
+
+Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change in any is found.
 """
 
 from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 
 from flagdata.errors import CorruptError
 from flagdata.lake.durable import put_if_absent
+from flagdata.provenance import file_hash
 
 FILE_HASH = "flagdata.file_sha256"
 """Key of a commit's info: SHA-256 of the one file of rows that the commit added."""
 
+PREVIOUS_HASH = "flagdata.previous_sha256"
+"""Key of a commit's info: SHA-256 of the log entry before it."""
+
+_ACTIONS = {"add", "remove", "metaData", "protocol", "commitInfo", "txn", "cdc", "domainMetadata"}
 _NAME = "{:020d}.json"
 _ENTRY = re.compile(r"(\d{20})\.json")
 _MARK = re.compile(r"\d{1,20}")
@@ -35,6 +43,7 @@ class Log:
     def __init__(self, folder: Path, marks: Path) -> None:
         self.folder = folder
         self.marks = marks
+        self._filled: set[int] = set()
 
     def path(self, version: int) -> Path:
         """Where the entry of a version is."""
@@ -45,6 +54,7 @@ class Log:
 
         Raises:
             LogGapError: an entry before it, or one that was acknowledged after it, is missing, or there is none.
+            CorruptError: an entry is empty.
         """
         acknowledged = self.acknowledged()  # first: all entries up to it were on the disk before
         present = self._present()
@@ -55,6 +65,10 @@ class Log:
         missing = [v for v in range(max(newest, acknowledged) + 1) if v not in present and not self.path(v).exists()]
         if missing:
             raise self._gap(missing, newest=newest)
+        for version in sorted(present - self._filled):
+            if self.path(version).stat().st_size == 0:  # the Delta library takes it for a commit of nothing
+                raise self._damaged(version)
+        self._filled = present
         return max(newest, acknowledged)
 
     def files(self) -> dict[str, str | None]:
@@ -65,21 +79,51 @@ class Log:
         """
         files: dict[str, str | None] = {}
         for version in sorted(self._present()):
-            entry = self.path(version)
-            try:
-                actions = [json.loads(line) for line in entry.read_text().splitlines()]
-                info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
-                added = [action["add"]["path"] for action in actions if "add" in action]
-            except (ValueError, KeyError, TypeError):
-                raise CorruptError("the log entry is damaged", where=str(entry), fix="restore it from a copy") from None
+            added, info = self._content(version)
             for name in added:
                 files.setdefault(name, info.get(FILE_HASH))
         return files
 
+    def changed(self) -> list[Path]:
+        """Entries that are not any more what the next entry, or the mark, says they were; of older lakes' none.
+
+        Raises:
+            CorruptError: an entry that cannot be read, by its name.
+        """
+        noted: dict[int, str] = {}
+        newest = self.acknowledged()
+        if newest >= 0:
+            with suppress(FileNotFoundError):  # another commit has just replaced it
+                noted[newest] = (self.marks / str(newest)).read_text().strip()
+        present = self._present()
+        for version in sorted(present):
+            previous = self._content(version)[1].get(PREVIOUS_HASH)
+            if previous is not None:
+                noted[version - 1] = previous
+        return [self.path(v) for v in sorted(present & noted.keys()) if file_hash(self.path(v)) != noted[v]]
+
+    def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
+        """Names of the files that an entry adds, and its commit info."""
+        try:
+            actions = [json.loads(line) for line in self.path(version).read_text().splitlines()]
+            if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
+                raise self._damaged(version)
+            info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
+            return [action["add"]["path"] for action in actions if "add" in action], dict(info)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise self._damaged(version) from None
+
+    def _damaged(self, version: int) -> CorruptError:
+        path = self.path(version)
+        fix = "restore it from a copy"
+        if version == max(self._present()) and version - 1 == self.acknowledged():  # as a power cut may leave it
+            fix += ", or delete it: its commit was never acknowledged"
+        return CorruptError(f"the log entry {path.name} is damaged", where=str(path), fix=fix)
+
     def acknowledge(self, version: int) -> None:
         """Note for good that the entry of `version` is on the disk; durable when it returns."""
         self.marks.mkdir(exist_ok=True)
-        put_if_absent(self.marks / str(version), b"")
+        put_if_absent(self.marks / str(version), f"{file_hash(self.path(version))}\n".encode())
         for lower in self._marks():
             if lower < version:
                 (self.marks / str(lower)).unlink(missing_ok=True)

@@ -12,6 +12,7 @@ import pyarrow as pa
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lake import Lake
+from flagdata.lake.log import LogGapError
 from flagdata.lake.refs import MAIN
 from flagdata.provenance import file_hash
 
@@ -39,7 +40,8 @@ def mark(lake: Lake, *, grace: timedelta) -> Marked:
     try:
         lake.catalog.head()
     except FlagdataError as error:
-        found = Finding(kind=error.kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+        kind = error.kind if isinstance(error, LogGapError) else "log-damaged"
+        found = Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
         return Marked(refs={}, objects=frozenset(), findings=(found,))
     try:
         names = [MAIN, *lake.refs.branches(), *lake.refs.tags()]
@@ -64,11 +66,12 @@ def catalog_files(lake: Lake) -> tuple[Finding, ...]:
     on how many were written before hashes were noted."""
     try:
         hashes = lake.catalog.file_hashes()
+        changed = lake.catalog.changed_entries()
     except FlagdataError as error:
         return (
             Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix),
         )
-    findings = []
+    findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
     for path, noted in sorted(hashes.items()):
         if not path.exists():
             findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))

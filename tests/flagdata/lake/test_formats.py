@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 
 import polars as pl
@@ -15,9 +16,11 @@ import pytest
 from deltalake import DeltaTable
 
 from flagdata.errors import CorruptError, UsageError
+from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.catalog import Moved
-from flagdata.lake.health import doctor
+from flagdata.lake.collect import collect
+from flagdata.lake.health import doctor, verify_catalog
 from flagdata.lake.objects import content_hash
 from flagdata.schema import CATALOG, Kind
 
@@ -117,11 +120,53 @@ def test_a_damaged_log_entry_is_told_by_its_name(lake: Lake, put_text: Put) -> N
     entry = lake.path / "catalog" / "_delta_log" / "00000000000000000001.json"
     entry.write_text(entry.read_text()[:100])
     fresh = Lake.open(lake.path)
-    with pytest.raises(CorruptError):
+    with pytest.raises(CorruptError) as told:
         fresh.rows()
+    assert told.value.as_dict() == {
+        "kind": "corrupt",
+        "what": f"the log entry {entry.name} is damaged",
+        "where": str(entry),
+        "fix": "restore it from a copy",
+    }
     findings = doctor(fresh)
+    assert not any("\n" in f.what for f in findings)
     assert {"ref-unreadable", "log-damaged"} <= {f.kind for f in findings}
     assert any(f.where == str(entry) for f in findings)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_an_emptied_or_altered_log_entry_stops_collection(lake: Lake, put_text: Put, version: int) -> None:
+    put_text(lake, "a")
+    put_text(lake, "b")
+    entry = lake.path / "catalog" / "_delta_log" / f"{version:020d}.json"
+    content = entry.read_bytes()
+    for damaged in (b"", content.replace(b'"add"', b'"adx"'), content.replace(b"ingest", b"jngest")):
+        entry.write_bytes(damaged)
+        fresh = Lake.open(lake.path)
+        assert any(f.where == str(entry) and f.severity is Severity.ERROR for f in verify_catalog(fresh))
+        with pytest.raises(CorruptError) as told:
+            collect(fresh, grace=timedelta(0))
+        assert told.value.where == str(entry)
+    entry.write_bytes(b"")
+    with pytest.raises(CorruptError, match=entry.name):
+        Lake.open(lake.path).rows()
+    entry.write_bytes(content)
+    assert verify_catalog(Lake.open(lake.path)) == ()
+
+
+def test_an_empty_entry_that_a_power_cut_left_before_it_was_acknowledged_may_be_deleted_as_the_fix_says(
+    lake: Lake, put_text: Put
+) -> None:
+    put_text(lake, "a")
+    entry = lake.path / "catalog" / "_delta_log" / f"{2:020d}.json"
+    entry.touch()
+    with pytest.raises(CorruptError) as told:
+        Lake.open(lake.path).rows()
+    assert "delete it" in told.value.fix
+    entry.unlink()
+    put_text(lake, "b")
+    assert lake.rows()["name"].to_pylist() == ["a", "b"]
+    assert doctor(lake) == ()
 
 
 def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(
