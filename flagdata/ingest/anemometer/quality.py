@@ -49,8 +49,9 @@ def gaps(reading: Reading) -> tuple[Finding, ...]:
         Finding(
             kind="gaps", severity=Severity.WARNING, count=len(wide), value=seconds,
             where=f"line {reading.line[longest + 1]}",
-            what=f"{len(wide)} gaps of {lost:.3f} s in all at a usual interval of {usual / NANOSECONDS:.4g} s; "
-            f"the longest, {seconds:.3f} s, ends at the line named",
+            what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'} longer than the usual "
+            f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
+            "the line named",
         ),
     )  # fmt: skip
 

@@ -34,6 +34,8 @@ _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
     r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
 )
+YEARS = (1970, 2200)
+"""First and last year of a stamp that is taken for a date."""
 EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000}
 
 
@@ -44,13 +46,15 @@ class Stamps:
     Attributes:
         ns: (n,) nanoseconds since 1970 of the wall clock, or of UTC where `utc`.
         utc: (n,) whether the stamp itself says its zone.
-        valid: (n,) whether it could be read at all and is a calendar date.
+        valid: (n,) whether it could be read at all and is a calendar date within `YEARS`.
+        distant: (n,) whether it is written as a stamp, but of a year outside `YEARS`: a clock that was never set.
         step: the resolution of the stamps as written [ns]: the last digit that is ever used.
     """
 
     ns: NDArray[np.int64]
     utc: NDArray[np.bool_]
     valid: NDArray[np.bool_]
+    distant: NDArray[np.bool_]
     step: int
 
 
@@ -99,7 +103,8 @@ def parse(texts: Sequence[str], form: str) -> Stamps:
     if form in EPOCH:
         return _epoch(text, EPOCH[form])
     found = pc.extract_regex(text, pattern(form))
-    valid = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
+    written = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
+    valid = written.copy()
     part = functools.partial(_part, found)
     year = part("Y") if part("Y") is not None else _plus(part("y"), 2000)
     hour, ok = _hour(found, part)
@@ -108,14 +113,16 @@ def parse(texts: Sequence[str], form: str) -> Stamps:
     zero = np.zeros(len(text), dtype=np.int64)
     minute, second = zero if minute is None else minute, zero if second is None else second
     valid &= (hour < 24) & (minute < 60) & (second < 60)
-    days, ok = _days(found, part, year if year is not None else zero)
+    year = zero if year is None else year
+    distant = written & ((year < YEARS[0]) | (year > YEARS[1]))
+    days, ok = _days(found, part, year)
     valid &= ok
     fraction, digits = _fraction(found)
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
     offset, utc = _offset(found, len(text))
     step = NANOSECONDS if np.any(second[valid]) else 60 * NANOSECONDS
     step = 10 ** (9 - digits) if digits else step
-    return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, step=step)
+    return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
 
 
 def _epoch(text: pa.StringArray, scale: int) -> Stamps:
@@ -129,7 +136,8 @@ def _epoch(text: pa.StringArray, scale: int) -> Stamps:
     valid &= (whole * (scale / NANOSECONDS) > 631_152_000) & (whole * (scale / NANOSECONDS) < 4_102_444_800)
     ns = np.where(valid, whole, 0) * scale + fraction // (NANOSECONDS // scale)
     step = max(1, scale // 10**digits)
-    return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy(), valid=valid, step=step)
+    distant = np.zeros(len(text), dtype=bool)
+    return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy(), valid=valid, distant=distant, step=step)
 
 
 def _field(found: pa.StructArray, name: str) -> Any:
@@ -169,14 +177,14 @@ def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[ND
     if of_year is not None:
         first = _civil(year, np.ones_like(year), np.ones_like(year))
         leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
-        return first + of_year - 1, (of_year >= 1) & (of_year <= 365 + leap) & (year >= 1970) & (year <= 2200)
+        return first + of_year - 1, (of_year >= 1) & (of_year <= 365 + leap) & (year >= YEARS[0]) & (year <= YEARS[1])
     month = part("m") if part("m") is not None else _month(found)
     day = part("d")
     leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
     lengths = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
     known = (month >= 1) & (month <= 12)
     length = lengths[np.where(known, month, 0)] + (leap & (month == 2))
-    ok = known & (day >= 1) & (day <= length) & (year >= 1970) & (year <= 2200)
+    ok = known & (day >= 1) & (day <= length) & (year >= YEARS[0]) & (year <= YEARS[1])
     return _civil(np.where(ok, year, 1970), np.where(ok, month, 1), np.where(ok, day, 1)), ok
 
 

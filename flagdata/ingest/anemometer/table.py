@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer import possible
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
-from flagdata.ingest.anemometer.stamps import Stamps
+from flagdata.ingest.anemometer.stamps import YEARS, Stamps
 from flagdata.ingest.anemometer.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.wall import to_utc
 from flagdata.schema import CHANNELS, SampleFlag
@@ -134,6 +134,7 @@ class _Gathered:
     checks: list[_Check]
     lines: list[NDArray[np.int64]] = field(default_factory=list)
     bad_stamps: list[int] = field(default_factory=list)
+    distant: int = 0
 
     def columns(self) -> list[_Column]:
         return [*self.channels.values(), *self.extra.values()]
@@ -151,6 +152,7 @@ class _Gathered:
             self.host.add(host, keep)
         self.clock.add(stamps, keep)
         self.bad_stamps.extend(line[~keep].tolist())
+        self.distant += int(stamps.distant.sum())
         self.lines.append(line[keep])
         for column in self.columns():
             cells = [row[column.index] for row in block]
@@ -237,11 +239,13 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, where: str) -> tuple[Findin
     Raises:
         InputError: all or most of them.
     """
-    bad, form = gathered.bad_stamps, gathered.clock.form
+    bad, form, distant = gathered.bad_stamps, gathered.clock.form, gathered.distant
     count = len(gathered.line())
+    years = f"outside the accepted years, {YEARS[0]} to {YEARS[1]}"
+    far = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0:
         raise InputError(
-            "no row with a readable time stamp",
+            f"no row with a readable time stamp{far}",
             where=f"{where}, line {bad[0] if bad else rows.first_line}",
             fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded anything",
         )
@@ -251,7 +255,9 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, where: str) -> tuple[Findin
     return (
         Finding(
             kind="unreadable-stamps", severity=Severity.ERROR, count=len(bad), where=f"line {bad[0]}",
-            what=f"{len(bad)} rows whose stamp is not {form} or no date; left out",
+            what=f"{len(bad)} rows whose stamp is {years}: a clock that was not set; left out"
+            if distant == len(bad)
+            else f"{len(bad)} rows whose stamp is not {form} or no date; left out{far}",
         ),
     )  # fmt: skip
 

@@ -124,3 +124,12 @@ def test_an_impossible_angle_of_a_stream_is_left_out_and_said(read: Read) -> Non
     angle = np.degrees(log.series.channels["apparent_wind_direction"])
     assert np.isnan(angle).tolist() == [False, True, False]
     assert [(count, where) for count, where, _ in out_of_range(log)] == [(1, "line 3")]
+
+
+def test_a_stamp_of_a_clock_that_was_not_set_is_said_to_be_outside_the_years(read: Read) -> None:
+    rows = ["2026-05-01T12:00:00Z,3", "1900-01-01T00:00:00Z,3", "2026-05-01T12:00:02Z,3", "2026-05-01T12:00:03Z,3"]
+    log = read("time,wind_speed\n" + "\n".join(rows) + "\n")
+    (finding,) = [f for f in log.findings if f.kind == "unreadable-stamps"]
+    assert (finding.count, finding.where) == (1, "line 3")
+    assert "outside the accepted years, 1970 to 2200" in finding.what
+    assert "iso" not in finding.what

@@ -150,6 +150,15 @@ def test_one_sample_lost_of_a_steady_log_is_a_gap() -> None:
     assert quality.gaps(reading(time, wind_speed=np.ones(99)))[0].value == pytest.approx(2.0)
 
 
+def test_a_gap_tells_its_interval_apart_from_the_time_lost_in_it() -> None:
+    time = T0 + S * np.array([0, 1, 2, 3, 11, 12, 13, 14])
+    (gap,) = quality.gaps(reading(time, wind_speed=np.ones(8)))
+    assert gap.what == (
+        "1 interval longer than the usual 1 s, 7.000 s lost in all; "
+        "the longest interval, 8.000 s, ends at the line named"
+    )
+
+
 @pytest.mark.parametrize("offset", [-0.35, 0.2])
 def test_the_zero_offset_of_an_idle_stretch_is_found_within_its_resolution(offset: float) -> None:
     idle = np.round(offset + stream(8, "idle").normal(0, 0.005, 3000), 2)

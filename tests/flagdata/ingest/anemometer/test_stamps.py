@@ -172,3 +172,10 @@ def test_an_order_without_evidence_is_refused_unless_told() -> None:
     with pytest.raises(TimeError):
         decide(["5/6/2026 10:00"], told=None, where="x")
     assert decide(["5/6/2026 10:00"], told="mdy", where="x").order == "mdy"
+
+
+@pytest.mark.parametrize("year", [1900, 1969, 2201, 3000])
+def test_a_year_outside_the_accepted_ones_is_told_from_what_is_no_date(year: int) -> None:
+    stamps = parse([f"{year}-05-01T12:00:00Z", "2026-02-30T12:00:00Z", "2026-05-01T12:00:00Z", "noon"], "iso")
+    assert stamps.valid.tolist() == [False, False, True, False]
+    assert stamps.distant.tolist() == [True, False, False, False]
