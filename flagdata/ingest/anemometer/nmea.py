@@ -32,7 +32,7 @@ from flagdata.ingest.anemometer.sentences import (
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor
+from flagdata.signals import Instants, Sensor
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import UNITS
 
@@ -131,7 +131,7 @@ class Nmea:
         return Reading(
             time=placed.time, channels=channels, flags=flags, line=line,
             sensor=Sensor(name=f"NMEA 0183 talker {talkers}"), step=NANOSECONDS,
-            findings=(*_findings(stream, placed), *found, *about),
+            findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, *about),
         )  # fmt: skip
 
 
@@ -262,6 +262,26 @@ def _fixed(
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
     text = f"fixed platform, as told: {kind} wind is wind over ground"
     return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
+
+
+def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
+    """How many sentences of each kind of wind there are, and how far apart, where a stream holds several kinds."""
+    told = {
+        "apparent_wind": "relative (MWV,R)",
+        "theoretical_wind": "theoretical (MWV,T)",
+        "wind": "over ground (MWD)",
+    }
+    parts: list[str] = []
+    for prefix, name in told.items():
+        at = [index for index, row in enumerate(stream.values) if f"{prefix}_speed" in row]
+        if len(at) > 1:
+            parts.append(f"{len(at)} {name}, one every {np.median(np.diff(time[at])) / NANOSECONDS:.3g} s")
+        elif at:
+            parts.append(f"1 {name}")
+    if len(parts) < 2:
+        return ()
+    text = f"{len(stream.line)} wind sentences of {len(parts)} kinds: {'; '.join(parts)}"
+    return (Finding(kind="wind-kinds", severity=Severity.NOTE, count=len(stream.line), what=text),)
 
 
 def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:

@@ -190,3 +190,22 @@ def test_relative_and_theoretical_never_share_a_channel(read: Read) -> None:
 
 def test_our_checksum_is_the_standards() -> None:
     assert checksum("GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,") == 0x47
+
+
+def test_a_stream_of_two_kinds_of_wind_says_how_many_of_each_and_how_often(read: Read) -> None:
+    # one sentence every 2 s, relative and theoretical in turn: each kind comes every 4 s
+    bodies = []
+    for second in range(0, 40, 2):
+        bodies += [
+            f"GPZDA,1200{second:02d}.00,01,05,2026,00,00",
+            f"WIMWV,010.0,{'RT'[second // 2 % 2]},5.{second % 7},M,A",
+        ]
+    log = read(stream(*bodies, "GPZDA,120040.00,01,05,2026,00,00"))
+    (finding,) = [f for f in log.findings if f.kind == "wind-kinds"]
+    assert finding.count == 20
+    assert "10 relative (MWV,R), one every 4 s; 10 theoretical (MWV,T), one every 4 s" in finding.what
+
+
+def test_a_stream_of_one_kind_of_wind_needs_no_such_count(read: Read) -> None:
+    log = read(stream("GPZDA,120000.00,01,05,2026,00,00", "WIMWV,010.0,R,5.0,M,A", "GPZDA,120002.00,01,05,2026,00,00"))
+    assert "wind-kinds" not in {f.kind for f in log.findings}
