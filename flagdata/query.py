@@ -202,7 +202,7 @@ def select(
 
     Raises:
         UsageError: SQL that cannot be run; the message carries DuckDB's reason and, for a misspelt column, its name.
-        UnknownNameError: no such ref.
+        NotFoundError: no such ref.
     """
     request = Request(
         where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit

@@ -64,8 +64,8 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
     if rows:
         table(header, [_line(row) for row in rows])
-    more = f" and {clips} clips (--kind clip lists them)" if clips else ""
-    say(f"{len(rows)} artifacts{more}" if found else "no artifacts")
+    more = f" and {counted(clips, 'clip')} (--kind clip lists them)" if clips else ""
+    say(f"{counted(len(rows), 'artifact')}{more}" if found else "no artifacts")
 
 
 @click.command()
@@ -208,7 +208,7 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
             click.echo(f"{sign} {row['kind']:<11} {row['artifact'][:_SHORT]} {row['name']}")
         for name in objects:
             click.echo(f"{sign} object      {name}")
-    say(f"{len(added)} rows added, {len(removed)} removed")
+    say(f"{counted(len(added), 'row')} added, {len(removed)} removed")
 
 
 @click.command()
@@ -265,6 +265,7 @@ def size_text(size: float | None) -> str:
 
 
 def _line(row: Mapping[str, Any]) -> list[object]:
+    from flagdata.schema import Kind
     from flagdata.timebase import iso
 
     wind = "" if row["wind"] is None else f"{row['wind']:.2f}"
@@ -277,7 +278,7 @@ def _line(row: Mapping[str, Any]) -> list[object]:
         "" if row["start"] is None else iso(row["start"] // 10**9 * 10**9),
         row["frame_count"],
         wind,
-        size_text(row["object_bytes"]),
+        "" if row["kind"] == Kind.CLIP else size_text(row["object_bytes"]),  # a clip's object is its recording's
         ",".join(row["quality"]),
     ]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.commands.lake import size_text
+from flagdata.commands.lake import counted, size_text
 from flagdata.console import document, json_option, lake_option, progress, say
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.findings import Finding
@@ -59,7 +59,8 @@ def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
     chosen = names if sample is None else sampled(names, sample)
     with progress(len(chosen), label="verify", unit="object") as advance:
         findings += verified(lake, chosen, advance=advance)
-    _conclude("verify", findings, f"{len(chosen)} of {len(names)} objects re-hashed", as_json=as_json)
+    hashed = len(chosen) - sum(finding.kind == "object-missing" for finding in findings)
+    _conclude("verify", findings, f"{hashed} of {counted(len(names), 'object')} re-hashed", as_json=as_json)
 
 
 @click.command()
@@ -82,7 +83,7 @@ def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
             findings += verified(lake, names, advance=advance)
-        checked = f"structure checked, {len(names)} objects re-hashed"
+        checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
     _conclude("doctor", findings, checked, as_json=as_json)
 
 
@@ -112,7 +113,8 @@ def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
     for name in (*found.objects, *map(str, found.leftovers)):
         click.echo(name)
     verb = "would be deleted" if dry_run else "deleted"
-    say(f"{len(found.objects)} objects and {len(found.leftovers)} leftovers, {size_text(found.size)}, {verb}")
+    what = f"{counted(len(found.objects), 'object')} and {counted(len(found.leftovers), 'leftover')}"
+    say(f"{what}, {size_text(found.size)}, {verb}")
 
 
 @click.command()

@@ -60,9 +60,9 @@ class Source:
             cache: where decoded clips are kept; `None` decodes each time.
 
         Raises:
-            NotFoundError: no clip matches.
+            NotFoundError: no such ref, or no clip matches.
             RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
-            UnknownNameError: no such ref, column or side.
+            UnknownNameError: no such column or side.
             UsageError: a filter that is not SQL, a window that is no length of time, or a seed that is no whole number.
         """
         if not isinstance(seed, int):
@@ -96,7 +96,8 @@ class Source:
 
         Raises:
             RefusedError: an explicit split leaks.
-            UnknownNameError: no such ref or column.
+            NotFoundError: no such ref.
+            UnknownNameError: no such column.
             UsageError: a filter that is not SQL.
         """
         return side_sizes(self.lake, where=where, at=at, split_by=split_by or HashedSplit())

@@ -28,7 +28,7 @@ def difference(lake: Lake, before: str | None, after: str | None) -> Difference:
     """What `after` shows that `before` does not, and the other way round; rows are compared by identity.
 
     Raises:
-        UnknownNameError: no such ref.
+        NotFoundError: no such ref.
     """
     old, new = lake.rows(at=before), lake.rows(at=after)
     old_objects, new_objects = _objects(old), _objects(new)

@@ -136,7 +136,8 @@ class Lake:
 
         Raises:
             UsageError: the expression is not one, or reads anything but the catalog.
-            UnknownNameError: no such ref or column.
+            NotFoundError: no such ref.
+            UnknownNameError: no such column.
         """
         table = self.table(self.view(at))
         if where is not None:
@@ -176,7 +177,7 @@ class Lake:
         """The Delta version a ref stands for (for a tag of a branch, the branch's).
 
         Raises:
-            UnknownNameError: no such ref.
+            NotFoundError: no such ref.
         """
         return self.view(at)[0].version
 
@@ -209,7 +210,7 @@ class Lake:
             UnknownNameError: no such branch.
             NotFoundError: a row was made from one that `into` does not show: merge the branch it is on first.
         """
-        own = self.view(branch)[0]
+        own = self.refs.view(branch, self.catalog.head())[0]
         if own.branch != branch or branch == into:
             raise UsageError(f"{branch!r} cannot be merged into {into!r}", fix="name two branches")
         rows = self.table((own,)).to_pylist()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,6 +20,7 @@ from flagdata.lake.durable import disk_errors, put_if_absent
 
 MAIN = "main"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_NOUNS = {"tags": "tag", "branches": "branch"}
 _COMMIT = re.compile(r"c[0-9a-f]{16}")
 
 
@@ -88,7 +89,7 @@ class Refs:
         Raises:
             ConflictError: the name is taken, by a tag or by a branch.
         """
-        check_name(name, noun=kind.removesuffix("s"))
+        check_name(name, noun=_NOUNS[kind])
         other = "branches" if kind == "tags" else "tags"
         content = {
             "schema": "flagdata.ref/1",
@@ -103,7 +104,7 @@ class Refs:
                 raise ConflictError(
                     f"there is a tag or branch {name!r} already",
                     where=str(path),
-                    fix="choose another name; tags never move",
+                    fix="choose another name; a tag never moves" if kind == "tags" else "choose another name",
                 )
 
     def view(self, branch: str, head: int) -> View:
@@ -143,8 +144,7 @@ def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapp
         commits: gives commit id → (version, branch); called only when `at` has the form of a commit id.
 
     Raises:
-        UnknownNameError: neither; suggests the nearest name.
-        NotFoundError: a version beyond the newest.
+        NotFoundError: none of these, with the nearest name; or a version beyond the newest.
     """
     if at is None:
         return refs.view(MAIN, head)
@@ -155,7 +155,7 @@ def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapp
     if _COMMIT.fullmatch(at):
         known = commits()
         if at not in known:
-            raise UnknownNameError.of("commit", at, known)
+            raise _not_there("commit", at, known)
         version, branch = known[at]
         return refs.view(branch, version)
     tags = refs.tags()
@@ -164,4 +164,8 @@ def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapp
     branches = refs.branches()
     if at == MAIN or at in branches:
         return refs.view(at, head)
-    raise UnknownNameError.of("tag, branch or commit", at, [MAIN, *tags, *branches])
+    raise _not_there("tag, branch or commit", at, [MAIN, *tags, *branches])
+
+
+def _not_there(noun: str, at: str, known: Iterable[str]) -> NotFoundError:
+    return NotFoundError(f"there is no {noun} {at!r}", fix=UnknownNameError.of(noun, at, known).fix)

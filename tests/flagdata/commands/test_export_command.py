@@ -54,7 +54,7 @@ def test_json_gives_the_manifest(lake: Lake, tmp_path: Path, capsys: pytest.Capt
         (["parquet", "--to", "{out}", "--where", "sed = 1"], 2, "did you mean 'seed'"),
         (["mp4", "--to", "{out}"], 2, "2 of kind model"),
         (["parquet", "--to", "{lake}"], 1, "exists"),
-        (["parquet", "--to", "{out}", "--at", "nowhere"], 2, "nowhere"),
+        (["parquet", "--to", "{out}", "--at", "nowhere"], 1, "nowhere"),
         (["parquet"], 2, "--to"),
         (["parquet", "--to", "{lake}/lake.json/out"], 1, "writing an export"),
         (["parquet", "--to", "{out}", "--salt", "x"], 2, "--salt without --split"),

@@ -199,7 +199,7 @@ def test_what_is_not_there_is_said(source):
         source.pairs(at="v1", split="none", split_by=HashedSplit(fractions={"all": 1.0, "none": 0.0}))
     with pytest.raises(UnknownNameError):
         source.pairs(split="trian")
-    with pytest.raises(UnknownNameError):
+    with pytest.raises(NotFoundError):
         source.pairs(at="no-such-tag")
     with pytest.raises(UsageError):
         source.pairs("wind >")

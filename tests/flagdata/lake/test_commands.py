@@ -108,9 +108,12 @@ def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_tex
             )
     listed = run("ls")
     assert [line.split()[2] for line in listed.out.splitlines()[1:]] == ["recording"]
-    assert "1 artifacts and 2 clips (--kind clip lists them)" in listed.err
+    assert "1 artifact and 2 clips (--kind clip lists them)" in listed.err
     assert run("ls", "--json").document["clips_not_listed"] == 2
     assert len(run("ls", "--kind", "clip", "--json").document["artifacts"]) == 2
+    # the recording's nine bytes ("recording") are its own, and no clip's
+    assert " 9 B" in listed.out
+    assert " 9 B" not in run("ls", "--kind", "clip").out
 
 
 def test_log_tells_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake, put_text: Put) -> None:
@@ -163,7 +166,7 @@ def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put
     document = run("diff", "v1", "main", "--json").document
     assert document["schema"] == "flagdata.diff/1"
     assert [row["artifact"] for row in document["removed"]] == [gone.id]
-    assert run("diff", "v2").code == 2
+    assert run("diff", "v2").code == 1
 
 
 def test_withdraw_says_what_went_along(run: Run, lake: Lake, put_text: Put) -> None:
@@ -187,6 +190,26 @@ def test_withdraw_takes_a_recording_s_clips_without_being_told(run: Run, lake: L
             tx.add(Artifact(kind="clip", name="c", object=recording.object, parents=(recording.id,), frame_first=i))
     done = run("withdraw", recording.id, "-m", "wrong")
     assert (done.code, done.out) == (0, "version 3: 1 withdrawn from main, 200 clips went along\n")
+
+
+def test_refs_that_are_not_there_are_not_found_and_names_that_cannot_be_are_told_by_their_noun(run: Run) -> None:
+    for ref in ("999", "nope", "c" + "0" * 16):
+        ended = run("ls", "--at", ref, "--json")
+        assert (ended.code, ended.document["kind"]) == (1, "not-found")
+    assert "cannot name a branch" in run("branch", "a/b").err.splitlines()[0]
+    assert "cannot name a branche" not in run("branch", "a/b").err
+    run("tag", "v1")
+    assert "a tag never moves" in run("tag", "v1").err
+    assert "move" not in run("branch", "v1").err
+
+
+def test_verify_counts_only_what_it_could_read(run: Run, lake: Lake, put_text: Put) -> None:
+    for text in "abc":
+        put_text(lake, text)
+    artifact = put_text(lake, "d")
+    assert artifact.object is not None
+    lake.object_path(artifact.object).unlink()
+    assert "3 of 4 objects re-hashed" in run("verify").err
 
 
 def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: Lake, put_text: Put) -> None:

@@ -96,7 +96,7 @@ def test_a_filter_selects_by_sql_and_a_bad_one_is_a_usage_error(lake: Lake, put_
 
 def test_unknown_refs_are_refused_with_the_nearest_name(lake: Lake) -> None:
     lake.tag("release-1")
-    with pytest.raises(UnknownNameError, match="release-1"):
+    with pytest.raises(NotFoundError, match="release-1"):
         lake.rows(at="relase-1")
     with pytest.raises(NotFoundError):
         lake.rows(at="99")
