@@ -117,7 +117,7 @@ class Lake:
         """A context manager: collects objects and rows, publishes all when its block ends, nothing when that raises.
 
         Raises:
-            UnknownNameError: no such branch.
+            NotFoundError: no such branch.
             ConflictError: other processes kept committing for two minutes.
             FlagdataError: no space, no permission; nothing was published.
         """
@@ -207,7 +207,7 @@ class Lake:
         Rows are only ever added, so nothing can conflict; what `branch` withdrew is not withdrawn from `into`.
 
         Raises:
-            UnknownNameError: no such branch.
+            NotFoundError: no such branch.
             NotFoundError: a row was made from one that `into` does not show: merge the branch it is on first.
         """
         own = self.refs.view(branch, self.catalog.head())[0]

@@ -111,13 +111,13 @@ class Refs:
         """What a branch shows when the table is at version `head`.
 
         Raises:
-            UnknownNameError: no such branch.
+            NotFoundError: no such branch, with the nearest name.
         """
         if branch == MAIN:
             return (Slice(branch=MAIN, version=head),)
         known = self.branches()
         if branch not in known:
-            raise UnknownNameError.of("branch", branch, [MAIN, *known], where=str(self.root))
+            raise _not_there("branch", branch, [MAIN, *known])
         return (Slice(branch=branch, version=head), *known[branch].view)
 
     def scratch_files(self) -> list[Path]:

@@ -173,7 +173,6 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
         (["{log}", "--date", "1/5/2026"], "not a date"),
         (["{video}", "--zone", "Europe/Amsterdm"], "did you mean 'Europe/Amsterdam'"),
         (["{video}", "--sniff", "--session", "a"], "--session means nothing to --sniff"),
-        (["{video}", "--branch", "nowhere"], "nowhere"),
     ],
 )
 def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
@@ -182,6 +181,13 @@ def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
     code, _, err = run(*(a.format(video=video, log=wind_log) for a in arguments))
     assert code == 2
     assert said in err
+    assert lake.rows().num_rows == 0
+
+
+def test_a_branch_that_is_not_there_is_not_found_and_nothing_is_ingested(run, lake: Lake, video: Path) -> None:
+    code, _, err = run(video, "--branch", "nowhere")
+    assert code == 1
+    assert "branch or commit 'nowhere'" in err
     assert lake.rows().num_rows == 0
 
 

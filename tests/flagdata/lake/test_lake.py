@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind, catalog_schema
 
@@ -48,7 +48,7 @@ def test_a_transaction_is_of_no_use_outside_its_block(lake: Lake) -> None:
     for use in (lambda: tx.staging(".mcap"), lambda: tx.put(lake.path), lambda: lake.transaction(" ")):
         with pytest.raises(UsageError):
             use()
-    with pytest.raises(UnknownNameError), lake.transaction("nowhere", branch="nope"):
+    with pytest.raises(NotFoundError), lake.transaction("nowhere", branch="nope"):
         pass
 
 
@@ -121,7 +121,7 @@ def test_a_merge_brings_a_branch_s_own_rows_to_main_once(lake: Lake, put_text: P
     for pair in (("main", "main"), ("try", "try")):
         with pytest.raises(UsageError):
             lake.merge(pair[0], "no", into=pair[1])
-    with pytest.raises(UnknownNameError):
+    with pytest.raises(NotFoundError):
         lake.merge("other", "no")
 
 
