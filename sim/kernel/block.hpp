@@ -136,6 +136,7 @@ class Block {
   std::array<contact::Search<T>, L> search_;
   std::vector<contact::Point<T>> near_;
   std::vector<T> moved_;  // how far each vertex is from there
+  T step_ = 0;            // of the time, where steps follow one another
   std::vector<T> built_;  // positions at each lane's last search
 
  public:
@@ -321,10 +322,15 @@ class Block {
     }
     const T* mass = p.mass + b * n * L;
     for (int l = 0; l < real; ++l) {
-      if (!search_[l].holds(p.contact, worst[l])) {
+      if (!search_[l].holds(worst[l])) {
         near_.resize(n);
-        for (int64_t i = 0; i < n; ++i) near_[i] = {x[3 * L * i + l], x[3 * L * i + L + l], x[3 * L * i + 2 * L + l]};
-        search_[l].build(p.contact, near_.data());
+        T fastest = 0;
+        for (int64_t i = 0; i < n; ++i) {
+          const int64_t at = 3 * L * i + l;
+          near_[i] = {x[at], x[at + L], x[at + 2 * L]};
+          fastest = std::max(fastest, v[at] * v[at] + v[at + L] * v[at + L] + v[at + 2 * L] * v[at + 2 * L]);
+        }
+        search_[l].build(p.contact, near_.data(), step_ * std::sqrt(fastest));
         for (int64_t i = l; i < 3 * L * n; i += L) built_[i] = x[i];
         for (int64_t i = l; i < L * n; i += L) moved_[i] = 0;
         worst[l] = 0;
@@ -404,6 +410,7 @@ class Block {
   // Leapfrog: half a kick, drift and kick in turn, half a kick.
   void advance(T* x, T* v, T* f, double h, int64_t steps) {
     const T* inverse = p.inverse_mass + b * p.vertices * L;
+    step_ = T(h);
     for (int64_t s = 0; s <= steps; ++s) {
       forces(x, v, T(double(s) / double(steps)), f);
       const T kick = T(s == 0 || s == steps ? h / 2 : h), drift = s < steps ? T(h) : T(0);

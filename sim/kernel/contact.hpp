@@ -2,14 +2,17 @@
 //
 // Every lane has its own candidates: pairs of a vertex and a face closer than the thickness plus a skin, ordered by
 // distance. They hold until some vertex of the lane has moved half the skin, so that a step seldom searches; and while no
-// vertex has moved further than m, only pairs closer than the thickness plus 2 m need looking at.
+// vertex has moved further than m, only pairs closer than the thickness plus 2 m need looking at. The skin is what the
+// lane's fastest vertex goes in some steps: a slow cloth, whose layers lie close, then has few candidates.
 
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 namespace contact {
@@ -75,24 +78,31 @@ class Search {
     int32_t vertex, face;
   };
   std::vector<Pair> pairs_;
-  bool fresh_ = false;
+  T skin_ = -1;  // of the last search; negative before it
   std::vector<T> x_, y_, z_, u_, v_;  // vertices in the order of their bins
   std::vector<int32_t> order_, bin_;
 
   static constexpr int kBins = 128;
-  static constexpr int kWidth = 16;
+  static constexpr int kWidth = 64 / sizeof(T);
+  typedef T Wide __attribute__((vector_size(64)));
+  using Mask = decltype(Wide{} < Wide{});
+  using Flag = std::conditional_t<sizeof(T) == 4, int32_t, int64_t>;
+
+  // Steps that a search is meant to serve, and the range of skins [thicknesses].
+  static constexpr int kSteps = 16;
+  static constexpr double kThinnest = 0.25, kThickest = 4;
 
  public:
-  static T skin(const Settings<T>& s) { return T(4 * s.thickness); }
   const std::vector<Pair>& pairs() const { return pairs_; }
 
   // Whether the candidates still hold after moves of squared length up to `worst`.
-  bool holds(const Settings<T>& s, T worst) const { return fresh_ && worst < skin(s) * skin(s) / 4; }
+  bool holds(T worst) const { return skin_ > 0 && worst < skin_ * skin_ / 4; }
 
-  void build(const Settings<T>& s, const Point<T>* x) {
+  // `pace` is how far the fastest vertex goes in a step: a slow cloth gets a thin skin, and few candidates.
+  void build(const Settings<T>& s, const Point<T>* x, T pace) {
     pairs_.clear();
-    fresh_ = true;
-    const T reach = T(s.thickness) + skin(s);
+    skin_ = std::clamp(2 * kSteps * pace, T(kThinnest * s.thickness), T(kThickest * s.thickness));
+    const T reach = T(s.thickness) + skin_;
     Point<T> low = x[0], high = x[0];
     for (int64_t i = 0; i < s.vertices; ++i) {
       if (!(std::abs(x[i].x) < T(1e4) && std::abs(x[i].y) < T(1e4) && std::abs(x[i].z) < T(1e4))) return;  // diverged
@@ -124,6 +134,43 @@ class Search {
   }
 
  private:
+  // Squared distances of points from one triangle: `closest` for a whole vector of points, without the weights.
+  struct Sight {
+    struct Points {
+      Wide x, y, z;
+    };
+
+    Point<T> e, f, g;
+    T ee, ef, ff, inverse, ie, iff, ig;
+
+    Sight(Point<T> a, Point<T> b, Point<T> c) : e(b - a), f(c - a), g(c - b) {
+      const T tiny = std::numeric_limits<T>::min();
+      ee = dot(e, e), ef = dot(e, f), ff = dot(f, f);
+      inverse = 1 / std::max(ee * ff - ef * ef, tiny);
+      ie = 1 / std::max(ee, tiny), iff = 1 / std::max(ff, tiny), ig = 1 / std::max(dot(g, g), tiny);
+    }
+
+    static Wide along(const Points& r, Point<T> d) { return r.x * d.x + r.y * d.y + r.z * d.z; }
+    static Points less(const Points& r, const Wide& s, Point<T> d) {
+      return {r.x - s * d.x, r.y - s * d.y, r.z - s * d.z};
+    }
+    static Wide length(const Points& r) { return r.x * r.x + r.y * r.y + r.z * r.z; }
+    static Wide least(const Wide& a, const Wide& b) { return a < b ? a : b; }
+    static Wide side(const Points& r, const Wide& share, Point<T> d) {
+      const Wide zero = Wide{}, one = zero + 1, low = share > 0 ? share : zero;
+      return length(less(r, low < 1 ? low : one, d));
+    }
+
+    // For points r from the first corner.
+    Wide square(const Points& r) const {
+      const Wide re = along(r, e), rf = along(r, f);
+      const Wide u = (ff * re - ef * rf) * inverse, v = (ee * rf - ef * re) * inverse;
+      const Points q = {r.x - e.x, r.y - e.y, r.z - e.z};
+      const Wide rim = least(side(r, re * ie, e), least(side(r, rf * iff, f), side(q, along(q, g) * ig, g)));
+      return ((u >= 0) & (v >= 0) & (u + v <= 1)) ? length(less(less(r, u, e), v, f)) : rim;
+    }
+  };
+
   template <typename Bin, typename Along>
   void look(const Settings<T>& s, const Point<T>* x, int64_t f, T reach, Bin bin, Along along);
 };
@@ -137,22 +184,30 @@ void Search<T>::look(const Settings<T>& s, const Point<T>* x, int64_t f, T reach
   const T radius = std::sqrt(square) + reach, bound = radius * radius;
   const int32_t first = bin_[bin(along(middle) - radius)], last = bin_[bin(along(middle) + radius) + 1];
   const T u = s.centre[2 * f], v = s.centre[2 * f + 1], apart = s.apart[f];
+  auto load = [](const std::vector<T>& values, int32_t i) {
+    Wide wide;
+    std::memcpy(&wide, values.data() + i, sizeof wide);
+    return wide;
+  };
+  // Any of `hit` set, which is copied to `flags`.
+  auto any = [](const Mask& hit, Flag* flags) {
+    std::memcpy(flags, &hit, sizeof hit);
+    int64_t words[8], set = 0;
+    std::memcpy(words, &hit, sizeof words);
+    for (int64_t word : words) set |= word;
+    return set != 0;
+  };
+  const Sight sight(a, b, c);
   for (int32_t i = first; i < last; i += kWidth) {
-    int32_t hit[kWidth], any = 0;
-    const T *px = x_.data() + i, *py = y_.data() + i, *pz = z_.data() + i, *pu = u_.data() + i, *pv = v_.data() + i;
-    for (int k = 0; k < kWidth; ++k) {
-      const T dx = px[k] - middle.x, dy = py[k] - middle.y, dz = pz[k] - middle.z, du = pu[k] - u, dv = pv[k] - v;
-      hit[k] = int32_t((dx * dx + dy * dy + dz * dz < bound) & (du * du + dv * dv >= apart));
-      any |= hit[k];
-    }
-    if (any == 0) continue;
-    for (int k = 0; k < kWidth; ++k) {
-      if (!hit[k]) continue;
-      const int32_t vertex = order_[i + k];
-      T w[3];
-      const T distance = std::sqrt(closest(x[vertex], a, b, c, w));
-      if (distance < reach) pairs_.push_back({distance, vertex, int32_t(f)});
-    }
+    const Wide px = load(x_, i), py = load(y_, i), pz = load(z_, i);
+    const Wide dx = px - middle.x, dy = py - middle.y, dz = pz - middle.z, du = load(u_, i) - u, dv = load(v_, i) - v;
+    const Mask near = (dx * dx + dy * dy + dz * dz < bound) & (du * du + dv * dv >= apart);
+    Flag hit[kWidth];
+    if (!any(near, hit)) continue;
+    const Wide distance = sight.square({px - a.x, py - a.y, pz - a.z});
+    if (!any(near & (distance < reach * reach), hit)) continue;
+    for (int k = 0; k < kWidth; ++k)
+      if (hit[k]) pairs_.push_back({std::sqrt(distance[k]), order_[i + k], int32_t(f)});
   }
 }
 
