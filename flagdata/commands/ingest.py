@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from flagdata.ingest.meshes.store import MeshIngest
     from flagdata.ingest.store import CameraIngest, IngestResult, Labels, WindIngest
     from flagdata.lake import Lake
+
+Told = TypeVar("Told")
+Done = TypeVar("Done")
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
 CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
@@ -288,30 +291,12 @@ def _ingest(
 ) -> None:
     from flagdata.ingest.classify import classify
 
-    kinds: list[Guess | FlagdataError] = []
-    for source in sources:
-        try:
-            kinds.append(classify(source, format_name=format_name, recipe=options.wind.wind.recipe))
-        except FlagdataError as error:
-            kinds.append(error)
+    recipe = options.wind.wind.recipe
+    kinds = _told(sources, lambda source: classify(source, format_name=format_name, recipe=recipe))
     _check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
-    results: list[IngestResult] = []
-    failures: list[tuple[Path, FlagdataError]] = []
-    for source, kind in zip(sources, kinds, strict=True):
-        try:
-            if isinstance(kind, FlagdataError):
-                raise kind
-            result = _one(lake, source, kind, options)
-        except FlagdataError as error:
-            if len(sources) == 1:
-                raise
-            failures.append((source, error))
-            if not as_json:
-                fail(error, as_json=False)
-            continue
-        results.append(result)
-        if not as_json:
-            print_result(result)
+    results, failures = _each(
+        sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_result, as_json=as_json
+    )
     if as_json:
         document(
             "ingest",
@@ -322,6 +307,47 @@ def _ingest(
             },
         )
     _exit_on(failures, sources)
+
+
+def _told(sources: Sequence[Path], tell: Callable[[Path], Told]) -> list[Told | FlagdataError]:
+    """What each source is, or why that cannot be told."""
+
+    def told(source: Path) -> Told | FlagdataError:
+        try:
+            return tell(source)
+        except FlagdataError as error:
+            return error
+
+    return [told(source) for source in sources]
+
+
+def _each(
+    sources: Sequence[Path],
+    told: Sequence[Told | FlagdataError],
+    act: Callable[[Path, Told], Done],
+    show: Callable[[Done], None],
+    *,
+    as_json: bool,
+) -> tuple[list[Done], list[tuple[Path, FlagdataError]]]:
+    """Act on every source in turn and show it; one that fails leaves the others to go on, unless it is the only one."""
+    results: list[Done] = []
+    failures: list[tuple[Path, FlagdataError]] = []
+    for source, found in zip(sources, told, strict=True):
+        try:
+            if isinstance(found, FlagdataError):
+                raise found
+            result = act(source, found)
+        except FlagdataError as error:
+            if len(sources) == 1:
+                raise
+            failures.append((source, error))
+            if not as_json:
+                fail(error, as_json=False)
+            continue
+        results.append(result)
+        if not as_json:
+            show(result)
+    return results, failures
 
 
 def _failures(failures: Sequence[tuple[Path, FlagdataError]]) -> list[dict[str, str | None]]:
@@ -423,30 +449,11 @@ class _CropPicture:
 def _sniff(sources: Sequence[Path], options: _Given, *, given: frozenset[str], as_json: bool) -> None:
     from flagdata.ingest.classify import guesses
 
-    ranked: list[tuple[Guess, ...] | FlagdataError] = []
-    for source in sources:
-        try:
-            ranked.append(guesses(source))
-        except FlagdataError as error:
-            ranked.append(error)
+    ranked = _told(sources, guesses)
     _check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
-    entries: list[dict[str, Any]] = []
-    failures: list[tuple[Path, FlagdataError]] = []
-    for source, found in zip(sources, ranked, strict=True):
-        try:
-            if isinstance(found, FlagdataError):
-                raise found
-            entry = _look(source, found, options)
-        except FlagdataError as error:
-            if len(sources) == 1:
-                raise
-            failures.append((source, error))
-            if not as_json:
-                fail(error, as_json=False)
-            continue
-        entries.append(entry)
-        if not as_json:
-            print_sniffed(entry)
+    entries, failures = _each(
+        sources, ranked, lambda source, found: _look(source, found, options), print_sniffed, as_json=as_json
+    )
     if as_json:
         document("sniff", {"sources": entries, "failures": _failures(failures)})
     _exit_on(failures, sources)
