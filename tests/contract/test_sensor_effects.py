@@ -62,20 +62,6 @@ def nulled(effect: Parametrised) -> Parametrised:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_parameter_has_unit_null_prior_and_source(name: str) -> None:
-    effect = SENSOR_EFFECTS[name]
-    assert effect.strengths()
-    for label, parameter in effect.parameters().items():
-        least, most = parameter.admissible
-        low, high = parameter.prior
-        assert parameter.unit, label
-        assert least <= low < high <= most, label
-        assert least <= parameter.null <= most, label
-        assert len(parameter.source) > 20, label
-        assert f"{label}:" in effect.__doc__, f"{label} is not described in the docstring"
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_at_its_null_value_the_observation_is_untouched_to_the_bit(name: str) -> None:
     effect = nulled(drawn(name))
     assert effect.absent
