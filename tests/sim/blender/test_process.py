@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError
-from sim.render.cycles_process import RenderError, WorkerProcess
-from sim.render.cycles_protocol import PROTOCOL_VERSION, Message, decode, encode
+from sim.blender.process import RenderError, WorkerProcess
+from sim.blender.protocol import PROTOCOL_VERSION, Message, decode, encode
 
 FAKE = Path(__file__).with_name("fake_worker.py")
 

@@ -1,7 +1,7 @@
 """The Blender worker as a process: started when first needed, restarted where it crashes or hangs, ended cleanly.
 
 Blender lives in that process alone: beside torch in one process it hung at exit. The worker is told nothing of lakes,
-recipes or torch; it gets resolved scenes and meshes, and gives pictures back (`sim.render.cycles_protocol`).
+recipes or torch; it gets resolved scenes and meshes, and gives pictures back (`sim.blender.protocol`).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from types import TracebackType
 from typing import IO, Self
 
 from flagdata.errors import FlagdataError, NotFoundError
-from sim.render.cycles_protocol import Message, decode, encode
+from sim.blender.protocol import Message, decode, encode
 
 START_TIMEOUT = 120.0  # s; importing Blender from a cold disk
 EXIT_TIMEOUT = 10.0  # s
 _CHUNK = 1 << 20
 _LOG_TAIL = 2000  # characters of the worker's own output that an error quotes
 
-WORKER = (sys.executable, "-m", "sim.render.cycles_worker")
+WORKER = (sys.executable, "-m", "sim.blender.worker")
 
 
 class RenderError(FlagdataError):
