@@ -119,7 +119,7 @@ class Crew:
             mesh=self.mesh, position=self._start(seed), material=material, handles=self.handles,
             wind=(speed * math.cos(toward), speed * math.sin(toward), wind.vertical),
             gravity=_gravity(self.recipe.scene), air=wind.force, evaluation=self.recipe.scene.evaluation,
-            contact=self.recipe.contact,
+            contact=self.recipe.contact, limits=self.recipe.limits,
         )  # fmt: skip
         parameters: dict[str, Parameter] = {
             "material": base.name,
@@ -159,7 +159,7 @@ class Crew:
             )
             scene = Scene(
                 mesh=self.mesh, position=self._start(0), material=material, handles=self.handles, air=wind.force,
-                evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact,
+                evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact, limits=self.recipe.limits,
             )  # fmt: skip
             effects = {
                 name: {key: ends(value)[end] for key, value in effect.parameters.items()}

@@ -11,17 +11,20 @@ member draws its own value.
                  quantity drawn for each of the 15 coefficients
     [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
+    [limits]     low, high, sweeps; without the table, strain has no limits
     [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit)
     [time]       settle, frames, rate
     [effects.NAME]  parameters of an effect (quantities, or "prior" for its prior range)
 
-`count`, `batch` and `title` do not change what a member is; everything else does.
+Without [material], [wind], [contact] or [limits] an ArcSim scene's own are taken. `count`, `batch` and `title` do not
+change what a member is; everything else does.
 """
 
 from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -29,11 +32,12 @@ from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageEr
 from flagdata.provenance import canonical, digest
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
-from sim.arcsim import ArcsimScene, read_material, read_scene
+from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
 from sim.contact import Contact
 from sim.effects import EFFECTS
 from sim.integrate import INTEGRATORS
 from sim.integrate.implicit import AirShape
+from sim.limits import StrainLimits
 from sim.material import Material, named
 from sim.run.recipe import (
     DTYPES,
@@ -98,12 +102,16 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
     precision = top.text("precision", "float32") or ""
     if precision not in DTYPES:
         raise UnknownNameError.of("precision", precision, DTYPES, where=where)
-    contact = _contact(top.table("contact")) if "contact" in top else None
+    integrator = _integrator(top.table("integrator"))
+    given = None if scene.arcsim is None else scene.arcsim.scene
+    contact = _contact(top.table("contact")) if "contact" in top else given and given.contact
+    bounds = given and given.limits
+    limits = _limits(top.table("limits"), bounds, integrator) if bounds is not None or "limits" in top else None
     recipe = Recipe(
         name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0),
         count=top.whole("count", 1, least=1), batch=top.whole("batch", 16, least=1), precision=precision,
         scene=scene, material=_material(top.table("material"), folder, scene), wind=_wind(top.table("wind"), scene),
-        contact=contact, integrator=_integrator(top.table("integrator")), time=_time(top.table("time")),
+        contact=contact, limits=limits, integrator=integrator, time=_time(top.table("time")),
         effects=_effects(top.table("effects")),
     )  # fmt: skip
     top.done()
@@ -231,6 +239,17 @@ def _contact(table: Table) -> Contact:
     return contact
 
 
+def _limits(table: Table, given: StrainLimits | None, integrator: IntegratorSpec) -> StrainLimits:
+    """Those of the table, in what it leaves out those of an ArcSim scene; small steps need one sweep."""
+    base = replace(given or StrainLimits(), sweeps=SWEEPS if integrator.name == "implicit" else 1)
+    limits = StrainLimits(
+        low=table.number("low", base.low), high=table.number("high", base.high),
+        sweeps=table.whole("sweeps", base.sweeps, least=1),
+    )  # fmt: skip
+    table.done()
+    return limits
+
+
 def _integrator(table: Table) -> IntegratorSpec:
     name = table.text("name", "symplectic") or ""
     if name not in INTEGRATORS:
@@ -290,7 +309,7 @@ def _of_scene_file(path: Path) -> Recipe:
     return Recipe(
         name=path.stem, title=path.name, seed=0, count=1, batch=1, precision="float64", scene=scene,
         material=_material(Table({}, where=where), path.parent, scene), wind=_wind(Table({}, where=where), scene),
-        contact=None,
+        contact=file.scene.contact, limits=file.scene.limits,
         integrator=IntegratorSpec(name="implicit", step=file.step, air_shape=AirShape.PREVIOUS),
         time=TimeSpec(settle=0.0, frames=file.frames + 1, rate=1 / file.frame_time), effects={},
     )  # fmt: skip

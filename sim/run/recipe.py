@@ -18,6 +18,7 @@ from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import ArcsimScene
 from sim.contact import Contact
 from sim.integrate.implicit import AirShape
+from sim.limits import StrainLimits
 from sim.material import Material
 from sim.run.tables import Quantity, plain
 from sim.tables import Evaluation
@@ -151,6 +152,8 @@ class Recipe:
         name: what the artifacts are called after.
         count: how many members.
         batch: members that are simulated together.
+        contact: as of `sim.scene.Scene`.
+        limits: as of `sim.scene.Scene`.
         precision: of the arithmetic, a name of `DTYPES`.
     """
 
@@ -164,6 +167,7 @@ class Recipe:
     material: MaterialSpec
     wind: WindSpec
     contact: Contact | None
+    limits: StrainLimits | None
     integrator: IntegratorSpec
     time: TimeSpec
     effects: Mapping[str, EffectSpec]
@@ -196,6 +200,7 @@ class Recipe:
                 "force": _force(wind.force),
             },
             "contact": None if self.contact is None else vars(self.contact).copy(),
+            **({} if self.limits is None else {"limits": vars(self.limits).copy()}),
             "integrator": {
                 "name": self.integrator.name, "step": self.integrator.step,
                 "air_shape": self.integrator.air_shape.value,

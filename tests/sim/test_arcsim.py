@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import json
+import math
+import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError
-from sim.air import QuadraticNormal
-from sim.arcsim import STAGES, read_material, read_scene
+from flagdata.errors import ConflictError, FlagdataError, InputError, NotFoundError, UnknownNameError
+from sim.air import QuadraticNormal, Stokes
+from sim.arcsim import STAGES, SWEEPS, ArcsimScene, read_material, read_scene, write_scene
+from sim.contact import Contact
+from sim.handles import Handles
+from sim.limits import StrainLimits
 from sim.material import named
+from sim.scene import flag
+from sim.tables import Evaluation
 
 MATERIAL = {"density": 0.284, "stretching": [[50, 1, 60, 40]] * 6, "bending": [[1e-5] * 5] * 3}
 SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
@@ -68,8 +76,10 @@ def test_comments_are_passed_over_but_not_in_texts(write: Write) -> None:
 def test_a_mesh_is_scaled_then_turned_then_moved(write: Write) -> None:
     transform = {"scale": 2, "rotate": [120, 1, 1, 1], "translate": [0, 0, 5]}
     # A third of a turn about (1, 1, 1) takes x to y, y to z and z to x.
-    position = read_scene(write(cloth(transform=transform))).scene.position
-    np.testing.assert_allclose(position, [[0, 0, 5], [0, 2, 5], [0, 2, 7], [0, 0, 7]], atol=1e-12)
+    scene = read_scene(write(cloth(transform=transform))).scene
+    np.testing.assert_allclose(scene.position, [[0, 0, 5], [0, 2, 5], [0, 2, 7], [0, 0, 7]], atol=1e-12)
+    # ArcSim scales the material coordinates along: the cloth is larger, not stretched.
+    np.testing.assert_allclose(scene.mesh.rest, [[0, 0], [2, 0], [2, 2], [0, 2]])
 
 
 def test_thickening_scales_density_and_both_tables(write: Write) -> None:
@@ -99,14 +109,102 @@ def test_all_that_is_not_supported_is_told_at_once(write: Write) -> None:
     what = caught.value.what
     for key in ("camera", "cloths[0].texture", "cloths[0].materials[0].sheen", "wind.gusts", "obstacles"):
         assert key in what
-    assert "the stages strainlimiting, remeshing, proximity, separation, popfilter" in what
-    assert "plasticity" not in what
-    assert "collision" not in what
+    assert "the stages remeshing, separation, popfilter" in what
+    for stage in ("strainlimiting", "proximity", "plasticity", "collision"):
+        assert stage not in what
 
 
-def test_accepted_stages_are_stated(write: Write) -> None:
-    read = read_scene(write({"disable": []}), accept=STAGES)
-    assert read.left_out == ("proximity", "collision", "separation", "popfilter")
+def test_accepted_stages_are_left_out_and_stated(write: Write) -> None:
+    path = write({**cloth(materials=[{"data": "m.json", "strain_limits": [0.9, 1.1]}]), "disable": []})
+    read = read_scene(path, accept=STAGES)
+    assert read.left_out == ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter")
+    assert (read.scene.contact, read.scene.limits) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("disable", "left"),
+    # Separation and the pop filter are parts of ArcSim's remeshing step.
+    [(["remeshing"], ("collision",)), (["collision"], ("remeshing", "separation", "popfilter")), ([*STAGES], ())],
+)
+def test_stages_of_remeshing_act_only_with_it(write: Write, disable: list[str], left: tuple[str, ...]) -> None:
+    accept = ("remeshing", "collision", "separation", "popfilter")
+    assert read_scene(write({"disable": disable}), accept=accept).left_out == left
+
+
+DISABLED = ["remeshing", "collision"]
+
+
+def test_proximity_is_contact_with_arcsims_defaults(write: Write) -> None:
+    # ArcSim 0.2.1: repulsion_thickness 1 mm, collision_stiffness 1e9, friction 0.6.
+    assert read_scene(write({"disable": DISABLED})).scene.contact == Contact(
+        thickness=1e-3, stiffness=1e9, friction=0.6
+    )
+    magic = {"repulsion_thickness": 10e-3, "collision_stiffness": 1e6, "projection_thickness": 1e-3}
+    scene = read_scene(write({"disable": DISABLED, "magic": magic, "friction": 0.1})).scene
+    assert scene.contact == Contact(thickness=0.01, stiffness=1e6, friction=0.1)
+    assert read_scene(write({"disable": [*DISABLED, "proximity"], "magic": magic})).scene.contact is None
+
+
+def test_strain_limits_are_the_materials_unless_disabled(write: Write) -> None:
+    changes = cloth(materials=[{"data": "m.json", "strain_limits": [0.9, 1.2]}])
+    limits = read_scene(write({**changes, "disable": DISABLED})).scene.limits
+    assert limits is not None
+    assert (limits.low, limits.high) == (0.9, 1.2)
+    assert read_scene(write({**changes, "disable": [*DISABLED, "strainlimiting"]})).scene.limits is None
+    assert read_scene(write({"disable": DISABLED})).scene.limits is None  # ArcSim's default is without
+
+
+@pytest.mark.parametrize("contact", [None, Contact(thickness=0.02, stiffness=1e5, friction=0.3)])
+@pytest.mark.parametrize("limits", [None, StrainLimits(low=0.8, high=1.3, sweeps=SWEEPS)])
+def test_a_scene_that_is_written_comes_back(
+    contact: Contact | None, limits: StrainLimits | None, tmp_path: Path
+) -> None:
+    scene = flag(material=replace(named("gray-interlock"), damping=1e-3), wind_speed=4.5, columns=6)
+    scene = replace(
+        scene, air=QuadraticNormal(density=1.2, drag=0.1), gravity=(0.0, 0.1, -9.7), contact=contact, limits=limits,
+        handles=Handles(vertices=(0, 3, 34), stiffness=500.0),
+    )  # fmt: skip
+    file = ArcsimScene(scene=scene, frame_time=0.04, frame_steps=8, frames=12)
+    read = read_scene(write_scene(file, tmp_path / "run"))
+    assert (read.frame_time, read.frame_steps, read.frames, read.left_out) == (0.04, 8, 12, ())
+    for name in ("handles", "wind", "gravity", "air", "evaluation", "contact", "limits"):
+        assert getattr(read.scene, name) == getattr(scene, name)
+    np.testing.assert_array_equal(read.scene.mesh.faces, scene.mesh.faces)
+    np.testing.assert_allclose(read.scene.mesh.rest, scene.mesh.rest, rtol=1e-8)  # nine digits
+    np.testing.assert_allclose(read.scene.position, scene.position, rtol=1e-8)
+    material = read.scene.material
+    assert (material.name, material.density, material.damping) == ("gray-interlock", scene.material.density, 1e-3)
+    np.testing.assert_array_equal(material.stretching, scene.material.stretching)
+    np.testing.assert_array_equal(material.bending, scene.material.bending)
+    with pytest.raises(ConflictError, match="already"):
+        write_scene(file, tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"handles": Handles(vertices=(0, 4), stiffness=math.inf)}, "rigid handles"),
+        ({"handles": Handles(vertices=(0, 4), offsets=((0, 0, 1),))}, "moving handles"),
+        ({"air": Stokes()}, "the wind force Stokes"),
+        ({"evaluation": Evaluation.CORRECTED}, "the corrected evaluation"),
+        ({"limits": StrainLimits(high=math.inf)}, "without an upper one"),
+    ],
+)
+def test_what_arcsim_cannot_be_told_is_not_written(changes: dict[str, Any], word: str, tmp_path: Path) -> None:
+    scene = replace(flag(material=named("paper"), wind_speed=4, columns=6), **changes)
+    with pytest.raises(InputError, match=word):
+        write_scene(ArcsimScene(scene=scene, frame_time=0.04, frame_steps=8, frames=1), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_scene_and_its_material_do_not_take_each_others_place(tmp_path: Path) -> None:
+    file = ArcsimScene(
+        scene=flag(material=named("paper"), wind_speed=4, columns=6), frame_time=0.04, frame_steps=8, frames=1
+    )
+    with pytest.raises(InputError, match="both named paper"):
+        write_scene(file, tmp_path, name="paper")
+    with pytest.raises(InputError, match="0 frames"):
+        replace(file, frames=0)
 
 
 @pytest.mark.parametrize(
@@ -133,6 +231,21 @@ def test_accepted_stages_are_stated(write: Write) -> None:
         ({"end_time": 3}, InputError, "given 2 times"),
         ({"duration": 0.01}, InputError, "at least one frame"),
         (cloth(materials=[{"data": "m.json", "density_mult": -1}]), InputError, "density"),
+        (
+            {**cloth(materials=[{"data": "m.json", "strain_limits": 1.05}]), "disable": ["remeshing", "collision"]},
+            InputError,
+            "strain_limits",
+        ),
+        (
+            {
+                **cloth(materials=[{"data": "m.json", "strain_limits": [1.1, 1.2]}]),
+                "disable": ["remeshing", "collision"],
+            },
+            InputError,
+            "exclude the rest state",
+        ),
+        ({"disable": ["remeshing", "collision"], "magic": {"repulsion_thickness": 0}}, InputError, "thickness"),
+        ({"magic": {"friction": 0.6}}, InputError, "magic.friction"),
     ],
 )
 def test_impossible_scenes_are_refused(
@@ -167,5 +280,21 @@ def test_the_reference_materials_are_the_catalogs(reference_data: Path) -> None:
 @pytest.mark.reference
 def test_the_papers_own_scene_names_what_it_needs(reference_data: Path) -> None:
     # Its scene runs with all of ArcSim's stages on.
-    with pytest.raises(InputError, match="stages strainlimiting, remeshing, proximity, collision"):
+    with pytest.raises(InputError, match="stages remeshing, collision, separation, popfilter"):
         read_scene(reference_data / "arcsim" / "raw_remeshed" / "conf.json")
+
+
+@pytest.mark.reference
+def test_the_papers_own_scene_has_its_contact_and_limits(reference_data: Path, tmp_path: Path) -> None:
+    folder = reference_data / "arcsim" / "raw_remeshed"
+    for kind in ("meshes", "materials"):
+        (tmp_path / kind).mkdir()
+    # Its mesh is not among the data: the coarse one of its first frame, whose corners are numbered alike.
+    (tmp_path / "meshes" / "flag.obj").write_text((folder / "0000_00.obj").read_text())
+    shutil.copy(reference_data / "materials" / "camel-ponte-roma.json", tmp_path / "materials")
+    shutil.copy(folder / "conf.json", tmp_path)
+    scene = read_scene(tmp_path / "conf.json", accept=("remeshing", "collision", "separation", "popfilter")).scene
+    assert scene.contact == Contact(thickness=0.01, stiffness=1e6, friction=0.6)
+    assert scene.limits == StrainLimits(low=0.95, high=1.05, sweeps=SWEEPS)
+    # thicken = 2
+    np.testing.assert_allclose(scene.material.density, 2 * named("camel-ponte-roma").density, rtol=1e-9)

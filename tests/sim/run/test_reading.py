@@ -13,7 +13,9 @@ from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNam
 from flagdata.provenance import canonical
 from sim.air import QuadraticNormal, Stokes
 from sim.arcsim import STAGES
+from sim.contact import Contact
 from sim.effects import EFFECTS
+from sim.limits import StrainLimits
 from sim.run.members import Crew
 from sim.run.reading import load, names, parse
 from sim.run.recipe import Shape
@@ -86,6 +88,9 @@ def test_what_is_left_out_has_its_default_in_the_identity() -> None:
         ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "no file is named"),
         ("scene = 3\n" + MINIMAL, InputError, "not a table"),
         ("[wind\n", InputError, "not TOML"),
+        (MINIMAL + "[limits]\nhgih = 1.1\n", UnknownNameError, "did you mean 'high'"),
+        (MINIMAL + "[limits]\nlow = 1.1\n", InputError, "exclude the rest state"),
+        (MINIMAL + "[limits]\nsweeps = 0\n", InputError, "sweeps is 0"),
     ],
 )
 def test_what_is_wrong_is_refused_with_its_place(text: str, error: type[FlagdataError], word: str) -> None:
@@ -146,7 +151,7 @@ def scene_folder(tmp_path: Path) -> Path:
         "frame_time": 0.04, "frame_steps": 8, "duration": 1, "gravity": [0, 0, -9.8],
         "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json", "strain_limits": [0.95, 1.05]}]}],
         "handles": [{"nodes": [0, 3]}], "wind": {"velocity": [0, 3, 1], "density": 1.2},
-        "disable": ["collision", "separation", "popfilter"],
+        "friction": 0.2, "disable": ["remeshing", "collision"],
     }  # fmt: skip
     (tmp_path / "square.obj").write_text(SQUARE)
     (tmp_path / "m.json").write_text(json.dumps(material))
@@ -185,8 +190,33 @@ def test_a_scene_file_by_itself_runs_with_arcsims_steps(scene_folder: Path) -> N
     recipe = load(str(scene_folder / "plain.json"))
     assert (recipe.integrator.name, recipe.integrator.step, recipe.time.settle) == ("implicit", 0.005, 0.0)
     assert (recipe.time.frames, recipe.time.rate) == (26, 25.0)
-    with pytest.raises(InputError, match="stages strainlimiting, proximity"):
-        load(str(scene_folder / "scene.json"))
+    assert (recipe.contact, recipe.limits) == (None, None)
+
+
+def test_a_scenes_contact_and_limits_are_the_recipes_unless_it_says_otherwise(scene_folder: Path) -> None:
+    whole = load(str(scene_folder / "scene.json"))
+    # ArcSim's defaults: 1 mm, 1e9 N/m³; the scene's own friction.
+    assert whole.contact == Contact(thickness=1e-3, stiffness=1e9, friction=0.2)
+    assert whole.limits == StrainLimits(low=0.95, high=1.05, sweeps=50)
+    kept = ARCSIM.replace('accept = ["strainlimiting", "proximity"]\n', "")
+    recipe = read(kept, scene_folder)
+    assert recipe.contact == whole.contact
+    assert recipe.limits == StrainLimits(low=0.95, high=1.05, sweeps=1)  # small steps
+    scene = Crew(recipe).member(0).scene
+    assert (scene.contact, scene.limits) == (recipe.contact, recipe.limits)
+    other = read(kept + "[contact]\nthickness = 0.01\n[limits]\nhigh = 1.2\n", scene_folder)
+    assert other.contact == Contact(thickness=0.01, stiffness=1e6, friction=0.6)
+    assert other.limits == StrainLimits(low=0.95, high=1.2)
+    assert other.identity() != recipe.identity()
+    assert read(ARCSIM, scene_folder).limits is None
+
+
+def test_limits_may_be_given_to_any_recipe() -> None:
+    assert read(MINIMAL + "[limits]\n").limits == StrainLimits(low=0.95, high=1.05, sweeps=1)
+    implicit = '[integrator]\nname = "implicit"\n[limits]\nlow = 0.9\n'
+    assert read(MINIMAL + implicit).limits == StrainLimits(low=0.9, high=1.05, sweeps=50)
+    assert read(MINIMAL + "[limits]\n").identity() != read(MINIMAL).identity()
+    assert "limits" not in read(MINIMAL).identity()  # members of before limits were known keep their names
 
 
 @pytest.mark.parametrize(

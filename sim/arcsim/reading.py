@@ -1,8 +1,13 @@
-"""ArcSim 0.2 scenes and materials, read as typed scenes. What the simulator does not do is refused by name.
+"""Reading ArcSim 0.2.1's scenes and materials. What the simulator does not do is refused by name.
 
-A scene file names one cloth with one material, its handles, gravity and wind. Stages that ArcSim runs unless they are
-disabled and that are not simulated here (remeshing, strain limiting, collision, plasticity) are an error unless the
-scene disables them, has no settings that make them act, or the caller accepts to leave them out.
+A scene file names one cloth with one material, its handles, gravity and wind. ArcSim's step has stages, which all act
+unless the scene disables them, strain limiting and plasticity only where a material has settings for them, separation
+and the pop filter only after remeshing. Of these, *proximity* becomes `Scene.contact` (`magic.repulsion_thickness`,
+1 mm; `magic.collision_stiffness`, 1e9 N/m³; `friction`, 0.6) and *strainlimiting* `Scene.limits`. The others are not
+simulated: they are an error unless the scene disables them or the caller accepts to leave them out.
+
+Two deviations: ArcSim reads `duration` only beside `timestep` and runs without end beside `frame_time`, here it ends
+the run in both; ArcSim meets strain limits by an optimisation, here the faces are corrected in `SWEEPS` sweeps.
 """
 
 from __future__ import annotations
@@ -21,17 +26,27 @@ from flagdata.errors import InputError, UnknownNameError
 from flagdata.ingest.meshes import read_obj
 from flagdata.ingest.meshes.folder import read_json
 from sim.air import QuadraticNormal
+from sim.contact import Contact
 from sim.handles import ARCSIM_STIFFNESS, Handles
+from sim.limits import StrainLimits
 from sim.material import Material
 from sim.mesh import Mesh
 from sim.scene import Scene
 
 STAGES = ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter", "plasticity")
 """Stages of ArcSim's step that a scene may disable."""
+SIMULATED = ("strainlimiting", "proximity")
+"""Those of them that are simulated here."""
+SWEEPS = 50
+"""Corrections a step for strain limits, as ArcSim's steps of 5 ms want them."""
+THICKNESS, STIFFNESS, FRICTION = 1e-3, 1e9, 0.6
+"""ArcSim's defaults of proximity: repulsion thickness [m], collision stiffness [N/m³], friction of cloth on cloth."""
 
 # What of a scene file is read: key → None for a value, a mapping for a table, a list of one for a list of tables.
 _KEYS: Mapping[str, Any] = {
-    **dict.fromkeys(("frame_time", "frame_steps", "end_time", "end_frame", "duration", "gravity", "disable")),
+    **dict.fromkeys(
+        ("frame_time", "frame_steps", "end_time", "end_frame", "duration", "gravity", "disable", "friction")
+    ),
     "cloths": [
         {
             "mesh": None,
@@ -47,9 +62,14 @@ _KEYS: Mapping[str, Any] = {
     ],
     "handles": [dict.fromkeys(("nodes", "type"))],
     "wind": dict.fromkeys(("velocity", "density", "drag")),
-    "magic": dict.fromkeys(("handle_stiffness", "repulsion_thickness", "collision_stiffness", "friction")),
-    **dict.fromkeys(("motions", "obstacles", "morphs")),
+    "magic": dict.fromkeys(
+        ("handle_stiffness", "repulsion_thickness", "collision_stiffness", "projection_thickness",
+         "edge_flip_threshold", "rib_stiffening", "combine_tensors")
+    ),
+    **dict.fromkeys(("motions", "obstacles", "morphs", "obs_friction")),
 }  # fmt: skip
+# `remeshing`, `projection_thickness` to `combine_tensors`, `weakening` and `obs_friction` belong to stages that are not
+# simulated and to obstacles: they say nothing once those are left out.
 _EMPTY = ("motions", "obstacles", "morphs")  # known, and only supported empty
 
 
@@ -63,13 +83,23 @@ class ArcsimScene:
         frame_steps: ArcSim's backward Euler steps a frame.
         frames: frames after the first.
         left_out: stages that ArcSim would run and that the caller accepted to leave out.
+
+    Raises:
+        InputError: a frame time that is not positive, or no steps or frames.
     """
 
     scene: Scene
     frame_time: float
     frame_steps: int
     frames: int
-    left_out: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.frame_time) and self.frame_time > 0 and self.frame_steps >= 1 and self.frames >= 1):
+            raise InputError(
+                f"{self.frames} frames of {self.frame_time!r} s in {self.frame_steps} steps",
+                where="ArcSim scene", fix="let it last at least one frame of at least one step",
+            )  # fmt: skip
 
     @property
     def step(self) -> float:
@@ -99,7 +129,7 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
 
     Args:
         root: folder that the mesh and material paths are relative to; the scene file's own if None.
-        accept: stages (of `STAGES`) that may be left out although the scene has them act.
+        accept: stages (of `STAGES`) that are left out although the scene has them act, those of `SIMULATED` too.
 
     Raises:
         NotFoundError: a file that is not there.
@@ -118,8 +148,11 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
     entry = _one(cloth, "materials", where)
 
     shape = read_obj(folder / _text(cloth, "mesh", where))
-    mesh = Mesh(rest=shape.rest, faces=shape.faces)
+    transform = cloth.get("transform", {})
+    # A scale acts on the material coordinates too: a larger cloth, not a stretched one.
+    mesh = Mesh(rest=shape.rest * _number(transform, "scale", 1.0, where), faces=shape.faces)
     wind, magic = content.get("wind", {}), content.get("magic", {})
+    simulated = _acting(content, where) - set(left_out)
     nodes: list[int] = []
     for handle in _list(content, "handles", where):
         if handle.get("type", "node") != "node":
@@ -127,7 +160,7 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
         nodes += [int(node) for node in handle.get("nodes", [])]
     scene = Scene(
         mesh=mesh,
-        position=_placed(shape.positions, cloth.get("transform", {}), where),
+        position=_placed(shape.positions, transform, where),
         material=_scaled(read_material(folder / _text(entry, "data", where)), entry, where),
         handles=Handles(
             vertices=tuple(nodes), stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, f"{where}, magic")
@@ -137,6 +170,8 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
         air=QuadraticNormal(
             density=_number(wind, "density", 1.0, f"{where}, wind"), drag=_number(wind, "drag", 0.0, f"{where}, wind")
         ),
+        contact=_contact(content, magic, where) if "proximity" in simulated else None,
+        limits=_limits(entry, where) if "strainlimiting" in simulated else None,
     )
     frame_time = _number(content, "frame_time", math.nan, where)
     frame_steps = _number(content, "frame_steps", math.nan, where)
@@ -165,24 +200,16 @@ def _frames(content: Mapping[str, Any], frame_time: float, where: str) -> int:
 
 
 def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -> tuple[str, ...]:
-    """The stages that would act and were accepted to be left out.
+    """The stages that act and are left out.
 
     Raises:
         InputError: keys, contents or stages that are not supported, all of them in one.
     """
     keys = _strange(content, _KEYS, "", where)
     filled = [key for key in _EMPTY if content.get(key)]
-    cloths = [c for c in _list(content, "cloths", where) if isinstance(c, Mapping)]
-    entries = [e for c in cloths for e in _list(c, "materials", where) if isinstance(e, Mapping)]
-    acts = {"proximity", "collision", "separation", "popfilter"}
-    if any("remeshing" in cloth for cloth in cloths):
-        acts.add("remeshing")
-    if any("strain_limits" in entry for entry in entries):
-        acts.add("strainlimiting")
-    if any("yield_curv" in entry for entry in entries):
-        acts.add("plasticity")
-    acting = tuple(stage for stage in STAGES if stage in acts - set(_list(content, "disable", where)))
-    refused = [stage for stage in acting if stage not in accept]
+    acting = tuple(stage for stage in STAGES if stage in _acting(content, where))
+    left_out = tuple(stage for stage in acting if stage in accept)
+    refused = [stage for stage in acting if stage not in (*accept, *SIMULATED)]
     told = [
         f"{what} {', '.join(names)}"
         for what, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
@@ -192,7 +219,34 @@ def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -
         fixes = ["remove what is not supported"] if keys or filled else []
         fixes += ['add the stages to the scene\'s "disable", or accept to leave them out'] if refused else []
         raise InputError(f"not supported: {'; '.join(told)}", where=where, fix="; ".join(fixes))
-    return acting
+    return left_out
+
+
+def _acting(content: Mapping[str, Any], where: str) -> set[str]:
+    """Stages that act in a scene."""
+    acting: set[str] = {*STAGES} - set(_list(content, "disable", where))
+    cloths = [cloth for cloth in _list(content, "cloths", where) if isinstance(cloth, Mapping)]
+    entries = [entry for c in cloths for entry in _list(c, "materials", where) if isinstance(entry, Mapping)]
+    for stage, key in (("strainlimiting", "strain_limits"), ("plasticity", "yield_curv")):
+        if not any(key in entry for entry in entries):
+            acting.discard(stage)
+    return acting if "remeshing" in acting else acting - {"separation", "popfilter"}
+
+
+def _contact(content: Mapping[str, Any], magic: Mapping[str, Any], where: str) -> Contact:
+    return Contact(
+        thickness=_number(magic, "repulsion_thickness", THICKNESS, f"{where}, magic"),
+        stiffness=_number(magic, "collision_stiffness", STIFFNESS, f"{where}, magic"),
+        friction=_number(content, "friction", FRICTION, where),
+    )
+
+
+def _limits(entry: Mapping[str, Any], where: str) -> StrainLimits:
+    given = entry["strain_limits"]
+    if not isinstance(given, list) or len(given) != 2:
+        raise InputError(f"strain_limits is {given!r}", where=where, fix="give [low, high]")
+    low, high = (_number({"strain_limits": value}, "strain_limits", 0.0, where) for value in given)
+    return StrainLimits(low=low, high=high, sweeps=SWEEPS)
 
 
 def _strange(content: Any, known: Mapping[str, Any], path: str, where: str) -> list[str]:

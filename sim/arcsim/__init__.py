@@ -1,0 +1,9 @@
+"""ArcSim 0.2.1's scenes and materials, read as typed scenes and written back.
+
+Which of its stages are simulated, and with which defaults, is in `sim.arcsim.reading`.
+"""
+
+from sim.arcsim.reading import STAGES, SWEEPS, ArcsimScene, read_material, read_scene
+from sim.arcsim.writing import write_scene
+
+__all__ = ["STAGES", "SWEEPS", "ArcsimScene", "read_material", "read_scene", "write_scene"]

@@ -1,0 +1,115 @@
+"""Writing scenes as ArcSim 0.2.1 reads them. What ArcSim cannot be told is refused by name.
+
+All stages that are not simulated here are disabled in what is written, and those that are where the scene does without
+them, so that ArcSim runs what the scene says. The sweeps of strain limits are not written: ArcSim meets its limits by
+an optimisation.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import ConflictError, InputError
+from flagdata.ingest.meshes import Obj, write_obj
+from sim.air import QuadraticNormal
+from sim.arcsim.reading import SIMULATED, STAGES, ArcsimScene
+from sim.material import Material
+from sim.scene import Scene
+from sim.tables import Evaluation
+
+
+def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path:
+    """Write `name`.json with its mesh `name`.obj and its material, by which `sim.arcsim.read_scene` gives it back.
+
+    ArcSim looks for the mesh and the material from where it is run: run it in the folder. Positions have nine
+    significant digits, all else is exact.
+
+    Returns:
+        The scene file.
+
+    Raises:
+        InputError: handles that move or are rigid, a wind force other than the quadratic one, the corrected evaluation
+            of the tables, or strain limits without an upper one, all of them listed.
+        ConflictError: one of the files is there already.
+    """
+    scene = file.scene
+    air = _expressible(scene)
+    paths = [folder / f"{name}.json", folder / f"{name}.obj", folder / f"{scene.material.name}.json"]
+    if len({path.name for path in paths}) < len(paths):
+        raise InputError(
+            f"scene and material are both named {name}", where=str(folder), fix="give the scene another name"
+        )
+    for path in paths:
+        if path.exists():
+            raise ConflictError("there is a file already", where=str(path), fix="write to another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    content, mesh, material = paths
+    write_obj(mesh, Obj(positions=scene.position, faces=scene.mesh.faces, rest=scene.mesh.rest))
+    _write(material, _material(scene.material))
+    _write(content, _content(file, air, mesh=mesh.name, material=material.name))
+    return content
+
+
+def _expressible(scene: Scene) -> QuadraticNormal:
+    """The scene's wind force, where ArcSim can be told it and all else."""
+    refused: list[str] = []
+    if len(scene.handles.times) > 1 or any(any(offset) for offset in scene.handles.offsets):
+        refused.append("moving handles")
+    if scene.handles.rigid:
+        refused.append("rigid handles")
+    air = scene.air if isinstance(scene.air, QuadraticNormal) else None
+    if air is None:
+        refused.append(f"the wind force {type(scene.air).__name__}")
+    if scene.evaluation is not Evaluation.ARCSIM:
+        refused.append(f"the {scene.evaluation.value} evaluation of the tables")
+    if scene.limits is not None and math.isinf(scene.limits.high):
+        refused.append("strain limits without an upper one")
+    if refused or air is None:
+        raise InputError(
+            f"ArcSim does not know: {', '.join(refused)}", where="ArcSim scene", fix="write a scene without them"
+        )
+    return air
+
+
+def _content(file: ArcsimScene, air: QuadraticNormal, *, mesh: str, material: str) -> dict[str, Any]:
+    scene = file.scene
+    entry: dict[str, Any] = {"data": material, "damping": scene.material.damping}
+    magic: dict[str, Any] = {"handle_stiffness": scene.handles.stiffness}
+    content: dict[str, Any] = {
+        "frame_time": file.frame_time,
+        "frame_steps": file.frame_steps,
+        "end_frame": file.frames,
+        "cloths": [{"mesh": mesh, "materials": [entry]}],
+        "handles": [{"nodes": list(scene.handles.vertices)}],
+        "gravity": list(scene.gravity),
+        "wind": {"velocity": list(scene.wind), "density": air.density, "drag": air.drag},
+        "magic": magic,
+    }
+    simulated = set(SIMULATED)
+    if scene.contact is None:
+        simulated.remove("proximity")
+    else:
+        magic["repulsion_thickness"] = scene.contact.thickness
+        magic["collision_stiffness"] = scene.contact.stiffness
+        content["friction"] = scene.contact.friction
+    if scene.limits is None:
+        simulated.remove("strainlimiting")
+    else:
+        entry["strain_limits"] = [scene.limits.low, scene.limits.high]
+    content["disable"] = [stage for stage in STAGES if stage not in simulated]
+    return content
+
+
+def _material(material: Material) -> dict[str, Any]:
+    return {
+        "density": material.density,
+        "stretching": material.stretching.tolist(),
+        "bending": material.bending.tolist(),
+    }
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
