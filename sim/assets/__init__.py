@@ -1,0 +1,133 @@
+"""Pictures that renders are made of, by name: textures of the cloth, and backgrounds.
+
+A name is `kind/member`: `flag/japan`, `stripes/81234` (procedural, drawn from the seed 81234), `photo/beach/3.jpg` (a
+file in the folder the user named). The same name gives the same picture, to the last byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.registry import Registry
+from sim.assets.photos import Photos
+
+PHOTO = "photo"
+
+
+class Kind(Protocol):
+    """A family of pictures."""
+
+    def draw(self, rng: np.random.Generator) -> str:
+        """The name of one member."""
+        ...
+
+    def image(self, member: str) -> NDArray[np.uint8]:
+        """A member's picture (height, width, 3), sRGB.
+
+        Raises:
+            UnknownNameError: there is no such member.
+        """
+        ...
+
+
+TEXTURES = Registry(
+    "texture",
+    {
+        "flag": "sim.assets.flags:NATIONAL",
+        "weave": "sim.assets.cloths:WEAVE",
+        "stripes": "sim.assets.cloths:STRIPES",
+        "checks": "sim.assets.cloths:CHECKS",
+        "print": "sim.assets.cloths:PRINT",
+    },
+)
+BACKGROUNDS = Registry(
+    "background",
+    {
+        "sky": "sim.assets.backgrounds:SKY",
+        "hills": "sim.assets.backgrounds:HILLS",
+        "foliage": "sim.assets.backgrounds:FOLIAGE",
+        "buildings": "sim.assets.backgrounds:BUILDINGS",
+    },
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assets:
+    """Where textures and backgrounds come from.
+
+    Attributes:
+        photos: a folder of photographs that take the place of procedural backgrounds; None for none.
+
+    Raises:
+        InputError: no such folder, or no photographs in it.
+    """
+
+    photos: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.photos is not None:
+            self._photos()
+
+    def texture(self, name: str) -> NDArray[np.uint8]:
+        """A texture by name: (height, width, 3) sRGB, upper row first.
+
+        Raises:
+            UnknownNameError: there is no such texture.
+        """
+        kind, member = _split(name, "texture", "flag/japan")
+        return TEXTURES[kind].image(member)
+
+    def background(self, name: str) -> NDArray[np.uint8]:
+        """A background by name: (height, width, 3) sRGB.
+
+        Raises:
+            UnknownNameError: there is no such background.
+            InputError: a photograph that cannot be read, or one without a folder of photographs.
+        """
+        kind, member = _split(name, "background", "sky/1")
+        if kind == PHOTO:
+            return self._photos().image(member)
+        return BACKGROUNDS[kind].image(member)
+
+    def draw_texture(self, kinds: Sequence[str], rng: np.random.Generator) -> str:
+        """The name of a texture of one of these kinds, each with equal chance.
+
+        Raises:
+            UnknownNameError: a kind that does not exist.
+        """
+        return _draw(TEXTURES, kinds, rng)
+
+    def draw_background(self, kinds: Sequence[str], rng: np.random.Generator) -> str:
+        """The name of a photograph where there is a folder of them, else of a background of one of these kinds.
+
+        Raises:
+            UnknownNameError: a kind that does not exist.
+        """
+        if self.photos is not None:
+            return f"{PHOTO}/{self._photos().draw(rng)}"
+        return _draw(BACKGROUNDS, kinds, rng)
+
+    def _photos(self) -> Photos:
+        if self.photos is None:
+            raise InputError("no folder of photographs was named", where=PHOTO, fix="name the folder they are in")
+        return Photos.of(self.photos)
+
+
+def _split(name: str, noun: str, example: str) -> tuple[str, str]:
+    kind, slash, member = name.partition("/")
+    if not slash or not member:
+        raise InputError(f"{name!r} does not name a {noun}", where=noun, fix=f"write kind/member, as {example!r}")
+    return kind, member
+
+
+def _draw(table: Registry, kinds: Sequence[str], rng: np.random.Generator) -> str:
+    made = [table[kind] for kind in kinds]
+    place = int(rng.integers(len(kinds)))
+    return f"{kinds[place]}/{made[place].draw(rng)}"

@@ -1,0 +1,39 @@
+"""Procedural pictures: a kind draws its members from seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.rng import stream
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seeded:
+    """Pictures that follow from a seed.
+
+    Attributes:
+        kind: the name of the kind, which is part of the stream's.
+        paint: makes linear-free sRGB values (height, width, 3) in [0, 1] from a generator.
+    """
+
+    kind: str
+    paint: Callable[[np.random.Generator], NDArray[np.float64]]
+
+    def draw(self, rng: np.random.Generator) -> str:
+        return str(int(rng.integers(2**31)))
+
+    def image(self, member: str) -> NDArray[np.uint8]:
+        """The picture of a seed.
+
+        Raises:
+            InputError: the member is no seed.
+        """
+        if not member.isascii() or not member.isdigit():
+            raise InputError(f"{member!r} is no seed", where=f"{self.kind}/…", fix=f"write {self.kind}/ and a number")
+        values = self.paint(stream(int(member), "assets", self.kind))
+        return np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)

@@ -1,0 +1,23 @@
+"""How meshes are seen: the renderers' contract, and the renderers by name.
+
+A renderer turns meshes and render parameters ζ into frames. What all renderers share is one function each: `stage`
+places camera, sun, cloth and pole; `Camera.project` maps the world to pixels; `plate` fits the background; `develop`
+turns linear light into sRGB bytes.
+"""
+
+from __future__ import annotations
+
+from flagdata.registry import Registry
+from sim.render.meshes import Meshes
+from sim.render.parameters import RenderParameters
+from sim.render.renderer import Renderer
+
+__all__ = ["RENDERERS", "Meshes", "RenderParameters", "Renderer"]
+
+RENDERERS = Registry(
+    "renderer",
+    {
+        "raster": "sim.render.raster:Raster",
+    },
+)
+"""Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`."""

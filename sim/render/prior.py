@@ -1,0 +1,174 @@
+"""What render parameters are drawn from: a catalog file of ranges with their sources, one named stream a parameter."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from typing import Any
+
+from flagdata.errors import InputError, UnknownNameError
+from flagdata.rng import stream
+from sim.assets import Assets
+from sim.render.parameters import RenderParameters
+from sim.run.tables import Quantity, Range, Table, ends, plain
+
+_DEGREES = "-deg"  # suffix of a key whose values are in degrees
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderPrior:
+    """Ranges of ζ.
+
+    Attributes:
+        name: of the catalog file.
+        quantities: parameter → fixed value or range, in the parameter's own unit; the others keep their default.
+        sources: parameter → where its range is from.
+        textures, backgrounds: kinds of which each draw takes one with equal chance, then one of that kind.
+        least_angle: between the heading and the camera's axis, taken as lines [rad]; draws below it are drawn again. A
+            flag's surface is not seen from upwind or downwind.
+
+    Raises:
+        InputError: a range outside of what is admissible, camera angles that all break the rule, no kinds.
+        UnknownNameError: a quantity that ζ does not have.
+    """
+
+    name: str
+    quantities: Mapping[str, Quantity]
+    sources: Mapping[str, str]
+    textures: tuple[str, ...]
+    backgrounds: tuple[str, ...]
+    least_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        where = f"render prior {self.name!r}"
+        described = RenderParameters.described()
+        for name, quantity in self.quantities.items():
+            if name not in described:
+                raise UnknownNameError.of("render parameter", name, described, where=where)
+            low, high = ends(quantity)
+            if low < described[name].least or high > described[name].most:
+                raise InputError(
+                    f"{name} from {low:g} to {high:g} {described[name].unit}", where=where,
+                    fix=f"stay within {described[name].least:g} to {described[name].most:g}",
+                )  # fmt: skip
+        low, high = ends(self.quantities.get("camera_angle", RenderParameters.camera_angle))
+        across = math.floor(high / math.pi - 0.5) >= math.ceil(low / math.pi - 0.5)
+        widest = math.pi / 2 if across else max(_to_line(low), _to_line(high))
+        if widest < self.least_angle or (widest == self.least_angle > 0 and low < high):
+            raise InputError(
+                f"no camera angle is {math.degrees(self.least_angle):g}° or more from the heading", where=where,
+                fix="widen the range of camera-angle, or lower least-angle",
+            )  # fmt: skip
+        for noun, kinds in (("textures", self.textures), ("backgrounds", self.backgrounds)):
+            if not kinds:
+                raise InputError(f"no {noun}", where=where, fix="name at least one kind")
+
+    def draw(self, seed: int, assets: Assets) -> RenderParameters:
+        """One ζ. Each parameter has a stream of its own, so that changing one range moves no other parameter.
+
+        Raises:
+            UnknownNameError: a kind of texture or background that the assets do not have.
+        """
+        numbers: dict[str, Any] = {}
+        for name, quantity in self.quantities.items():
+            rng = stream(seed, "render", name)
+            value = _at(quantity, rng.random())
+            while name == "camera_angle" and _to_line(value) < self.least_angle and isinstance(quantity, Range):
+                value = _at(quantity, rng.random())
+            whole = isinstance(getattr(RenderParameters, name), int)
+            numbers[name] = round(value) if whole else value
+        texture, background = stream(seed, "render", "texture"), stream(seed, "render", "background")
+        return RenderParameters(
+            texture=assets.draw_texture(self.textures, texture),
+            background=assets.draw_background(self.backgrounds, background),
+            **numbers,
+        )
+
+    def with_quantities(self, changes: Mapping[str, Quantity], *, source: str) -> RenderPrior:
+        """This prior with some quantities replaced, and where the new ones are from.
+
+        Raises:
+            InputError, UnknownNameError: as the class.
+        """
+        return replace(
+            self, quantities={**self.quantities, **changes}, sources={**self.sources, **dict.fromkeys(changes, source)}
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """All that shapes a draw beside its seed and the assets, as JSON."""
+        return {
+            "quantities": {name: plain(quantity) for name, quantity in self.quantities.items()},
+            "textures": list(self.textures), "backgrounds": list(self.backgrounds), "least_angle": self.least_angle,
+        }  # fmt: skip
+
+
+def names() -> list[str]:
+    """Names of the catalog's render priors, sorted."""
+    folder = files("catalogs") / "renders"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def named(name: str) -> RenderPrior:
+    """A render prior of the catalog.
+
+    Raises:
+        UnknownNameError: with the nearest name that is there.
+    """
+    if name not in names():
+        raise UnknownNameError.of("render prior", name, names())
+    text = (files("catalogs") / "renders" / f"{name}.toml").read_text(encoding="utf-8")
+    return read(tomllib.loads(text), name=name)
+
+
+def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
+    """A prior from a parsed file: `title`, `least-angle-deg`, `textures`, `backgrounds`, and any number of tables of
+    quantities, each with the `source` of its ranges. Keys are ζ's names in kebab-case; angles end in `-deg`.
+
+    Raises:
+        InputError: missing, unknown or ill-typed entries, or a parameter that is given twice.
+    """
+    table = Table(content, where=f"render prior {name!r}")
+    table.text("title", None)
+    least_angle = math.radians(table.number("least-angle-deg", 0.0, least=0.0))
+    textures, backgrounds = table.texts("textures"), table.texts("backgrounds")
+    quantities: dict[str, Quantity] = {}
+    sources: dict[str, str] = {}
+    for section in table.names():
+        if section in ("title", "least-angle-deg", "textures", "backgrounds"):
+            continue
+        part = table.table(section)
+        source = part.text("source", None)
+        if not source:
+            raise InputError("no source", where=part.where, fix='say where the ranges are from: source = "…"')
+        for parameter, entry in RenderParameters.described().items():
+            key = parameter.replace("_", "-") + (_DEGREES if entry.unit == "rad" else "")
+            if key not in part:
+                continue
+            if parameter in quantities:
+                raise InputError(f"{key} is given twice", where=part.where, fix="keep one")
+            given = part.quantity(key, 0.0)
+            quantities[parameter] = _radians(given) if entry.unit == "rad" else given
+            sources[parameter] = source
+        part.done()
+    return RenderPrior(
+        name=name, quantities=quantities, sources=sources, textures=textures, backgrounds=backgrounds,
+        least_angle=least_angle,
+    )  # fmt: skip
+
+
+def _at(quantity: Quantity, share: float) -> float:
+    return quantity.at(share) if isinstance(quantity, Range) else quantity
+
+
+def _radians(quantity: Quantity) -> Quantity:
+    if isinstance(quantity, Range):
+        return Range(low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale)
+    return math.radians(quantity)
+
+
+def _to_line(angle: float) -> float:
+    """The angle to the nearest multiple of π, in [0, π/2]."""
+    return abs(math.remainder(angle, math.pi))
