@@ -37,6 +37,11 @@ class AirForce(Protocol):
         """(vertex, 3, batch) [N] for a wind (3, batch), or (vertex, 3, batch) where it differs in space [m/s]."""
         ...
 
+    @property
+    def plain(self) -> QuadraticNormal:
+        """The quadratic-normal force nearest to it, of which the compiled kernel takes care."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True)
 class FaceWind:
@@ -89,12 +94,20 @@ class QuadraticNormal:
                     f"{name} {value!r} is negative or not finite", where="wind force", fix="give at least 0"
                 )
 
+    @property
+    def plain(self) -> QuadraticNormal:
+        """Itself."""
+        return self
+
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
         seen = face_wind(cloth, position, velocity, wind)
         third = (cloth.areas / 3)[:, None, None]
         push = third * (self.density * seen.across.abs() * seen.across * seen.normal + self.drag * seen.along)
         return gather_sum([push, push, push], cloth.face_slots)
+
+
+NO_AIR = QuadraticNormal(density=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +125,11 @@ class Stokes:
             raise InputError(
                 f"viscosity {self.viscosity!r} is negative or not finite", where="wind force", fix="give at least 0"
             )
+
+    @property
+    def plain(self) -> QuadraticNormal:
+        """None of it acts."""
+        return NO_AIR
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""

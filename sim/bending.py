@@ -58,14 +58,10 @@ def fold(cloth: Cloth, position: Tensor) -> Fold:
 
 def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
     """k S / 2 at fold angles (hinge, batch): (hinge, batch) [N·m/rad]."""
-    k = _table_stiffness(cloth, angle)
-    return k if cloth.stiffening is None else k * (1 + cloth.stiffening)
-
-
-def _table_stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
     curvature = angle * cloth.hinge_column[:, None]
     k = bending_stiffness(curvature, cloth.segments, cloth.hinge_rows, cloth.evaluation)
-    return k * (cloth.hinge_shape[:, None] / 2)
+    k = k * (cloth.hinge_shape[:, None] / 2)
+    return k if cloth.stiffening is None else k * (1 + cloth.stiffening)
 
 
 def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tensor]:
@@ -88,15 +84,6 @@ def force(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
     if not len(cloth.hinges):
         return torch.zeros_like(position)
     return gather_sum(corner_forces(cloth, position, velocity), cloth.hinge_slots)
-
-
-def added_force(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """The part of `force` that is due to `Cloth.stiffening`: (vertex, 3, batch) [N]."""
-    if cloth.stiffening is None or not len(cloth.hinges):
-        return torch.zeros_like(position)
-    f = fold(cloth, position)
-    corners = _corners(cloth, f, _table_stiffness(cloth, f.angle) * cloth.stiffening, velocity)
-    return gather_sum(corners, cloth.hinge_slots)
 
 
 def energy(cloth: Cloth, position: Tensor) -> Tensor:

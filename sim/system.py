@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -14,7 +14,7 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim import bending, contact, inertia, membrane
-from sim.air import AirForce, QuadraticNormal
+from sim.air import AirForce
 from sim.cloth import Cloth
 from sim.contact import Contact
 from sim.handles import Handles
@@ -92,6 +92,14 @@ class Drive:
     wind: tuple[Tensor, Tensor]
     targets: tuple[Tensor, Tensor]
     rate: Tensor
+
+    def part(self, start: float, end: float) -> Drive:
+        """Between two shares of it, each from 0 to 1."""
+
+        def both(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+            return torch.lerp(*pair, start), torch.lerp(*pair, end)
+
+        return Drive(wind=both(self.wind), targets=both(self.targets), rate=self.rate)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -294,15 +302,15 @@ class System:
         return total.index_add(0, self.held, -self.handles.stiffness * stretch)
 
     @property
-    def plain_air(self) -> QuadraticNormal | None:
-        """The air's force where the compiled kernel knows it: quadratic-normal, in a wind that is uniform in space."""
-        return self.air if isinstance(self.air, QuadraticNormal) and not self.flows else None
-
-    @property
     def extra(self) -> bool:
         """Whether anything acts that the compiled kernel does not know."""
-        added = (*self.effects, *self.loads, *self.ties, *self.frictions)
-        return bool(added) or self.plain_air is None or self.cloth.stiffening is not None
+        added = (*self.effects, *self.flows, *self.loads, *self.ties, *self.frictions)
+        return bool(added) or self.air is not self.air.plain
+
+    @cached_property
+    def base(self) -> System:
+        """The part of it that the compiled kernel knows: the base model, in the undisturbed wind."""
+        return replace(self, air=self.air.plain, effects=(), flows=(), loads=(), ties=(), frictions=())
 
     def extra_force(
         self,
@@ -315,14 +323,16 @@ class System:
         memory: tuple[Tensor, ...] = (),
         effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """The part of `force` that the compiled kernel does not know: (vertex, 3, batch) [N]. Arguments as there."""
-        wind = self.local(torch.lerp(*drive.wind, share), time, position)
-        total = torch.zeros_like(position)
-        if self.plain_air is None:
+        """The part of `force` that is not the `base`'s: (vertex, 3, batch) [N]. Arguments as there.
+
+        Of the air, it is the difference to the base's.
+        """
+        undisturbed = torch.lerp(*drive.wind, share)
+        wind = self.local(undisturbed, time, position)
+        total = self._tie_damping(drive, time, position, velocity)
+        if self.flows or self.air is not self.air.plain:
             total = total + self.air.force(self.cloth, position, velocity, wind)
-        if self.cloth.stiffening is not None:
-            total = total + bending.added_force(self.cloth, position, velocity)
-        total = total + self._tie_damping(drive, time, position, velocity)
+            total = total - self.air.plain.force(self.cloth, position, velocity, undisturbed)
         moving = velocity if effect_velocity is None else effect_velocity
         return self._with_added(total, wind, time, position, moving, memory)
 

@@ -89,6 +89,11 @@ class FactoredNormal:
     base: QuadraticNormal
     effects: tuple[PressureEffect, ...]
 
+    @property
+    def plain(self) -> QuadraticNormal:
+        """Without the factors."""
+        return self.base
+
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
         seen = face_wind(cloth, position, velocity, wind)

@@ -72,6 +72,7 @@ struct Problem {
   const T* mass;          // (blocks, vertices, L)
   const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly
   const T* segments;      // (blocks, 3, 5, L)
+  const T* stiffening;    // (blocks, hinges, L) bending stiffness on top, as a share; or null
   const T* damping;       // (blocks, L)
   const int32_t* table;   // (blocks, L)
   const T* gravity;       // (blocks, 3, L)
@@ -289,7 +290,8 @@ class Block {
       const T* s = segments + 5 * L * r;
       k += weight * (load(s) + load(s + L) * column + load(s + 2 * L) * c1 + load(s + 3 * L) * c2 + load(s + 4 * L) * c3);
     }
-    return maximum(k, V{}) * (p.hinge_shape[e] * T(0.5));
+    k = maximum(k, V{}) * (p.hinge_shape[e] * T(0.5));
+    return p.stiffening ? k * (1 + load(p.stiffening + (b * p.hinges + e) * L)) : k;
   }
 
   void hinges(const T* x, const T* v, T* f) const {

@@ -11,7 +11,6 @@ from weakref import WeakKeyDictionary
 import torch
 from torch import Tensor
 
-from sim.air import QuadraticNormal
 from sim.contact import Contact, layers
 from sim.kernel.build import library
 from sim.system import Drive, System
@@ -21,8 +20,9 @@ _POINTERS = (
     "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "samples",
 )  # fmt: skip
 _SCALARS = ("origin", "spacing", "air_density", "air_drag", "stiffness")
-_BLOCKED = ("mass", "inverse_mass", "segments", "damping", "table", "gravity", "wind", "targets", "rate")
-
+_BLOCKED = (
+    "mass", "inverse_mass", "segments", "stiffening", "damping", "table", "gravity", "wind", "targets", "rate",
+)  # fmt: skip
 
 _CONTACT_POINTERS = ("face", "vertex_area", "rest", "centre", "apart")
 _CONTACT_SCALARS = ("thickness", "stiffness", "friction")
@@ -63,13 +63,16 @@ class Kernel:
     """The kernel for one system.
 
     Attributes:
+        batch: members.
+        dtype: of all numbers.
         lanes: members of a block.
         blocks: how many blocks the batch takes; spare lanes of the last repeat its last member.
         tensors: what the kernel reads, kept alive here.
     """
 
-    system: System
     code: ctypes.CDLL
+    batch: int
+    dtype: torch.dtype
     lanes: int
     blocks: int
     problem: _Problem
@@ -77,7 +80,8 @@ class Kernel:
 
     @classmethod
     def of(cls, system: System) -> Kernel | None:
-        """The kernel for a system; None where there is none: not a CPU, not float32 or 64, or it cannot be built."""
+        """The kernel for the base of a system; None where there is none: not a CPU, not float32 or 64, or it cannot be
+        built."""
         cloth = system.cloth
         if cloth.device.type != "cpu" or cloth.dtype not in (torch.float32, torch.float64):
             return None
@@ -96,7 +100,7 @@ class Kernel:
         inverse_mass = 1 / cloth.mass
         if system.clamped:
             inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
-        air = system.plain_air or QuadraticNormal(density=0.0)
+        air = system.air.plain
 
         def block(tensor: Tensor) -> Tensor:
             return _to_blocks(tensor, lanes, blocks)
@@ -116,6 +120,7 @@ class Kernel:
             "mass": block(cloth.mass),
             "inverse_mass": block(inverse_mass),
             "segments": block(cloth.segments),
+            "stiffening": block(torch.zeros_like(cloth.mass[:0]) if cloth.stiffening is None else cloth.stiffening),
             "damping": block(cloth.damping),
             "table": block(cloth.table_of.int()),
             "gravity": block(system.gravity),
@@ -129,13 +134,21 @@ class Kernel:
         problem.batch = cloth.batch
         problem.counts[:] = cloth.grid.counts
         for name, tensor in tensors.items():
-            setattr(problem, name, tensor.data_ptr())
+            setattr(problem, name, tensor.data_ptr() if tensor.numel() else None)
         if system.contact is not None:
             tensors |= _set_contact(problem.contact, system, system.contact, tensors["face"])
         if system.limits is not None:
             problem.lowest, problem.highest = system.limits.low, system.limits.high
             problem.sweeps = system.limits.sweeps
-        return cls(system=system, code=code, lanes=lanes, blocks=blocks, problem=problem, tensors=tensors)
+        return cls(
+            code=code,
+            batch=cloth.batch,
+            dtype=cloth.dtype,
+            lanes=lanes,
+            blocks=blocks,
+            problem=problem,
+            tensors=tensors,
+        )
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
         """The problem with wind and handles set; the tensors must outlive the call it is made for."""
@@ -155,7 +168,7 @@ class Kernel:
 
     def unpack(self, blocks: Tensor) -> Tensor:
         """(block, …, lane) → (…, batch)."""
-        return blocks.movedim(0, -2).flatten(-2)[..., : self.system.cloth.batch].contiguous()
+        return blocks.movedim(0, -2).flatten(-2)[..., : self.batch].contiguous()
 
     def advance(self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int) -> tuple[Tensor, Tensor]:
         """Leapfrog without effects: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
@@ -167,7 +180,7 @@ class Kernel:
         return self.unpack(xb), self.unpack(vb)
 
     def forces(self, drive: Drive, share: float, x: Tensor, v: Tensor) -> Tensor:
-        """The base model's forces (vertex, 3, batch) [N]: all but effects and winds' forces other than quadratic."""
+        """The base's forces (vertex, 3, batch) [N]: what `System.extra_force` leaves."""
         problem, alive = self._drive(drive)
         xb, vb = self.pack(x), self.pack(v)
         out = torch.empty_like(xb)
@@ -196,7 +209,7 @@ class Kernel:
         return self.unpack(xb).masked_fill(lost, torch.nan), self.unpack(vb).masked_fill(lost, torch.nan)
 
     def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes.c_double | ctypes.c_int64) -> None:
-        function = _function(self.code, name, self.system.cloth.dtype)
+        function = _function(self.code, name, self.dtype)
         function.restype = None
         passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
         function(ctypes.byref(problem), ctypes.c_int64(self.blocks), *passed)
