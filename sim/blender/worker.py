@@ -5,11 +5,11 @@ message swaps the meshes in place and is answered by the picture. It imports Ble
 
 Messages, and their answers:
 
-    scene  → done    engine, width, height, samples, bounces, seed, threads, camera {matrix (4 × 4, camera to world,
+    scene  → done    engine, width, height, samples, bounces, threads, camera {matrix (4 × 4, camera to world,
                      looking along its −z, y up), focal, centre [px]}, sun {toward, irradiance [W/m²], angle (its
                      angular radius) [rad]}, sky (radiance of the surroundings), objects [{name, albedo (linear),
                      translucency}]; arrays "texture/NAME" (height, width, 3) uint8 sRGB albedo, row 0 on top (v = 1)
-    frame  → picture arrays "positions/NAME" (vertex, 3) [m], "faces/NAME" (face, 3), "uv/NAME" (vertex, 2), v up;
+    frame  → picture seed; arrays "positions/NAME" (vertex, 3) [m], "faces/NAME" (face, 3), "uv/NAME" (vertex, 2), v up;
                      answered by "rgba" (height, width, 4) float32: linear radiance times coverage, coverage
     exit   → nothing
 """
@@ -78,7 +78,7 @@ class Studio:
         if fields["engine"] == "CYCLES":
             cycles = scene.cycles
             cycles.device = "CPU"
-            cycles.samples, cycles.seed = fields["samples"], fields["seed"]
+            cycles.samples = fields["samples"]
             cycles.max_bounces = cycles.diffuse_bounces = fields["bounces"]
             cycles.use_adaptive_sampling = cycles.use_denoising = False
             cycles.pixel_filter_type = "BOX"
@@ -165,6 +165,8 @@ class Studio:
         for name, thing in self._objects.items():
             arrays = message.arrays
             self._shape(name, thing, arrays[f"positions/{name}"], arrays[f"faces/{name}"], arrays[f"uv/{name}"])
+        if self._scene.render.engine == "CYCLES":
+            self._scene.cycles.seed = message.fields["seed"]
         self._bpy.ops.render.render(write_still=True)
         return self._read()
 

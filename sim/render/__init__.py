@@ -18,6 +18,8 @@ RENDERERS = Registry(
     "renderer",
     {
         "raster": "sim.render.raster:Raster",
+        "cycles": "sim.render.cycles:Cycles",
+        "workbench": "sim.render.cycles:Workbench",
     },
 )
 """Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`."""
