@@ -8,7 +8,6 @@ VALIDATIONS = {
     "clock-recovery": "tests.validation.clock_recovery",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
-    "simulator": "tests.validation.simulator",
 }
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ _RATIOS = (0.1, 0.2, 0.4, 0.5, 0.6, 0.8)
 _COLUMNS = (12, 24, 48)
 _SHARES = np.array([0.95, 0.99, 1.02, 1.05, 1.1])
 _DURATION = 2.0
+_SWEPT = (0.2, 0.5)
 _THEORY, _SIMULATED, _WITHOUT = "#1f5f8b", "#b5541c", "#444444"
 
 
@@ -96,7 +97,7 @@ def _growth_over_speed() -> dict[str, Any]:
     Of the mode that is largest at the end of the run: well below the onset not always the one that decays slowest.
     """
     result: dict[str, Any] = {}
-    for beta in (0.2, 0.5):
+    for beta in _SWEPT:
         strip = _loaded(beta)
         critical = onset(strip, lowest=0.1, highest=8.0).speed
         # What grows fast reaches large slopes, but is also soon alone: a shorter run.
@@ -109,7 +110,7 @@ def _growth_over_speed() -> dict[str, Any]:
         )
         speeds, unloaded = np.concatenate([slow, fast]), np.linspace(0.3, 4.0, 14) * critical
         bare = growth(sweep(_BARE, unloaded), columns=24, duration=_DURATION)
-        result[f"beta {beta}"] = {
+        result[_name(beta)] = {
             "critical_speed": critical,
             "speeds": speeds.tolist(),
             "simulated_growth": rates.real.tolist(),
@@ -121,6 +122,10 @@ def _growth_over_speed() -> dict[str, Any]:
             "frequency_in_vacuum": float(eigenvalues(_BARE)[0].imag),
         }
     return result
+
+
+def _name(beta: float) -> str:
+    return f"M/(m+M) = {beta:g}"
 
 
 def _amplitudes() -> dict[str, Any]:
@@ -164,18 +169,27 @@ def _plot(result: dict[str, Any], out: Path) -> None:
             )
         axes.set(xlabel="mass ratio M/(m+M)", ylabel=label)
     speed.legend(frameon=False, fontsize=8)
-    for (name, sweeps), style in zip(result["growth"].items(), ("-", "--"), strict=True):
+    shares = np.linspace(0.3, 1.5, 97)
+    for beta, style in zip(_SWEPT, ("-", "--"), strict=True):
+        name = _name(beta)
+        sweeps = result["growth"][name]
         critical = sweeps["critical_speed"]
         share = np.array(sweeps["speeds"]) / critical
-        rate.plot(share, sweeps["calculated_growth"], style, color=_THEORY, lw=1.2, label=f"calculation, {name}")
+        calculated = [leading(member).real for member in sweep(_loaded(beta), shares * critical)]
+        rate.plot(shares, calculated, style, color=_THEORY, lw=1.2, label=f"calculation, {name}")
         rate.plot(share, sweeps["simulated_growth"], "o", color=_SIMULATED, mfc="none" if style == "-" else None, ms=4,
                   label=f"simulator, {name}")  # fmt: skip
         unloaded = np.array(sweeps["without_loading_speeds"]) / critical
-        label = "simulator, without loading" if style == "-" else None
+        label = "simulator, M = 0" if style == "-" else None
         rate.plot(unloaded, sweeps["without_loading_growth"], ".", color=_WITHOUT, label=label)
     rate.axhline(0, color="#999999", lw=0.6)
-    rate.set(xlabel="speed / calculated onset", ylabel="growth rate of the leading mode [1/s]", ylim=(-8, 14))
-    rate.legend(frameon=False, fontsize=8)
+    rate.set(xlabel="speed / calculated onset", ylabel="growth rate of the leading mode [1/s]", xlim=(0.25, 2.6),
+             ylim=(-6, 16))  # fmt: skip
+    strongest = max(abs(v) for sweeps in result["growth"].values() for v in sweeps["without_loading_growth"])
+    rate.text(
+        2.55, -0.3, f"M = 0, up to 4 times the onset: within {strongest:.1g} 1/s of 0", fontsize=7, ha="right", va="top"
+    )
+    rate.legend(frameon=False, fontsize=8, loc="upper right")
     shares = result["amplitude"]["shares_of_critical_speed"]
     for label, colour in (("with_loading", _SIMULATED), ("without_loading", _WITHOUT)):
         for name, style in (("2_to_4_s", "o:"), ("6_to_8_s", "o-")):

@@ -139,7 +139,7 @@ def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
     if points:
         plane.plot(*zip(*points, strict=True), "o", color="#b5541c", mfc="none", label="simulator, M = 0.50 ρL")
     plane.set(xlabel="ρ L / ρₛ h", ylabel="onset  U / √(B / ρ L³)", xlim=(0, 10), ylim=(0, 60))
-    plane.legend(frameon=False, fontsize=8)
+    plane.legend(frameon=False, fontsize=8, ncols=2, loc="upper right")
     thresholds = _dadamo()["thresholds"]
     length = [row["length_m"] for row in thresholds]
     for axes, parts in (
@@ -157,7 +157,10 @@ def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
         color="#222222",
         label="half of the tunnel's",
     )
-    sheets.set(xlabel="length [m]", ylabel="onset of flutter [m/s]", title="paper sheets, d'Adamo 2024")
-    pitch.set(xlabel="length [m]", ylabel="frequency there [Hz]")
-    sheets.legend(frameon=False, fontsize=8)
+    sheets.set(xlabel="length [m]", ylabel="onset of flutter [m/s]", ylim=(0, 20))
+    pitch.set(xlabel="length [m]", ylabel="frequency there [Hz]", ylim=(0, 30))
+    plane.set_title("two-dimensional sheets: Argentina and Mahadevan 2005", fontsize=9)
+    sheets.set_title("paper sheets: d'Adamo and others 2024", fontsize=9)
+    sheets.legend(frameon=False, fontsize=7, loc="upper right")
+    pitch.legend(frameon=False, fontsize=7, loc="lower left")
     figure.savefig(out / "validate-flutter-measured.png", dpi=110)
