@@ -47,8 +47,31 @@ class Load(Protocol):
         ...
 
 
+@dataclass(frozen=True, kw_only=True)
+class Springs:
+    """Springs −k (s − min(1, ℓ/|d|)) d for a stretch d from anchors that move with the handles.
+
+    Attributes:
+        vertices: (spring,).
+        anchors: (spring, 3, batch) at zero offset [m].
+        stiffness: k, (spring, batch) [N/m].
+        slack: ℓ, (spring, batch) [m].
+        share: s; 1 for springs of their own, 0 for what slack takes away from the handles'.
+    """
+
+    vertices: Tensor
+    anchors: Tensor
+    stiffness: Tensor
+    slack: Tensor
+    share: float
+
+
 class Tie(Protocol):
     """Springs beside the handles, damped as those are. Where it loosens handles it makes up the difference to them."""
+
+    def springs(self, cloth: Cloth) -> Springs:
+        """All that it is."""
+        ...
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """The elastic part: (vertex, 3, batch) [N]."""
@@ -87,11 +110,15 @@ class Drive:
         wind: (3, batch) at the start and at the end [m/s].
         targets: (held, 3, batch) of the handles at the start and at the end [m].
         rate: (held, 3, batch) velocity of the handles [m/s].
+        offset: (3,) displacement of everything that moves with the handles, at the start and at the end [m].
+        drift: (3,) its velocity [m/s].
     """
 
     wind: tuple[Tensor, Tensor]
     targets: tuple[Tensor, Tensor]
     rate: Tensor
+    offset: tuple[Tensor, Tensor]
+    drift: Tensor
 
     def part(self, start: float, end: float) -> Drive:
         """Between two shares of it, each from 0 to 1."""
@@ -99,7 +126,7 @@ class Drive:
         def both(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
             return torch.lerp(*pair, start), torch.lerp(*pair, end)
 
-        return Drive(wind=both(self.wind), targets=both(self.targets), rate=self.rate)
+        return replace(self, wind=both(self.wind), targets=both(self.targets), offset=both(self.offset))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -232,6 +259,8 @@ class System:
         seen = position if air_position is None else air_position
         wind = self.local(wind, time, seen)
         total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, seen, velocity, wind)
+        for tie in self.ties:
+            total = total + tie.force(self.cloth, time, position)
         moving = velocity if effect_velocity is None else effect_velocity
         return self._with_added(total, wind, time, position, moving, memory)
 
@@ -240,24 +269,28 @@ class System:
     ) -> Tensor:
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
-        for tie in self.ties:
-            total = total + tie.force(self.cloth, time, position)
         for friction, past in zip(self.frictions, self._memory(memory), strict=True):
             total = total + friction.force(self.cloth, past, position)
         return total
 
+    def offset(self, time: float) -> Tensor:
+        """(3,) displacement of the handles' anchors at a time [m]."""
+        return torch.as_tensor(self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device)
+
     def targets(self, time: float) -> Tensor:
         """(held, 3, batch) where the handles are at a time [m]."""
-        offset = torch.as_tensor(self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device)
-        return self.anchors + offset[:, None]
+        return self.anchors + self.offset(time)[:, None]
 
     def drive(self, start: float, end: float) -> Drive:
         """Wind and handles between two times [s], taken as linear."""
         first, last = self.targets(start), self.targets(end)
+        offset = (self.offset(start), self.offset(end))
         return Drive(
             wind=(self.wind.velocity(start), self.wind.velocity(end)),
             targets=(first, last),
             rate=(last - first) / (end - start),
+            offset=offset,
+            drift=(offset[1] - offset[0]) / (end - start),
         )
 
     @property
@@ -304,13 +337,12 @@ class System:
     @property
     def extra(self) -> bool:
         """Whether anything acts that the compiled kernel does not know."""
-        added = (*self.effects, *self.flows, *self.loads, *self.ties, *self.frictions)
-        return bool(added) or self.air is not self.air.plain
+        return bool((*self.effects, *self.flows, *self.frictions)) or self.air is not self.air.plain
 
     @cached_property
     def base(self) -> System:
-        """The part of it that the compiled kernel knows: the base model, in the undisturbed wind."""
-        return replace(self, air=self.air.plain, effects=(), flows=(), loads=(), ties=(), frictions=())
+        """The part of it that the compiled kernel knows: the base model with ties and loads, in the undisturbed wind."""
+        return replace(self, air=self.air.plain, effects=(), flows=(), frictions=())
 
     def extra_force(
         self,
@@ -329,7 +361,7 @@ class System:
         """
         undisturbed = torch.lerp(*drive.wind, share)
         wind = self.local(undisturbed, time, position)
-        total = self._tie_damping(drive, time, position, velocity)
+        total = torch.zeros_like(position)
         if self.flows or self.air is not self.air.plain:
             total = total + self.air.force(self.cloth, position, velocity, wind)
             total = total - self.air.plain.force(self.cloth, position, velocity, undisturbed)
@@ -341,7 +373,7 @@ class System:
         tied = self.tied(time, position)
         if tied is None:
             return torch.zeros_like(velocity)
-        return -self.cloth.damping * tied * (velocity - drive.rate.mean(0))
+        return -self.cloth.damping * tied * (velocity - drive.drift[:, None])
 
     def tensors(self) -> tuple[Tensor, ...]:
         """The parameters that gradients may be wanted of."""

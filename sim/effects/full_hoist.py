@@ -15,7 +15,7 @@ from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.handles import Handles, full_hoist
 from sim.state import State
-from sim.system import System
+from sim.system import Springs, System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class FullHoist(Effect):
         share = np.gradient(along) if len(hoist) > 2 else np.full(2, np.ptp(along) / 2)
         vertices = torch.tensor([hoist[i] for i in added], device=state.position.device)
         lace = Lace(
-            springs=torch.as_tensor(share[added], dtype=system.cloth.dtype, device=system.cloth.device)[:, None]
+            strength=torch.as_tensor(share[added], dtype=system.cloth.dtype, device=system.cloth.device)[:, None]
             * self.stiffness,
             vertices=vertices,
             anchors=state.position[vertices],
@@ -63,22 +63,29 @@ class Lace:
     """Springs to anchors that move with the handles.
 
     Attributes:
-        springs: (tied, batch or 1) [N/m].
+        strength: (tied, batch or 1) [N/m].
         vertices: (tied,).
         anchors: (tied, 3, batch) [m].
         handles: whose motion they follow.
     """
 
-    springs: Tensor
+    strength: Tensor
     vertices: Tensor
     anchors: Tensor
     handles: Handles
+
+    def springs(self, cloth: Cloth) -> Springs:
+        """All that it is."""
+        stiffness = self.strength.expand(-1, cloth.batch)
+        return Springs(
+            vertices=self.vertices, anchors=self.anchors, stiffness=stiffness, slack=0 * stiffness, share=1.0
+        )
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """(vertex, 3, batch) [N]."""
         offset = torch.as_tensor(self.handles.offset(time), dtype=position.dtype, device=position.device)
         stretch = position[self.vertices] - self.anchors - offset[:, None]
-        return torch.zeros_like(position).index_add(0, self.vertices, -self.springs.unsqueeze(1) * stretch)
+        return torch.zeros_like(position).index_add(0, self.vertices, -self.strength.unsqueeze(1) * stretch)
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """(vertex, batch) [N/m]."""
@@ -86,4 +93,4 @@ class Lace:
 
     def stiffest(self, cloth: Cloth) -> Tensor:
         """(vertex, batch) [N/m]."""
-        return torch.zeros_like(cloth.mass).index_add(0, self.vertices, self.springs.expand(-1, cloth.batch))
+        return torch.zeros_like(cloth.mass).index_add(0, self.vertices, self.strength.expand(-1, cloth.batch))

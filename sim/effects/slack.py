@@ -15,7 +15,7 @@ from sim.effects.geometry import norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.handles import Handles
 from sim.state import State
-from sim.system import System
+from sim.system import Springs, System
 
 # Shorter cords count as this long [m], so that the gradient at none is finite.
 _SHORTEST = 1e-6
@@ -65,6 +65,16 @@ class Play:
     vertices: Tensor
     anchors: Tensor
     handles: Handles
+
+    def springs(self, cloth: Cloth) -> Springs:
+        """All that it is."""
+        slack = torch.as_tensor(self.length, dtype=cloth.dtype, device=cloth.device).expand(
+            len(self.vertices), cloth.batch
+        )
+        return Springs(
+            vertices=self.vertices, anchors=self.anchors, stiffness=torch.full_like(slack, self.handles.stiffness),
+            slack=slack, share=0.0,
+        )  # fmt: skip
 
     def _stretch(self, time: float, position: Tensor) -> tuple[Tensor, Tensor]:
         """d (held, 3, batch) [m], and the share of it that is slack (held, 1, batch)."""

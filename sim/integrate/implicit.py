@@ -48,7 +48,7 @@ class BackwardEuler:
         tolerance: relative residual at which a member's solve stops.
         iterations: bound on conjugate-gradient steps. A member that has not converged by then gets NaN, which
             `State.healthy` reports; the others go on.
-        backend: what computes the step; the kernel knows the base model without contact and effects.
+        backend: what computes the step; the kernel knows the base model without contact.
     """
 
     step: float = 5e-3
@@ -79,7 +79,7 @@ class BackwardEuler:
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         kernel = kernel_for(system, state, self.backend)
-        if kernel is not None and not system.extra and system.contact is None:
+        if kernel is not None and not (system.extra or system.loads or system.ties) and system.contact is None:
             lag = h if self.air_shape is AirShape.PREVIOUS else 0.0
             x, v = kernel.implicit(drive, x, v, h, lag=lag, tolerance=self.tolerance, iterations=self.iterations)
             x, v = system.limited(x, v, h)

@@ -110,7 +110,7 @@ def advance(
         v = v.index_copy(0, system.held, drive.rate)
     start = State(position=x, velocity=v, time=state.time, memory=state.memory)
     if not system.extra:
-        x, v = _base(system, drive, x, v, duration / steps, steps, kernel_for(system, start, backend))
+        x, v = _base(system, drive, state.time, x, v, duration / steps, steps, kernel_for(system, start, backend))
         return State(position=x, velocity=v, time=state.time + duration)
     if outer is None:
         return _each_step(system, drive, start, duration, steps=steps, backend=backend)
@@ -122,14 +122,16 @@ def advance(
 
 
 def _base(
-    system: System, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int, kernel: Kernel | None
+    system: System, drive: Drive, start: float, x: Tensor, v: Tensor, h: float, steps: int, kernel: Kernel | None
 ) -> tuple[Tensor, Tensor]:
-    """Positions and velocities after steps of h [s] of a system that is its own base."""
+    """Positions and velocities after steps of h [s] from a time, of a system that is its own base."""
     if kernel is not None:
         return kernel.advance(drive, x, v, h, steps)
     inverse_mass = _inverse_mass(system)
     for index in range(steps + 1):
-        acceleration = inverse_mass * system.force(drive, index / steps, 0.0, x, v)
+        share = index / steps
+        force = system.force(drive, share, start + share * h * steps, x, v)
+        acceleration = inverse_mass * system.effective(x, force)
         v = v + (h / 2 if index in (0, steps) else h) * acceleration
         if index < steps:
             x, v = system.limited(x + h * v, v, h)
@@ -161,11 +163,6 @@ def _each_step(system: System, drive: Drive, state: State, duration: float, *, s
 def _impulses(
     system: System, drive: Drive, state: State, duration: float, *, inner: int, outer: int, backend: Backend
 ) -> State:
-    if system.loads:
-        raise UsageError(
-            "mass of air that moves with the cloth acts in every step", where="integrator symplectic",
-            fix="leave the outer step out, or the effect",
-        )  # fmt: skip
     base, length = system.base, duration / outer
     x, v, memory = state.position, state.velocity, state.memory
     kernel = None if kernel_for(system, state, backend) is None else Kernel.of(base)
@@ -173,12 +170,13 @@ def _impulses(
     for index in range(outer + 1):
         share = index / outer
         level = v + length / 2 * acceleration
-        force = system.extra_force(drive, share, state.time + share * duration, x, level, memory=memory)
-        acceleration = inverse_mass * force
+        time = state.time + share * duration
+        force = system.extra_force(drive, share, time, x, level, memory=memory)
+        acceleration = inverse_mass * system.effective(x, force)
         v = v + (length / 2 if index in (0, outer) else length) * acceleration
         if index < outer:
             part = drive.part(share, (index + 1) / outer)
-            x, v = _base(base, part, x, v, length / inner, inner, kernel)
+            x, v = _base(base, part, time, x, v, length / inner, inner, kernel)
             memory = system.remembered(memory, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
 

@@ -49,7 +49,7 @@ struct Arctangent<double> {
 // Field by field as in fused.py.
 template <typename T>
 struct Problem {
-  int64_t vertices, faces, hinges, held;
+  int64_t vertices, faces, hinges, held, ties;
   int64_t counts[3];
   int64_t fold;  // 1: bending looks up |curvature|
   const int32_t* face;         // (faces, 3)
@@ -60,6 +60,7 @@ struct Problem {
   const T* hinge_column;       // (hinges)
   const T* hinge_rows;         // (hinges, 3)
   const int32_t* held_vertex;  // (held)
+  const int32_t* tie_vertex;   // (ties)
   const T* samples;            // (tables, n0, n1, n2, 4)
   double origin, spacing, air_density, air_drag, stiffness;
   int64_t batch;  // members; lanes beyond are spare
@@ -71,14 +72,20 @@ struct Problem {
   // One block's share of each of the following is contiguous, lanes innermost.
   const T* mass;          // (blocks, vertices, L)
   const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly
+  const T* added_mass;    // (blocks, vertices, L) of air along the normals; or null
   const T* segments;      // (blocks, 3, 5, L)
   const T* stiffening;    // (blocks, hinges, L) bending stiffness on top, as a share; or null
   const T* damping;       // (blocks, L)
   const int32_t* table;   // (blocks, L)
   const T* gravity;       // (blocks, 3, L)
+  const T* tie_share;     // (blocks, ties, L)
+  const T* tie_stiffness; // (blocks, ties, L)
+  const T* tie_slack;     // (blocks, ties, L)
   const T* wind;          // (2, blocks, 3, L)
   const T* targets;       // (2, blocks, held, 3, L)
   const T* rate;          // (blocks, held, 3, L)
+  const T* tie_targets;   // (2, blocks, ties, 3, L)
+  const T* tie_rate;      // (blocks, 3, L)
 };
 
 template <typename T, int L>
@@ -139,6 +146,7 @@ class Block {
   std::vector<T> moved_;  // how far each vertex is from there
   T step_ = 0;            // of the time, where steps follow one another
   std::vector<T> built_;  // positions at each lane's last search
+  std::vector<T> normals_;
 
  public:
   Block(const Problem<T>& problem, int64_t block, int64_t count)
@@ -358,6 +366,39 @@ class Block {
     }
   }
 
+  // Springs of any length between nothing and `slack`, beside the handles.
+  void ties(const T* x, const T* v, T share, T* f) const {
+    const V3 rate = load3(p.tie_rate + b * 3 * L);
+    for (int64_t t = 0; t < p.ties; ++t) {
+      const int64_t at = 3 * L * int64_t(p.tie_vertex[t]), own = (b * p.ties + t) * L;
+      const V3 start = load3(p.tie_targets + 3 * own), end = load3(p.tie_targets + 3 * (blocks * p.ties * L + own));
+      const V3 target = combine(start, splat(1 - share), end, splat(share));
+      const V3 stretch = sub(load3(x + at), target);
+      const V distance = maximum(root(dot(stretch, stretch)), splat(T(1e-6)));
+      const V taut = load(p.tie_share + own) - minimum(load(p.tie_slack + own) / distance, splat(1));
+      const V pull = -load(p.tie_stiffness + own) * taut;
+      add3(f + at, combine(stretch, pull, sub(load3(v + at), rate), pull * damping));
+    }
+  }
+
+  // Of a force on cloth and air, what gives the cloth's own mass its acceleration (sim/inertia.py).
+  void share_with_air(const T* x, T* f) {
+    normals_.assign(3 * L * p.vertices, T(0));
+    for (int64_t e = 0; e < p.faces; ++e) {
+      const int64_t at[3] = {3 * L * int64_t(p.face[3 * e]), 3 * L * int64_t(p.face[3 * e + 1]),
+                             3 * L * int64_t(p.face[3 * e + 2])};
+      const V3 x0 = load3(x + at[0]);
+      const V3 sixth = scale(cross(sub(load3(x + at[1]), x0), sub(load3(x + at[2]), x0)), splat(T(1) / 6));
+      for (int c = 0; c < 3; ++c) add3(normals_.data() + at[c], sixth);
+    }
+    const T *mass = p.mass + b * p.vertices * L, *added = p.added_mass + b * p.vertices * L;
+    for (int64_t i = 0; i < p.vertices; ++i) {
+      const V3 n = scale(load3(normals_.data() + 3 * L * i), splat(1 / p.vertex_areas[i]));
+      const V air = load(added + i * L), part = air / (load(mass + i * L) + air * dot(n, n));
+      add3(f + 3 * L * i, scale(n, -part * dot(n, load3(f + 3 * L * i))));
+    }
+  }
+
   // All forces at `share` of the way between the drive's start and end.
   void forces(const T* x, const T* v, T share, T* f) {
     weigh(f);
@@ -367,6 +408,7 @@ class Block {
     faces(x, v, wind, f);
     hinges(x, v, f);
     if (p.stiffness > 0) springs(x, v, share, f);
+    if (p.ties > 0) ties(x, v, share, f);
     if (p.contact.thickness > 0) contacts(x, v, f);
   }
 
@@ -415,6 +457,7 @@ class Block {
     step_ = T(h);
     for (int64_t s = 0; s <= steps; ++s) {
       forces(x, v, T(double(s) / double(steps)), f);
+      if (p.added_mass) share_with_air(x, f);
       const T kick = T(s == 0 || s == steps ? h / 2 : h), drift = s < steps ? T(h) : T(0);
       for (int64_t i = 0; i < p.vertices; ++i) {
         const V w = kick * load(inverse + i * L);

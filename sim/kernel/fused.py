@@ -17,11 +17,12 @@ from sim.system import Drive, System
 from sim.tables import Evaluation
 
 _POINTERS = (
-    "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "samples",
+    "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "tie_vertex", "samples",
 )  # fmt: skip
 _SCALARS = ("origin", "spacing", "air_density", "air_drag", "stiffness")
 _BLOCKED = (
-    "mass", "inverse_mass", "segments", "stiffening", "damping", "table", "gravity", "wind", "targets", "rate",
+    "mass", "inverse_mass", "added_mass", "segments", "stiffening", "damping", "table", "gravity", "tie_share",
+    "tie_stiffness", "tie_slack", "wind", "targets", "rate", "tie_targets", "tie_rate",
 )  # fmt: skip
 
 _CONTACT_POINTERS = ("face", "vertex_area", "rest", "centre", "apart")
@@ -42,7 +43,7 @@ class _Problem(ctypes.Structure):
     """Mirrors `Problem` of kernel.cpp field by field."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("vertices", "faces", "hinges", "held")),
+        *((name, ctypes.c_int64) for name in ("vertices", "faces", "hinges", "held", "ties")),
         ("counts", ctypes.c_int64 * 3),
         ("fold", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in _POINTERS),
@@ -68,6 +69,7 @@ class Kernel:
         lanes: members of a block.
         blocks: how many blocks the batch takes; spare lanes of the last repeat its last member.
         tensors: what the kernel reads, kept alive here.
+        tied: (tie, 3, batch) anchors of the springs beside the handles [m].
     """
 
     code: ctypes.CDLL
@@ -77,6 +79,7 @@ class Kernel:
     blocks: int
     problem: _Problem
     tensors: dict[str, Tensor] = field(repr=False)
+    tied: Tensor | None = field(repr=False)
 
     @classmethod
     def of(cls, system: System) -> Kernel | None:
@@ -101,6 +104,11 @@ class Kernel:
         if system.clamped:
             inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
         air = system.air.plain
+        empty = cloth.mass[:0]
+        ties = [tie.springs(cloth) for tie in system.ties]
+
+        def of_ties(parts: list[Tensor]) -> Tensor:
+            return torch.cat(parts) if parts else empty
 
         def block(tensor: Tensor) -> Tensor:
             return _to_blocks(tensor, lanes, blocks)
@@ -120,7 +128,12 @@ class Kernel:
             "mass": block(cloth.mass),
             "inverse_mass": block(inverse_mass),
             "segments": block(cloth.segments),
-            "stiffening": block(torch.zeros_like(cloth.mass[:0]) if cloth.stiffening is None else cloth.stiffening),
+            "stiffening": block(empty if cloth.stiffening is None else cloth.stiffening),
+            "added_mass": block(system.added_mass if system.loads else empty),
+            "tie_vertex": torch.cat([t.vertices for t in ties]).int() if ties else empty,
+            "tie_share": block(of_ties([torch.full_like(t.stiffness, t.share) for t in ties])),
+            "tie_stiffness": block(of_ties([t.stiffness for t in ties])),
+            "tie_slack": block(of_ties([t.slack for t in ties])),
             "damping": block(cloth.damping),
             "table": block(cloth.table_of.int()),
             "gravity": block(system.gravity),
@@ -128,6 +141,7 @@ class Kernel:
         tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
         problem = _Problem(
             vertices=cloth.mesh.vertex_count, faces=len(cloth.faces), hinges=len(cloth.hinges), held=len(system.held),
+            ties=len(tensors["tie_vertex"]),
             fold=int(cloth.evaluation is Evaluation.CORRECTED), origin=cloth.grid.origin, spacing=cloth.grid.spacing,
             air_density=air.density, air_drag=air.drag, stiffness=system.handles.stiffness if system.sprung else 0.0,
         )  # fmt: skip
@@ -141,14 +155,9 @@ class Kernel:
             problem.lowest, problem.highest = system.limits.low, system.limits.high
             problem.sweeps = system.limits.sweeps
         return cls(
-            code=code,
-            batch=cloth.batch,
-            dtype=cloth.dtype,
-            lanes=lanes,
-            blocks=blocks,
-            problem=problem,
-            tensors=tensors,
-        )
+            code=code, batch=cloth.batch, dtype=cloth.dtype, lanes=lanes, blocks=blocks, problem=problem,
+            tensors=tensors, tied=torch.cat([t.anchors for t in ties]) if ties else None,
+        )  # fmt: skip
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
         """The problem with wind and handles set; the tensors must outlive the call it is made for."""
@@ -157,6 +166,10 @@ class Kernel:
             return torch.stack([self.pack(tensor) for tensor in pair])
 
         given = {"wind": both(drive.wind), "targets": both(drive.targets), "rate": self.pack(drive.rate)}
+        if self.tied is not None:
+            start, end = drive.offset
+            given["tie_targets"] = both((self.tied + start[:, None], self.tied + end[:, None]))
+            given["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
         problem = _Problem.from_buffer_copy(self.problem)
         for name, tensor in given.items():
             setattr(problem, name, tensor.data_ptr())
