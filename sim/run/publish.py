@@ -83,7 +83,7 @@ def simulate(
     crew = Crew(recipe)
     identity = recipe.identity()
     known = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
-    ids = {index: _artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
+    ids = {index: member_artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
     existing = [ids[index] for index in ids if ids[index] in known]
     pending = [index for index in ids if ids[index] not in known]
     steppers = [Stepper.of(crew, base) for base in range(len(recipe.material.bases))]
@@ -92,12 +92,12 @@ def simulate(
     added: list[str] = []
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
-    batches = _batches(crew, steppers, pending)
-    for stepper, outcomes in _outcomes(crew, batches, device=device, workers=workers, progress=progress):
+    waiting = batches(crew, steppers, pending)
+    for stepper, outcomes in _outcomes(crew, waiting, device=device, workers=workers, progress=progress):
         good = [o for o in outcomes if o.sequence is not None]
-        failed += [_failure(o) for o in outcomes if o.failure is not None]
+        failed += [failure_of(o) for o in outcomes if o.failure is not None]
         if good:
-            added += _publish(lake, recipe, identity, good, stepper, branch=branch)
+            added += publish(lake, recipe, good, step=stepper.step, branch=branch)
     seconds = time.perf_counter() - begun
     return RunReport(
         added=tuple(added), existing=tuple(existing), failed=tuple(failed), seconds=seconds,
@@ -106,14 +106,14 @@ def simulate(
     )  # fmt: skip
 
 
-def _batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> list[tuple[Stepper, list[int]]]:
+def batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> list[tuple[Stepper, list[int]]]:
     """Members of one material together, since each material has its own steps."""
     size = crew.recipe.batch
-    batches: list[tuple[Stepper, list[int]]] = []
+    found: list[tuple[Stepper, list[int]]] = []
     for base, stepper in enumerate(steppers):
         own = [index for index in pending if crew.base(index) == base]
-        batches += [(stepper, own[first : first + size]) for first in range(0, len(own), size)]
-    return batches
+        found += [(stepper, own[first : first + size]) for first in range(0, len(own), size)]
+    return found
 
 
 def _outcomes(
@@ -139,7 +139,7 @@ def _outcomes(
         library()  # built once, before several threads ask for it
     waiting = iter(batches)
     executor = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="simulate")
-    with _one_thread():
+    with one_thread():
         try:
             running = {executor.submit(one, *batch) for batch in islice(waiting, workers + 1)}
             while running:
@@ -153,7 +153,7 @@ def _outcomes(
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def one_thread() -> Iterator[None]:
     """Torch on one thread: the order of its sums, and so their last bits, depends on how many it has."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -163,9 +163,13 @@ def _one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _publish(
-    lake: Lake, recipe: Recipe, identity: Mapping[str, Any], outcomes: list[Outcome], stepper: Stepper, *, branch: str
-) -> list[str]:
+def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: float, branch: str) -> list[str]:
+    """Publish the outcomes that have meshes in one commit, and return the artifacts that are new.
+
+    Args:
+        step: of the integrator [s].
+    """
+    identity = recipe.identity()
     indices = ", ".join(str(o.member.index) for o in outcomes)
     with lake.transaction(f"simulate {recipe.name}: members {indices}", branch=branch) as transaction:
         for outcome in outcomes:
@@ -173,12 +177,12 @@ def _publish(
                 continue
             staged = transaction.staging(".zarr")
             write_meshes(staged, outcome.sequence)
-            transaction.add(_artifact_of(recipe, identity, outcome, stepper, stored=transaction.put(staged)))
+            transaction.add(_published(recipe, identity, outcome, step, stored=transaction.put(staged)))
     result = transaction.result
     return list(result.added) if result is not None else []
 
 
-def _artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:
+def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:
     """The member's row without its result; its identity is complete."""
     return Artifact(
         kind=Kind.MESHES, name=f"{recipe.name}-{index:05d}", recipe=identity, seed=seed,
@@ -186,22 +190,20 @@ def _artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int
     )  # fmt: skip
 
 
-def _artifact_of(
-    recipe: Recipe, identity: Mapping[str, Any], outcome: Outcome, stepper: Stepper, *, stored: str
-) -> Artifact:
+def _published(recipe: Recipe, identity: Mapping[str, Any], outcome: Outcome, step: float, *, stored: str) -> Artifact:
     member, diagnosis = outcome.member, outcome.diagnosis
     report = {
         "schema": "flagdata.simulation-report/1", "index": member.index, "root_seed": recipe.seed,
-        "step": stepper.step, "batch": recipe.batch, "settle": recipe.time.settle, **diagnosis.summary(),
+        "step": step, "batch": recipe.batch, "settle": recipe.time.settle, **diagnosis.summary(),
         "findings": [],
     }  # fmt: skip
     return replace(
-        _artifact(recipe, identity, member.index, member.seed), object=stored, wind=member.wind_speed,
+        member_artifact(recipe, identity, member.index, member.seed), object=stored, wind=member.wind_speed,
         parameters=canonical(member.parameters), report=json.dumps(report, allow_nan=False),
     )  # fmt: skip
 
 
-def _failure(outcome: Outcome) -> dict[str, Any]:
+def failure_of(outcome: Outcome) -> dict[str, Any]:
     kind, what = outcome.failure or ("failed", "it failed")
     return {"index": outcome.member.index, "seed": outcome.member.seed, "kind": kind, "what": what}
 
