@@ -1,0 +1,81 @@
+"""Everything that stands in the world at one instant of every frame, in the arrays a rasteriser reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from flagdata.errors import InputError
+from sim.render.camera import Camera
+from sim.render.meshes import Meshes
+from sim.render.stage import Stage
+
+NEAR = 0.02
+"""What is nearer to the camera's plane is not drawn [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Geometry:
+    """All frames' cloth, then the pole, which is the same in all of them.
+
+    Attributes:
+        positions: (vertex, 3) float32, in the world [m].
+        uv: (vertex, 2) float32.
+        corners: (face, 3) int64 vertex indices: frame after frame, in each the cloth's faces, then the pole's.
+        frame: (face,) int64 the frame a face is seen in.
+        cloth: (face,) whether it is cloth.
+        vertex_offset: frame i has the cloth vertices offset[i] to offset[i + 1]; the pole's come after all.
+    """
+
+    positions: Tensor
+    uv: Tensor
+    corners: Tensor
+    frame: Tensor
+    cloth: Tensor
+    vertex_offset: tuple[int, ...]
+
+    @classmethod
+    def of(cls, meshes: Meshes, placed: Stage) -> Geometry:
+        """The meshes on their stage."""
+        device, pole = meshes.device, len(meshes.positions)
+        corners, frames, cloth = [], [], []
+        for i in range(len(meshes)):
+            own = meshes.faces[meshes.face_offset[i] : meshes.face_offset[i + 1]] + meshes.vertex_offset[i]
+            corners += [own, placed.pole_faces + pole]
+            count = len(own) + len(placed.pole_faces)
+            frames.append(torch.full((count,), i, device=device))
+            cloth.append(torch.arange(count, device=device) < len(own))
+        return cls(
+            positions=torch.cat([meshes.positions + meshes.positions.new_tensor(placed.shift), placed.pole_positions]),
+            uv=torch.cat([meshes.uv, meshes.uv.new_zeros((len(placed.pole_positions), 2))]),
+            corners=torch.cat(corners), frame=torch.cat(frames), cloth=torch.cat(cloth),
+            vertex_offset=meshes.vertex_offset,
+        )  # fmt: skip
+
+    def check(self, camera: Camera) -> None:
+        """Make sure that the cloth is in front of the camera.
+
+        Raises:
+            InputError: part of it is beside or behind the camera.
+        """
+        cloth = self.vertex_offset[-1]
+        _, depth = camera.project(self.positions[:cloth])
+        behind = torch.nonzero(depth <= NEAR).flatten()
+        if len(behind):
+            vertex = int(behind[0])
+            frame = sum(offset <= vertex for offset in self.vertex_offset) - 1
+            raise InputError(
+                f"{len(behind)} vertices of the cloth are behind the camera", where=f"frame {frame}",
+                fix="enlarge camera_radius, or render fewer frames where the cloth travels",
+            )  # fmt: skip
+
+    def normals(self) -> Tensor:
+        """(vertex, 3) float32 unit normals: the mean of the faces around a vertex, weighted by their areas."""
+        a, b, c = (self.positions[self.corners[:, k]].double() for k in range(3))
+        face = torch.linalg.cross(b - a, c - a)
+        total = torch.zeros((len(self.positions), 3), dtype=torch.float64, device=self.positions.device)
+        for k in range(3):
+            total.index_add_(0, self.corners[:, k], face)
+        return torch.nn.functional.normalize(total, dim=1, eps=1e-30).float()
