@@ -341,7 +341,7 @@ class System:
 
     @cached_property
     def base(self) -> System:
-        """The part of it that the compiled kernel knows: the base model with ties and loads, in the undisturbed wind."""
+        """The part that the compiled kernel knows: the base model with ties and loads, in the undisturbed wind."""
         return replace(self, air=self.air.plain, effects=(), flows=(), frictions=())
 
     def extra_force(

@@ -17,7 +17,8 @@ from sim.system import Drive, System
 from sim.tables import Evaluation
 
 _POINTERS = (
-    "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "tie_vertex", "samples",
+    "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "tie_vertex",
+    "samples",
 )  # fmt: skip
 _SCALARS = ("origin", "spacing", "air_density", "air_drag", "stiffness")
 _BLOCKED = (
