@@ -1,4 +1,4 @@
-"""Compiles the kernel once for a machine and keeps it in the user's cache folder."""
+"""Compiles kernels once for a machine and keeps them in the user's cache folder."""
 
 from __future__ import annotations
 
@@ -38,41 +38,47 @@ def compiler() -> str | None:
 
 @functools.cache
 def library() -> ctypes.CDLL | None:
-    """The compiled kernel; None, with one warning, where it cannot be built."""
+    """The simulator's compiled kernel; None, with one warning, where it cannot be built."""
+    return compiled("sim.kernel", _SOURCES, without="the simulator runs as plain torch, many times slower")
+
+
+def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.CDLL | None:
+    """C++ sources of a package as a library; None, with one warning, where it cannot be built.
+
+    Args:
+        sources: file names; the first is compiled and includes the others.
+        without: what it means for the user that it is not there.
+    """
     path = compiler()
     if path is None:
-        _warn("no C++ compiler found (CXX, g++, clang++, c++)")
+        _warn("no C++ compiler found (CXX, g++, clang++, c++)", without)
         return None
     try:
-        return ctypes.CDLL(str(_built(path)))
+        return ctypes.CDLL(str(_built(path, package, sources)))
     except subprocess.CalledProcessError as error:
-        _warn(f"{path} failed: {error.stderr.strip()[-500:]}")
+        _warn(f"{path} failed: {error.stderr.strip()[-500:]}", without)
     except OSError as error:
-        _warn(str(error))
+        _warn(str(error), without)
     return None
 
 
-def _warn(reason: str) -> None:
-    warnings.warn(
-        f"the simulator runs as plain torch, many times slower: {reason}. Install g++ to have its kernel compiled.",
-        RuntimeWarning,
-        stacklevel=3,
-    )
+def _warn(reason: str, without: str) -> None:
+    warnings.warn(f"{without}: {reason}. Install g++ to have its kernel compiled.", RuntimeWarning, stacklevel=4)
 
 
-def _built(path: str) -> Path:
-    sources = {name: (files("sim.kernel") / name).read_bytes() for name in _SOURCES}
+def _built(path: str, package: str, names: tuple[str, ...]) -> Path:
+    sources = {name: (files(package) / name).read_bytes() for name in names}
     version = subprocess.run([path, "--version"], capture_output=True, check=True).stdout
     name = hashlib.sha256(
         b"\0".join([*sources.values(), version, " ".join(_FLAGS).encode(), _processor()])
     ).hexdigest()[:20]
     folder = cache_folder()
-    target = folder / f"kernel-{name}.so"
+    target = folder / f"{Path(names[0]).stem}-{name}.so"
     if target.exists():
         return target
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        code, made = Path(scratch) / _SOURCES[0], Path(scratch) / "kernel.so"
+        code, made = Path(scratch) / names[0], Path(scratch) / "made.so"
         for part, text in sources.items():
             (Path(scratch) / part).write_bytes(text)
         subprocess.run([path, *_FLAGS, "-o", str(made), str(code)], capture_output=True, check=True, text=True)
