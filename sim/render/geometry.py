@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -16,7 +16,7 @@ NEAR = 0.02
 """What is nearer to the camera's plane is not drawn [m]."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Geometry:
     """All frames' cloth, then the pole, which is the same in all of them.
 
@@ -26,7 +26,11 @@ class Geometry:
         corners: (face, 3) int64 vertex indices: frame after frame, in each the cloth's faces, then the pole's.
         frame: (face,) int64 the frame a face is seen in.
         cloth: (face,) whether it is cloth.
-        vertex_offset: frame i has the cloth vertices offset[i] to offset[i + 1]; the pole's come after all.
+        vertex_offset: (frame + 1,) int64; frame i has the cloth's vertices offset[i] to offset[i + 1], and the pole's,
+            which come after all of them.
+        face_offset: (frame + 1,) int64.
+        cloth_faces: (frame,) int64 how many of a frame's faces are cloth.
+        shift: (3,) what brings meshes into the world [m].
     """
 
     positions: Tensor
@@ -34,25 +38,36 @@ class Geometry:
     corners: Tensor
     frame: Tensor
     cloth: Tensor
-    vertex_offset: tuple[int, ...]
+    vertex_offset: Tensor
+    face_offset: Tensor
+    cloth_faces: Tensor
+    shift: tuple[float, float, float]
 
     @classmethod
     def of(cls, meshes: Meshes, placed: Stage) -> Geometry:
         """The meshes on their stage."""
         device, pole = meshes.device, len(meshes.positions)
-        corners, frames, cloth = [], [], []
+        vertex_offset, offset = (torch.tensor(o, device=device) for o in (meshes.vertex_offset, meshes.face_offset))
+        poles = len(placed.pole_faces)
+        corners = []
         for i in range(len(meshes)):
             own = meshes.faces[meshes.face_offset[i] : meshes.face_offset[i + 1]] + meshes.vertex_offset[i]
             corners += [own, placed.pole_faces + pole]
-            count = len(own) + len(placed.pole_faces)
-            frames.append(torch.full((count,), i, device=device))
-            cloth.append(torch.arange(count, device=device) < len(own))
+        each = torch.arange(len(meshes), device=device)
+        frame = torch.repeat_interleave(each, offset.diff() + poles)
+        face_offset = offset + poles * torch.arange(len(offset), device=device)
+        place = torch.arange(len(frame), device=device) - face_offset[frame]
         return cls(
             positions=torch.cat([meshes.positions + meshes.positions.new_tensor(placed.shift), placed.pole_positions]),
             uv=torch.cat([meshes.uv, meshes.uv.new_zeros((len(placed.pole_positions), 2))]),
-            corners=torch.cat(corners), frame=torch.cat(frames), cloth=torch.cat(cloth),
-            vertex_offset=meshes.vertex_offset,
+            corners=torch.cat(corners), frame=frame, cloth=place < offset.diff()[frame], vertex_offset=vertex_offset,
+            face_offset=face_offset, cloth_faces=offset.diff(), shift=placed.shift,
         )  # fmt: skip
+
+    def at(self, meshes: Meshes) -> Geometry:
+        """The same at another instant."""
+        cloth = meshes.positions + meshes.positions.new_tensor(self.shift)
+        return replace(self, positions=torch.cat([cloth, self.positions[len(cloth) :]]))
 
     def check(self, camera: Camera) -> None:
         """Make sure that the cloth is in front of the camera.
@@ -60,12 +75,10 @@ class Geometry:
         Raises:
             InputError: part of it is beside or behind the camera.
         """
-        cloth = self.vertex_offset[-1]
-        _, depth = camera.project(self.positions[:cloth])
+        _, depth = camera.project(self.positions[: int(self.vertex_offset[-1])])
         behind = torch.nonzero(depth <= NEAR).flatten()
         if len(behind):
-            vertex = int(behind[0])
-            frame = sum(offset <= vertex for offset in self.vertex_offset) - 1
+            frame = int(torch.searchsorted(self.vertex_offset, behind[0], right=True)) - 1
             raise InputError(
                 f"{len(behind)} vertices of the cloth are behind the camera", where=f"frame {frame}",
                 fix="enlarge camera_radius, or render fewer frames where the cloth travels",

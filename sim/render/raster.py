@@ -8,15 +8,18 @@ import torch
 from torch import Tensor
 
 from sim.assets import Assets
+from sim.render import raster_kernel, raster_torch
 from sim.render.develop import develop, plate
 from sim.render.geometry import Geometry
+from sim.render.light import Light
 from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
-from sim.render.raster_torch import Light, add_sample
+from sim.render.raster_kernel import library
 from sim.render.sampling import Samples
 from sim.render.shutter import moved
 from sim.render.stage import stage
 from sim.render.texture import Pyramid
+from sim.render.view import View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,17 +47,17 @@ class Raster:
         behind = torch.from_numpy(plate(self.assets.background(zeta.background), zeta)).to(device)
         placed = stage(meshes, zeta)
         samples = Samples.of(zeta, to_sun=placed.to_sun)
+        geometry = Geometry.of(meshes, placed)
         out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=device)
+        code = library() if device.type == "cpu" else None
         for index in range(zeta.raster_samples):
-            geometry = Geometry.of(moved(meshes, float(samples.time[index])), placed)
-            geometry.check(placed.camera)
-            light = Light(
-                to_sun=tuple(tuple(d) for d in samples.to_sun[index].tolist()), sun_weight=samples.sun_weight,
-                sky=zeta.sky_strength, translucency=zeta.translucency,
-            )  # fmt: skip
+            now = geometry.at(moved(meshes, float(samples.time[index])))
+            now.check(placed.camera)
             x, y = samples.jitter[index].tolist()
-            add_sample(
-                out, geometry, camera=placed.camera, jitter=(x, y), light=light, pyramid=pyramid,
-                samples=zeta.raster_samples,
-            )  # fmt: skip
+            view = View(camera=placed.camera, jitter=(x, y), samples=zeta.raster_samples)
+            light = Light.of(zeta, samples, index)
+            if code is None:
+                raster_torch.add_sample(out, now, view=view, light=light, pyramid=pyramid)
+            else:
+                raster_kernel.add_sample(code, out, now, view=view, light=light, pyramid=pyramid)
         return develop(out, behind, gain=zeta.gain)

@@ -7,32 +7,16 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from sim.render.camera import Camera
-from sim.render.coverage import Triangles, fragments
+from sim.render.coverage import GRID, Triangles, fragments
 from sim.render.geometry import NEAR, Geometry
+from sim.render.light import Light
 from sim.render.shadow import ShadowMaps
 from sim.render.stage import POLE_ALBEDO
 from sim.render.texture import Pyramid
+from sim.render.view import View
 
 _BITS = 32
 _LAST = (1 << 31) - 1
-
-
-@dataclass(frozen=True, kw_only=True)
-class Light:
-    """What lights the scene.
-
-    Attributes:
-        to_sun: (point, 3) unit vectors towards the points of the sun that this sample sees.
-        sun_weight: irradiance of a surface that faces one of them, scaled so that their sum is the sun's [W/m²].
-        sky: radiance of the sky, from everywhere [W/(m² sr)].
-        translucency: share of the diffuse light that leaves cloth on the far side.
-    """
-
-    to_sun: tuple[tuple[float, float, float], ...]
-    sun_weight: float
-    sky: float
-    translucency: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,28 +30,17 @@ class _Visible:
     image_area: Tensor
 
 
-def add_sample(
-    out: Tensor,
-    geometry: Geometry,
-    *,
-    camera: Camera,
-    jitter: tuple[float, float],
-    light: Light,
-    pyramid: Pyramid,
-    samples: int,
-) -> None:
+def add_sample(out: Tensor, geometry: Geometry, *, view: View, light: Light, pyramid: Pyramid) -> None:
     """Add one sample's share to all frames.
 
     Args:
         out: (frame, height, width, 4) float32 radiance times coverage, and coverage; changed in place.
-        jitter: place of the sample in each pixel, from its upper left corner [px].
-        samples: of a pixel in all.
     """
-    seen = _visible(geometry, camera, jitter)
+    seen = _visible(geometry, view)
     x, normals = geometry.positions, geometry.normals()
     a, b, c = (x[geometry.corners[seen.face, k]] for k in range(3))
     face_normal = torch.linalg.cross(b - a, c - a)
-    front = ((a - x.new_tensor(camera.position)) * face_normal).sum(dim=1) < 0
+    front = ((a - x.new_tensor(view.camera.position)) * face_normal).sum(dim=1) < 0
     weights = seen.weights[:, :, None]
     place = (x[seen.corners] * weights).sum(dim=1)
     normal = torch.nn.functional.normalize((normals[seen.corners] * weights).sum(dim=1), dim=1)
@@ -76,30 +49,30 @@ def add_sample(
     cloth = geometry.cloth[seen.face]
     uv_edges = geometry.uv[seen.corners[:, 1:]] - geometry.uv[seen.corners[:, :1]]
     uv_area = (uv_edges[:, 0, 0] * uv_edges[:, 1, 1] - uv_edges[:, 0, 1] * uv_edges[:, 1, 0]).abs() / 2
-    level = pyramid.level(uv_area, seen.image_area, samples)
+    level = pyramid.level(uv_area, seen.image_area, view.samples)
     albedo = torch.where(cloth[:, None], pyramid.at(uv, level), x.new_tensor(POLE_ALBEDO))
     through = torch.where(cloth, light.translucency, 0.0)
     frame = geometry.frame[seen.face]
-    irradiance = torch.zeros_like(through)
+    cosines = torch.zeros_like(through)
     for direction in light.to_sun:
         cosine = normal @ normal.new_tensor(direction)
         share = torch.where(cosine > 0, (1 - through) * cosine, -through * cosine)
-        irradiance += share * ShadowMaps.of(geometry, direction).lit(place, normal, frame)
-    diffuse = irradiance * (light.sun_weight * samples / torch.pi) + light.sky
-    shown = torch.cat([albedo * diffuse[:, None], torch.ones_like(diffuse)[:, None]], dim=1) / samples
+        cosines += share * ShadowMaps.of(geometry, direction).lit(place, normal, frame)
+    diffuse = cosines * light.point + light.sky
+    shown = torch.cat([albedo * diffuse[:, None], torch.ones_like(diffuse)[:, None]], dim=1) / view.samples
     out.view(-1, 4).index_add_(0, seen.pixel, shown)
 
 
-def _visible(geometry: Geometry, camera: Camera, jitter: tuple[float, float]) -> _Visible:
-    x, size = geometry.positions, camera.width * camera.height
-    places, depth = camera.project(x)
+def _visible(geometry: Geometry, view: View) -> _Visible:
+    x, camera = geometry.positions, view.camera
+    size = camera.width * camera.height
+    places, depth = view.project(x)
     ahead = (depth > NEAR)[geometry.corners].all(dim=1)
     shown = torch.nonzero(ahead).flatten()
-    triangles = Triangles.of(places + x.new_tensor([0.5 - jitter[0], 0.5 - jitter[1]]), geometry.corners[shown])
+    triangles = Triangles.of(places, geometry.corners[shown])
     nearness = 1 / depth
     parts = fragments(triangles, width=camera.width, height=camera.height)
-    frames = len(geometry.vertex_offset) - 1
-    best = torch.zeros(frames * size, dtype=torch.int64, device=x.device)
+    best = torch.zeros(len(geometry.cloth_faces) * size, dtype=torch.int64, device=x.device)
     found: list[tuple[Tensor, Tensor, Tensor, Tensor, Tensor]] = []
     for part in parts:
         face = shown[triangles.face[part.triangle]]
@@ -116,5 +89,5 @@ def _visible(geometry: Geometry, camera: Camera, jitter: tuple[float, float]) ->
     return _Visible(
         pixel=pixel, face=shown[triangles.face[triangle]], corners=triangles.corners[triangle],
         weights=linear / linear.sum(dim=1, keepdim=True),
-        image_area=triangles.area[triangle].float() * (0.5 / 256**2),
+        image_area=triangles.area[triangle].float() * (0.5 / GRID**2),
     )  # fmt: skip

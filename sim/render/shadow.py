@@ -11,6 +11,7 @@ from torch import Tensor
 
 from sim.render.coverage import Triangles, fragments
 from sim.render.geometry import Geometry
+from sim.render.light import Direction
 
 SIZE = 256
 """Texels of a map along each side; the frame's cloth just fits in."""
@@ -19,8 +20,8 @@ _AWAY = 1.5  # texels that a point is moved off its surface, times the sine of t
 _BIAS = 0.3  # texels that a surface may be nearer to the sun and still not shade
 
 
-def axes(direction: tuple[float, float, float]) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Two unit vectors across a direction and each other."""
+def basis(direction: Direction) -> tuple[Direction, Direction, Direction]:
+    """Two unit vectors across a direction and each other, and the direction."""
     x, y, z = direction
     if abs(z) < 0.9:
         length = (x * x + y * y) ** 0.5
@@ -29,7 +30,7 @@ def axes(direction: tuple[float, float, float]) -> tuple[tuple[float, float, flo
         length = (x * x + z * z) ** 0.5
         first = (z / length, 0.0, -x / length)
     second = (y * first[2] - z * first[1], z * first[0] - x * first[2], x * first[1] - y * first[0])
-    return first, second
+    return first, second, direction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,12 +50,12 @@ class ShadowMaps:
     nearest: Tensor
 
     @classmethod
-    def of(cls, geometry: Geometry, direction: tuple[float, float, float]) -> Self:
+    def of(cls, geometry: Geometry, direction: Direction) -> Self:
         """The maps for light from a direction (unit vector towards it)."""
         x = geometry.positions
-        basis = torch.tensor([*axes(direction), direction], dtype=x.dtype, device=x.device)
-        seen = x @ basis.T
-        offset = geometry.vertex_offset
+        across = torch.tensor(basis(direction), dtype=x.dtype, device=x.device)
+        seen = x @ across.T
+        offset = geometry.vertex_offset.tolist()
         bounds = [torch.aminmax(seen[a:b, :2], dim=0) for a, b in itertools.pairwise(offset)]
         low, high = (torch.stack([getattr(bound, end) for bound in bounds]) for end in ("min", "max"))
         middle, texel = (low + high) / 2, (high - low).amax(dim=1).clamp_min(1e-6) / (SIZE - 2 * _MARGIN)
@@ -69,7 +70,7 @@ class ShadowMaps:
             value = h[:, 0] + part.shares[:, 0] * (h[:, 1] - h[:, 0]) + part.shares[:, 1] * (h[:, 2] - h[:, 0])
             pixel = frame[triangles.face[part.triangle]] * SIZE * SIZE + part.pixel
             nearest.scatter_reduce_(0, pixel, value, "amax")
-        return cls(basis=basis, middle=middle, texel=texel, nearest=nearest.unflatten(0, (-1, SIZE, SIZE)))
+        return cls(basis=across, middle=middle, texel=texel, nearest=nearest.unflatten(0, (-1, SIZE, SIZE)))
 
     def lit(self, points: Tensor, normals: Tensor, frame: Tensor) -> Tensor:
         """(point,) share of the light that reaches points (point, 3) on surfaces with normals (point, 3).

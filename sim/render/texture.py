@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -43,6 +44,11 @@ class Pyramid:
             height=torch.tensor([level.shape[0] for level in levels], device=device),
             start=torch.tensor([sum(sizes[:i]) for i in range(len(sizes))], device=device),
         )
+
+    @cached_property
+    def padded(self) -> Tensor:
+        """(all texels, 4) the texels with a fourth value, 0."""
+        return torch.nn.functional.pad(self.texels, (0, 1))
 
     def __len__(self) -> int:
         return len(self.start)
