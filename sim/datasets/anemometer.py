@@ -1,0 +1,118 @@
+"""The anemometer beside a simulated flag: what it would have logged, in the same form as a real log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.rng import stream
+from flagdata.schema import SampleFlag
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import NANOSECONDS
+from sim.datasets.reading import changing
+from sim.datasets.recipe import AnemometerSpec
+from sim.effects import SENSOR_EFFECTS
+from sim.effects.sensor import AnemometerEffect
+from sim.run.members import Crew, Member
+from sim.run.tables import Quantity, Range
+
+_FINE = 10.0  # Hz, at which the air is sampled and the instrument's response computed
+_NAME = "simulated"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """What an anemometer logged.
+
+    Attributes:
+        series: its samples.
+        parameters: what was drawn for it, "effect.parameter" → value, SI; with "anemometer.noise" [m/s].
+    """
+
+    series: WindSeries
+    parameters: Mapping[str, float]
+
+
+def read(spec: AnemometerSpec, crew: Crew, member: Member, *, seed: int, begin: int) -> Reading:
+    """The log of one recording.
+
+    The instrument stands at the middle of the hoist in undisturbed air: effects that change the wind from place to
+    place do not reach it. Its samples are means over their period up to their stamp, after its effects in the recipe's
+    order, with noise, in steps of its resolution, and never below 0; stamps fall anywhere within a second.
+
+    Args:
+        seed: of the recording.
+        begin: instant at which the simulation's time is 0 [UTC ns].
+    """
+    drawn = {
+        name: {key: _drawn(value, seed, "anemometer", name, key) for key, value in parameters.items()}
+        for name, parameters in spec.effects.items()
+    }
+    noise = _drawn(spec.noise, seed, "anemometer", "noise")
+    time, velocity = air(spec, crew, member)
+    speed = torch.from_numpy(np.hypot(velocity[:, 0], velocity[:, 1])[:, None])
+    for name, values in drawn.items():
+        effect: AnemometerEffect = SENSOR_EFFECTS[name](**values)
+        speed = effect.read(torch.from_numpy(time), speed)
+    phase = stream(seed, "anemometer", "phase").random()
+    stamps, means = _means(time, np.column_stack([speed[:, 0].numpy(), velocity[:, :2]]), spec.rate, phase)
+    readings = means[:, 0] + stream(seed, "anemometer", "samples").normal(0.0, noise, len(stamps))
+    threshold = drawn.get("anemometer-dead-zone", {}).get("threshold")
+    dead = np.zeros(len(stamps), dtype=bool) if threshold is None else means[:, 0] < threshold
+    readings[dead] = 0.0
+    readings = np.round(np.maximum(readings, 0.0) / spec.resolution) * spec.resolution
+    series = WindSeries(
+        time=begin + np.round(stamps * NANOSECONDS).astype(np.int64),
+        channels={"wind_speed": readings, "wind_direction": blowing_from(means[:, 1], means[:, 2])},
+        flags=np.where(dead, int(SampleFlag.DEAD_ZONE), 0).astype(np.uint16),
+        sensor=Sensor(
+            name=_NAME, averaging=1 / spec.rate, resolution=spec.resolution, accuracy=spec.accuracy,
+            threshold=threshold, distance_constant=drawn.get("anemometer-lag", {}).get("distance"),
+        ),
+    )  # fmt: skip
+    known = {f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()}
+    return Reading(series=series, parameters={**known, "anemometer.noise": noise})
+
+
+def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times (n,) since the simulation's start [s], and the air's velocity (n, 3) at them [m/s].
+
+    A wind that changes is known only from the start; one that does not began `before` the first frame.
+    """
+    time = crew.recipe.time
+    end = (time.total - 1) / time.rate
+    begin = 0.0 if changing(crew.recipe) else time.settling / time.rate - spec.before
+    count = math.floor((end - begin) * _FINE + 1e-9) + 1
+    times = begin + np.arange(count) / _FINE
+    if not changing(crew.recipe):
+        return times, np.tile(np.array(member.scene.wind, dtype=np.float64), (count, 1))
+    system, _ = crew.assemble([member])
+    with torch.no_grad():
+        velocity = [system.wind.velocity(float(t))[:, 0].double().numpy() for t in times]
+    return times, np.stack(velocity)
+
+
+def blowing_from(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a wind (x towards east, y towards north) blows from, clockwise from north, in [0, 2π) [rad]."""
+    return np.mod(np.arctan2(-x, -y), 2 * math.pi)
+
+
+def _means(
+    time: NDArray[np.float64], values: NDArray[np.float64], rate: float, phase: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stamps (m,) a period apart, and the means (m, k) of values (n, k) over the period that ends with each."""
+    period = 1 / rate
+    first = math.ceil((time[0] + period) * rate - phase) + phase
+    stamps = np.arange(first, time[-1] * rate + 1e-9) / rate
+    edges = np.searchsorted(time, np.stack([stamps - period, stamps]) + 1e-9, side="right")
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    return stamps, (sums[edges[1]] - sums[edges[0]]) / (edges[1] - edges[0])[:, None]
+
+
+def _drawn(quantity: Quantity, seed: int, *path: str) -> float:
+    return quantity.at(stream(seed, *path).random()) if isinstance(quantity, Range) else quantity

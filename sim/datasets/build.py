@@ -1,0 +1,205 @@
+"""Building a data set: sequences first, then their films, each commit a batch of them.
+
+Workers turn jobs into bytes (`sim.datasets.jobs`); this process alone writes to the lake. What is in the lake is known
+by its identity, so that a build that was killed goes on where its last commit was, and ends with the same artifacts and
+objects as an unbroken one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from distributed import Client
+
+from flagdata.dataset.clips import clip_rows
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.meshes import read_meshes
+from flagdata.record import Record
+from flagdata.timebase import NANOSECONDS
+from sim.datasets import jobs
+from sim.datasets.cast import Cast, Roll, casts
+from sim.datasets.cluster import Job, results
+from sim.datasets.films import Film, Sequences
+from sim.datasets.jobs import Filmed, Simulated
+from sim.datasets.recipe import DatasetRecipe
+from sim.run.publish import publish
+
+COMMIT_FILMS = 32
+"""Films of one commit."""
+COMMIT_SECONDS = 30.0
+"""A commit is due after this time, however few films there are."""
+
+Advance: TypeAlias = Callable[[int], None]
+Bars: TypeAlias = Callable[[int, str, str], AbstractContextManager[Advance]]
+"""Makes a progress bar of a total, a label and a unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BuildReport:
+    """What a build did.
+
+    Attributes:
+        sequences, films: how many the data set has.
+        new_sequences, new_films: how many of them were made now.
+        clips: how many the films have.
+        failed: sequences that diverged or crumpled and were replaced, with why.
+        seconds: wall time.
+    """
+
+    sequences: int
+    films: int
+    new_sequences: int
+    new_films: int
+    clips: int
+    failed: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(kw_only=True)
+class Build:
+    """One build of a recipe into a lake.
+
+    Args:
+        device: where workers compute.
+    """
+
+    lake: Lake
+    recipe: DatasetRecipe
+    client: Client
+    bars: Bars
+    branch: str = "main"
+    device: str = "cpu"
+    _new_sequences: int = field(default=0, init=False)
+    _new_films: int = field(default=0, init=False)
+
+    def run(self) -> BuildReport:
+        """Make what is missing.
+
+        Raises:
+            RefusedError: too many sequences fail.
+            WorkerError: workers kept dying.
+            FlagdataError: a renderer, an asset or the disk failed.
+        """
+        begun = time.perf_counter()
+        rolls = self._simulate()
+        films = self._film(rolls)
+        failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
+        return BuildReport(
+            sequences=sum(roll.cast.simulation.count for roll in rolls), films=len(films),
+            new_sequences=self._new_sequences, new_films=self._new_films, clips=self._clips(films),
+            failed=tuple(failed), seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+
+    def _known(self) -> set[str]:
+        return set(self.lake.rows(at=self.branch, columns=["artifact"])["artifact"].to_pylist())
+
+    # Sequences
+
+    def _simulate(self) -> list[Roll]:
+        rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
+        known = self._known()
+        total = sum(roll.cast.simulation.count for roll in rolls)
+        with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
+            todo = [(roll, roll.pending(known)) for roll in rolls]
+            advance(total - sum(len(pending) for _, pending in todo))
+            while any(pending for _, pending in todo):
+                self._simulate_once([entry for entry in todo if entry[1]], advance)
+                todo = [(roll, roll.pending(())) for roll, _ in todo]
+        return rolls
+
+    def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:
+        """All pending members of the rolls once; those that fail are noted on their roll."""
+        by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
+        done: Simulated
+        for done in results(self.client, self._batches(todo)):
+            roll = by_name[done.name]
+            good = [outcome for outcome in done.outcomes if outcome.sequence is not None]
+            for outcome in done.outcomes:
+                if outcome.failure is not None:
+                    roll.failed[outcome.member.index] = outcome.failure[1]
+            if good:
+                publish(self.lake, roll.cast.simulation, good, step=done.step, branch=self.branch)
+                roll.done |= {outcome.member.index for outcome in good}
+                self._new_sequences += len(good)
+                advance(len(good))
+
+    def _batches(self, todo: Sequence[tuple[Roll, list[int]]]) -> Iterator[Job]:
+        for roll, pending in todo:
+            simulation = roll.cast.simulation
+            for base in range(len(simulation.material.bases)):
+                own = [index for index in pending if roll.crew.base(index) == base]
+                for first in range(0, len(own), simulation.batch):
+                    yield jobs.simulate, (simulation, base, own[first : first + simulation.batch], self.device)
+
+    # Films
+
+    def films(self, rolls: Iterable[Roll]) -> list[Film]:
+        """All films of the data set, in the order they are made in."""
+        members: dict[str, list[tuple[Cast, int, str]]] = {side.name: [] for side in self.recipe.sides}
+        for roll in rolls:
+            members[roll.cast.side.name] += [(roll.cast, index, roll.id(index)) for index in roll.chosen]
+        return [
+            film
+            for side, own in members.items()
+            for film in Sequences(recipe=self.recipe, side=side, members=tuple(own)).films()
+        ]
+
+    def _film(self, rolls: Iterable[Roll]) -> list[Film]:
+        films = self.films(rolls)
+        frames = self.recipe.simulation.time.frames
+        known = self._known()
+        missing = [film for film in films if film.artifact(frames=frames).id not in known]
+        with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
+            advance(len(films) - len(missing))
+            waiting: list[Filmed] = []
+            last = time.monotonic()
+            for done in results(self.client, self._shots(missing)):
+                waiting.append(done)
+                if len(waiting) >= COMMIT_FILMS or time.monotonic() - last > COMMIT_SECONDS:
+                    self._commit(waiting)
+                    advance(len(waiting))
+                    waiting, last = [], time.monotonic()
+            if waiting:
+                self._commit(waiting)
+                advance(len(waiting))
+        return films
+
+    def _shots(self, films: Sequence[Film]) -> Iterator[Job]:
+        rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
+        objects = {row["artifact"]: row["object"] for row in rows}
+        for film in films:
+            sequence = read_meshes(self.lake.object_path(objects[film.sequence]))
+            yield jobs.film, (self.recipe, film, sequence, self.device)
+
+    def _commit(self, filmed: Sequence[Filmed]) -> None:
+        message = f"build {self.recipe.name}: {len(filmed)} films"
+        with self.lake.transaction(message, branch=self.branch) as transaction:
+            for done in filmed:
+                staged = transaction.staging(".mcap")
+                staged.write_bytes(done.data)
+                stored = transaction.put(staged)
+                record = Record.open(self.lake.object_path(stored))
+                recording = _recording(done, record, stored=stored)
+                transaction.add(replace(recording, branch=self.branch))
+                for clip in clip_rows(record, recording):
+                    transaction.add(clip)
+        self._new_films += len(filmed)
+
+    def _clips(self, films: Sequence[Film]) -> int:
+        frames = self.recipe.simulation.time.frames
+        own = {film.artifact(frames=frames).id for film in films}
+        clips = self.lake.rows("kind = 'clip'", at=self.branch, columns=["recording"])["recording"].to_pylist()
+        return sum(recording in own for recording in clips)
+
+
+def _recording(done: Filmed, record: Record, *, stored: str) -> Artifact:
+    times = record.frame_times
+    rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start) if len(times) > 1 else None
+    return replace(
+        done.film.artifact(frames=len(times)), object=stored, start=done.start, end=done.end, rate=rate,
+        parameters=done.parameters,
+    )  # fmt: skip

@@ -1,0 +1,129 @@
+"""Who is simulated: the recipe of each side's sequences, or of each of its sessions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
+
+from flagdata.errors import RefusedError
+from flagdata.rng import child_seed
+from sim.datasets.recipe import DatasetRecipe, SessionSpec, Side
+from sim.run.members import Crew
+from sim.run.publish import member_artifact
+from sim.run.recipe import MaterialSpec
+from sim.run.recipe import Recipe as Simulation
+from sim.run.tables import Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cast:
+    """Sequences that are simulated by one recipe.
+
+    Attributes:
+        side: they belong to.
+        session: number of their session on that side; None where each stands alone.
+        simulation: its `count` is how many are wanted.
+    """
+
+    side: Side
+    session: int | None
+    simulation: Simulation
+
+
+def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
+    """All sequences of a data set, side by side, session by session. No seed is on two sides."""
+    for side in recipe.sides:
+        root = replace(recipe.simulation, name=f"{recipe.name}-{side.name}", title=recipe.title)
+        if recipe.sessions is None or not side.sessions:
+            seed = child_seed(recipe.seed, "sequences", side.name)
+            yield Cast(side=side, session=None, simulation=replace(root, seed=seed, count=side.sequences))
+            continue
+        for session in range(side.sessions):
+            seed = child_seed(recipe.seed, "sequences", side.name, session)
+            count = len(range(session, side.sequences, side.sessions))
+            own = _of_session(replace(root, seed=seed, count=count), recipe.sessions)
+            yield Cast(side=side, session=session, simulation=replace(own, name=f"{root.name}-{session:02d}"))
+
+
+def _of_session(simulation: Simulation, spec: SessionSpec) -> Simulation:
+    """The recipe of one session: one flag, drawn once, in winds about one mean."""
+    drawn = Crew(simulation).member(0)
+    mean = drawn.parameters["wind_speed"]
+    if not isinstance(mean, float):
+        raise TypeError("a member's wind speed is a number")
+    around = Range(low=mean * (1 - spec.spread), high=mean * (1 + spec.spread))
+    return replace(
+        simulation,
+        material=MaterialSpec(bases=(drawn.scene.material,)),
+        wind=replace(simulation.wind, speed=around),
+        batch=min(simulation.batch, simulation.count),
+    )
+
+
+@dataclass(kw_only=True)
+class Roll:
+    """Which members of a cast are there: the first of its recipe that do not fail.
+
+    A member that diverges or crumples is left out, and the next index takes its place; since failing is a matter of
+    recipe and index alone, an interrupted build and an unbroken one choose the same.
+
+    Attributes:
+        cast: whose.
+        ids: index → identity.
+        done: indices that are in the lake.
+        failed: indices that made no meshes, with why.
+    """
+
+    cast: Cast
+    ids: dict[int, str] = field(default_factory=dict)
+    done: set[int] = field(default_factory=set)
+    failed: dict[int, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._crew = Crew(self.cast.simulation)
+        self._recipe = self.cast.simulation.identity()
+
+    @property
+    def chosen(self) -> list[int]:
+        """Indices of the sequences, as many as are wanted.
+
+        Raises:
+            RefusedError: more than a quarter of the members failed.
+        """
+        count = self.cast.simulation.count
+        limit = count + max(4, math.ceil(count / 4))
+        chosen: list[int] = []
+        index = 0
+        while len(chosen) < count:
+            if index >= limit:
+                first = next(iter(self.failed.values()))
+                raise RefusedError(
+                    f"{len(self.failed)} of {limit} sequences failed; the first: {first}",
+                    where=self.cast.simulation.name, fix="declare more damping or smaller steps in the scene",
+                )  # fmt: skip
+            if index not in self.failed:
+                chosen.append(index)
+            index += 1
+        return chosen
+
+    def pending(self, known: Collection[str]) -> list[int]:
+        """Chosen members that are not in the lake.
+
+        Args:
+            known: artifact ids that are there.
+        """
+        self.done |= {index for index in self.chosen if self.id(index) in known}
+        return [index for index in self.chosen if index not in self.done]
+
+    def id(self, index: int) -> str:
+        """Identity of a member's mesh sequence."""
+        if index not in self.ids:
+            simulation = self.cast.simulation
+            self.ids[index] = member_artifact(simulation, self._recipe, index, self._crew.seed(index)).id
+        return self.ids[index]
+
+    @property
+    def crew(self) -> Crew:
+        """The members."""
+        return self._crew

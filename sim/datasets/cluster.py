@@ -1,0 +1,111 @@
+"""The processes that do the work: Dask's, on this machine or behind a scheduler's address."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from typing import Any, cast
+
+from distributed import Client, LocalCluster, as_completed
+from distributed.scheduler import KilledWorker
+
+from flagdata.errors import FlagdataError, NotFoundError
+
+_CONNECT_TIMEOUT = 30.0  # s
+_AHEAD = 2  # jobs a thread, so that none waits for the next
+_RETRIES = 3  # of a job whose workers died, before it is given up
+
+Job = tuple[Callable[..., Any], Sequence[Any]]
+"""A function of this package and its arguments."""
+
+
+class WorkerError(FlagdataError):
+    """Workers died over a job."""
+
+    kind = "workers-lost"
+
+
+@contextmanager
+def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
+    """A client of the scheduler at an address ("tcp://host:8786"), or of processes of this machine if it is None.
+
+    Args:
+        workers: processes on this machine, of one thread each; of no meaning with a scheduler, which has its own.
+
+    Raises:
+        NotFoundError: no scheduler answers there.
+    """
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise NotFoundError(
+                f"no scheduler answers: {error}", where=scheduler,
+                fix="start one with dask scheduler, and workers with dask worker ADDRESS",
+            ) from None  # fmt: skip
+        with client:
+            yield client
+        return
+    with (
+        _threads_per_process(1),
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0,
+            dashboard_address=None,  # pyright: ignore[reportArgumentType]  None is no dashboard, as documented
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):  # fmt: skip
+        yield client
+
+
+@contextmanager
+def _threads_per_process(count: int) -> Iterator[None]:
+    """What the numerical libraries of processes started meanwhile take."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, str(count)))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
+    """The jobs' results as they come; a few wait beside those that run, so that memory stays bounded.
+
+    A job whose worker dies is done again by another one. Leaving the iteration early cancels what still runs.
+
+    Raises:
+        WorkerError: workers kept dying over one job.
+        FlagdataError: a job failed; its own error.
+    """
+    threads = max(1, sum(cast("dict[str, int]", client.nthreads()).values()))
+    waiting = iter(jobs)
+    running = as_completed(loop=client.loop)
+
+    def submit(count: int) -> None:
+        for function, arguments in islice(waiting, count):
+            running.add(client.submit(function, *arguments, pure=False, retries=_RETRIES))
+
+    try:
+        submit(threads * _AHEAD)
+        for future in running:
+            try:
+                result = future.result()
+            except KilledWorker as error:
+                raise WorkerError(
+                    f"workers died {_RETRIES} times over the same job: {error}", where="dask",
+                    fix="look at the workers' logs; they may lack memory",
+                ) from None  # fmt: skip
+            future.release()
+            yield result
+            submit(1)
+    finally:
+        running.clear()

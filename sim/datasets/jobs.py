@@ -1,0 +1,134 @@
+"""What workers do: pure functions from a recipe and a number to bytes. Workers know no lake and keep no state.
+
+Renderers and crews are kept from one job to the next, since they take time to make; they change no result.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+
+from flagdata.lake.meshes import MeshSequence
+from flagdata.provenance import canonical
+from sim.assets import Assets
+from sim.datasets import anemometer, picture
+from sim.datasets.films import Film
+from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.record import Content, parameters_of, record_bytes, texts_of
+from sim.render import RENDERERS, Meshes, RenderParameters
+from sim.run.batch import Outcome, Stepper, run
+from sim.run.members import Crew
+from sim.run.recipe import Recipe as Simulation
+from sim.run.recipe import Shape
+
+_KEPT = 8  # crews
+_own = threading.local()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulated:
+    """A batch of members after a run.
+
+    Attributes:
+        name: of their recipe.
+        outcomes: what became of each.
+        step: of the integrator [s].
+    """
+
+    name: str
+    outcomes: tuple[Outcome, ...]
+    step: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Filmed:
+    """A recording.
+
+    Attributes:
+        film: which.
+        data: the record's bytes.
+        start, end: of its frames [UTC ns].
+        parameters: θ, ζ and the instruments' draws: canonical JSON.
+    """
+
+    film: Film
+    data: bytes
+    start: int
+    end: int
+    parameters: str
+
+
+def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: str) -> Simulated:
+    """Simulate members of one material of a recipe together."""
+    torch.set_num_threads(1)
+    crew, steppers = _crew(simulation)
+    if base not in steppers:
+        steppers[base] = Stepper.of(crew, base)
+    members = [crew.member(index) for index in indices]
+    outcomes = run(crew, steppers[base], members, size=simulation.batch, device=device)
+    return Simulated(name=simulation.name, outcomes=tuple(outcomes), step=steppers[base].step)
+
+
+def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) -> Filmed:
+    """Film a sequence.
+
+    Raises:
+        FlagdataError: a renderer that is not installed or fails, or an asset that is not there.
+    """
+    torch.set_num_threads(1)
+    assets = Assets(photos=recipe.photos)
+    zeta = recipe.prior.draw(job.look, assets)
+    crew, _ = _crew(job.cast.simulation)
+    member = crew.member(job.index)
+    reading = anemometer.read(recipe.anemometer, crew, member, seed=job.seed, begin=job.begin)
+    drawn = picture.settings(recipe.camera, seed=job.seed)
+    parameters = parameters_of(member, zeta, {**reading.parameters, **drawn}, recipe.anemometer.truth)
+    frames = shot(recipe, job, sequence, zeta, assets, device=device)
+    slot = recipe.camera.frame_slot
+    times = job.begin + sequence.time
+    content = Content(
+        film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, slot=slot,
+        frames=list(picture.jpegs(frames.cpu().numpy(), drawn, slot=slot, seed=job.seed)),
+    )  # fmt: skip
+    return Filmed(
+        film=job, data=record_bytes(content), start=int(times[0]), end=int(times[-1]),
+        parameters=canonical({**parameters, **texts_of(member, zeta)}),
+    )  # fmt: skip
+
+
+def shot(
+    recipe: DatasetRecipe, job: Film, sequence: MeshSequence, zeta: RenderParameters, assets: Assets, *, device: str
+) -> torch.Tensor:
+    """Frames (n, height, width, 3) uint8."""
+    simulation = job.cast.simulation
+    if simulation.scene.shape is Shape.HANGING_CLOTH:
+        meshes = Meshes.hanging(sequence, device=device)
+    else:
+        member = _crew(simulation)[0].member(job.index)
+        toward = member.parameters["wind_toward"]
+        meshes = Meshes.flag(sequence, heading=float(toward) if isinstance(toward, float) else 0.0, device=device)
+    with torch.no_grad():
+        return _renderer(recipe.renderer, assets).render(meshes, zeta)
+
+
+def _crew(simulation: Simulation) -> tuple[Crew, dict[int, Stepper]]:
+    """The crew of a recipe with the steppers that were made for it."""
+    kept: dict[str, tuple[Crew, dict[int, Stepper]]] = _own.__dict__.setdefault("crews", {})
+    key = canonical({**simulation.identity(), "batch": simulation.batch, "name": simulation.name})
+    if key not in kept:
+        while len(kept) >= _KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = (Crew(simulation), {})
+    return kept[key]
+
+
+def _renderer(name: str, assets: Assets) -> Any:
+    """This thread's renderer: Blender's has a process of its own, which answers one request at a time."""
+    kept: dict[tuple[str, Assets], Any] = _own.__dict__.setdefault("renderers", {})
+    if (name, assets) not in kept:
+        kept[name, assets] = RENDERERS[name](assets=assets)
+    return kept[name, assets]

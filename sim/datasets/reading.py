@@ -1,0 +1,210 @@
+"""Data sets' recipes as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+
+All values are SI. A *quantity* is a number, or `{ low = …, high = …, scale = "linear" | "log" }`, from which each
+recording draws its own value.
+
+    title, licence, seed
+    [simulation]  scene: a recipe of `flagdata simulate`, by name or path (.toml)
+    [render]      renderer; prior: a name of catalogs/renders; photos: a folder of backgrounds; and in place of the
+                  prior's own width, height [px], raster-samples, cycles-samples
+    [sides.NAME]  sequences, renders; sessions, where sequences are dealt to set-ups
+    [sessions]    spread: of the winds of one session about its mean, as a share
+    [camera]      jpeg-quality, read-noise, shot-noise: quantities; frame-slot [B]
+    [anemometer]  truth = "stated" | "measured"; rate [Hz], before [s], noise (a quantity), resolution, accuracy [m/s]
+    [anemometer.effects.NAME]  parameters of a sensor effect: quantities; effects follow one another as in the file
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.schema import TRUTH_WINDOW
+from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
+from sim.effects import EFFECTS, SENSOR_EFFECTS
+from sim.effects.effect import FlowEffect, WindEffect
+from sim.effects.sensor import AnemometerEffect
+from sim.render import RENDERERS
+from sim.render import prior as priors
+from sim.render.prior import RenderPrior
+from sim.run import Recipe as Simulation
+from sim.run import load as load_simulation
+from sim.run.tables import Quantity, Table
+
+SIDES = ("train", "validation", "test")
+_SIZES = ("width", "height", "raster_samples", "cycles_samples")
+
+
+def names() -> list[str]:
+    """Recipes of the catalog, sorted."""
+    folder = files("catalogs") / "datasets"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load(source: str) -> DatasetRecipe:
+    """The recipe of that name in the catalog, or of a `.toml` file.
+
+    Raises:
+        NotFoundError: no such file.
+        UnknownNameError: no such recipe; a key, name or option that is not known.
+        InputError, UsageError: a value that does not fit.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        if source not in names():
+            raise UnknownNameError.of("data set", source, names())
+        text = (files("catalogs") / "datasets" / f"{source}.toml").read_text(encoding="utf-8")
+        return parse(text, name=source, folder=Path(), where=f"data set {source}")
+    if not path.is_file():
+        raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
+    return parse(path.read_text(encoding="utf-8"), name=path.stem, folder=path.parent, where=source)
+
+
+def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
+    """A recipe from its text.
+
+    Args:
+        folder: that a scene's path is relative to.
+
+    Raises:
+        UnknownNameError, InputError, UsageError: as `load`.
+    """
+    try:
+        top = Table(tomllib.loads(text), where=where)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    render = top.table("render")
+    renderer = render.text("renderer", "raster") or ""
+    if renderer not in RENDERERS:
+        raise UnknownNameError.of("renderer", renderer, RENDERERS, where=render.where)
+    photos = render.text("photos", None)
+    sessions = _sessions(top.table("sessions")) if "sessions" in top else None
+    recipe = DatasetRecipe(
+        name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
+        seed=top.whole("seed", 0, least=0), renderer=renderer, simulation=_simulation(top.table("simulation"), folder),
+        prior=_prior(render), sessions=sessions,
+        photos=None if photos is None else folder / photos, sides=_sides(top.table("sides"), sessions),
+        camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),
+    )  # fmt: skip
+    top.done()
+    _check(recipe, where=where)
+    return recipe
+
+
+def with_renderer(recipe: DatasetRecipe, renderer: str) -> DatasetRecipe:
+    """The recipe with another renderer.
+
+    Raises:
+        UnknownNameError: no renderer of that name.
+    """
+    if renderer not in RENDERERS:
+        raise UnknownNameError.of("renderer", renderer, RENDERERS, where="--renderer")
+    return replace(recipe, renderer=renderer)
+
+
+def _simulation(table: Table, folder: Path) -> Simulation:
+    scene = table.text("scene", None)
+    table.done()
+    if scene is None:
+        raise InputError("no scene is named", where=table.where, fix='add scene = "flag-search-space", or a .toml file')
+    return load_simulation(str(folder / scene) if scene.endswith(".toml") else scene)
+
+
+def _prior(table: Table) -> RenderPrior:
+    name = table.text("prior", None)
+    if name is None:
+        known = ", ".join(priors.names())
+        raise InputError("no prior of ζ is named", where=table.where, fix=f"add prior, one of {known}")
+    changes: dict[str, Quantity] = {}
+    for key in _SIZES:
+        spelled = key.replace("_", "-")
+        if spelled in table:
+            changes[key] = float(table.whole(spelled, 1, least=1))
+    table.done()
+    return priors.named(name).with_quantities(changes, source=table.where)
+
+
+def _sides(table: Table, sessions: SessionSpec | None) -> tuple[Side, ...]:
+    found: list[Side] = []
+    for name in table.names():
+        if name not in SIDES:
+            raise UnknownNameError.of("side", name, SIDES, where=table.where)
+        inner = table.table(name)
+        sequences = inner.whole("sequences", 0, least=1)
+        side = Side(
+            name=name, sequences=sequences, renders=inner.whole("renders", sequences, least=sequences),
+            sessions=inner.whole("sessions", 0, least=1) if sessions is not None else 0,
+        )  # fmt: skip
+        if side.sessions > side.sequences:
+            raise InputError(
+                f"{side.sessions} sessions of {side.sequences} sequences", where=inner.where, fix="have fewer sessions"
+            )
+        inner.done()
+        found.append(side)
+    if not found:
+        raise InputError("no sides", where=table.where, fix="add [sides.train] with sequences and renders")
+    table.done()
+    return tuple(found)
+
+
+def _sessions(table: Table) -> SessionSpec:
+    spec = SessionSpec(spread=table.number("spread", 0.25, least=0.0))
+    table.done()
+    return spec
+
+
+def _camera(table: Table) -> CameraSpec:
+    spec = CameraSpec(
+        jpeg_quality=table.quantity("jpeg-quality", 90.0, least=1.0, most=100.0),
+        read_noise=table.quantity("read-noise", 0.0, least=0.0, most=128.0),
+        shot_noise=table.quantity("shot-noise", 0.0, least=0.0, most=128.0),
+        frame_slot=table.whole("frame-slot", 32768, least=1),
+    )
+    table.done()
+    return spec
+
+
+def _anemometer(table: Table) -> AnemometerSpec:
+    effects: dict[str, dict[str, Quantity]] = {}
+    chosen = table.table("effects")
+    known = [name for name in SENSOR_EFFECTS if issubclass(SENSOR_EFFECTS[name], AnemometerEffect)]
+    for name in chosen.names():
+        if name not in known:
+            raise UnknownNameError.of("effect of an anemometer", name, known, where=chosen.where)
+        inner = chosen.table(name)
+        effects[name] = {
+            key: inner.quantity(key.replace("_", "-"), entry.null, least=entry.admissible[0], most=entry.admissible[1])
+            for key, entry in SENSOR_EFFECTS[name].parameters().items()
+        }
+        inner.done()
+    chosen.done()
+    spec = AnemometerSpec(
+        truth=table.choice("truth", Truth.STATED), rate=table.number("rate", 1.0, above=0.0),
+        before=table.number("before", 75.0, least=0.0), noise=table.quantity("noise", 0.0, least=0.0),
+        resolution=table.number("resolution", 0.1, above=0.0), accuracy=table.number("accuracy", 0.2, least=0.0),
+        effects=effects,
+    )  # fmt: skip
+    table.done()
+    return spec
+
+
+def _check(recipe: DatasetRecipe, *, where: str) -> None:
+    if not recipe.licence:
+        raise InputError("no licence", where=where, fix='say how the data may be used: licence = "CC-BY-4.0"')
+    time, anemometer = recipe.simulation.time, recipe.anemometer
+    known = time.settle if changing(recipe.simulation) else anemometer.before
+    if anemometer.truth is Truth.MEASURED and known < TRUTH_WINDOW:
+        raise UsageError(
+            f"the anemometer has {known:g} s of wind before the first frame, ground truth is the mean of the "
+            f"{TRUTH_WINDOW:g} s before a clip's end",
+            where=where,
+            fix=f"let the scene settle for {TRUTH_WINDOW:g} s" if changing(recipe.simulation) else "raise before",
+        )
+
+
+def changing(simulation: Simulation) -> bool:
+    """Whether the wind of a scene changes with time or place, so that it is known only while it is simulated."""
+    return any(issubclass(EFFECTS[name], (WindEffect, FlowEffect)) for name in simulation.effects)

@@ -1,0 +1,172 @@
+"""What a data set's recipe says. The form of the file is in `sim.datasets.reading`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from flagdata.provenance import canonical, digest, file_hash, recipe_hash
+from sim.assets.photos import Photos
+from sim.render.prior import RenderPrior
+from sim.run.recipe import Recipe as Simulation
+from sim.run.tables import Quantity, plain
+
+RECIPE_VERSION = 1
+
+
+class Truth(StrEnum):
+    """What the ground truth of a clip is."""
+
+    STATED = "stated"
+    """The wind that was simulated, exactly."""
+    MEASURED = "measured"
+    """What the anemometer measured, with its uncertainty, as for a real recording."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """One side of the split.
+
+    Attributes:
+        name: "train", "validation", "test".
+        sequences: mesh sequences, each of its own seed.
+        renders: recordings in all; each sequence has as many as any other, or one more.
+        sessions: set-ups that the sequences are dealt to in turn; 0 where each sequence stands alone.
+    """
+
+    name: str
+    sequences: int
+    renders: int
+    sessions: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraSpec:
+    """The camera behind the picture.
+
+    Attributes:
+        jpeg_quality: 1 to 100.
+        read_noise: standard deviation that does not depend on the light, in 8-bit steps.
+        shot_noise: of a full-scale (255) pixel, in 8-bit steps; its square is in proportion to the light.
+        frame_slot: stored frames are filled up to whole multiples of this, so that their size tells nothing [B].
+    """
+
+    jpeg_quality: Quantity
+    read_noise: Quantity
+    shot_noise: Quantity
+    frame_slot: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnemometerSpec:
+    """The anemometer beside the flag.
+
+    Attributes:
+        truth: see `Truth`.
+        rate: samples a second [Hz]; each is the mean of the time since the one before.
+        before: for how long it ran before the first frame, where the wind is constant [s].
+        noise: standard deviation of a sample [m/s].
+        resolution: step of its readings [m/s].
+        accuracy: standard uncertainty that its data sheet states [m/s].
+        effects: names of `sim.effects.SENSOR_EFFECTS` → parameter → value, drawn for each recording.
+    """
+
+    truth: Truth
+    rate: float
+    before: float
+    noise: Quantity
+    resolution: float
+    accuracy: float
+    effects: Mapping[str, Mapping[str, Quantity]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionSpec:
+    """What the sequences of one session have in common beside the flag, camera and light, which are the same.
+
+    Attributes:
+        spread: the sequences' winds lie within this share of the session's mean, either way.
+    """
+
+    spread: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetRecipe:
+    """A data set.
+
+    Attributes:
+        name: what its artifacts are called after.
+        title: one line for people.
+        licence: of what is built.
+        seed: all random streams follow from it.
+        renderer: a name of `sim.render.RENDERERS`.
+        simulation: the scene's recipe; its seed and count are the sides' own.
+        prior: of ζ.
+        photos: a folder of photographs in place of procedural backgrounds.
+        sessions: None where sequences stand alone.
+    """
+
+    name: str
+    title: str
+    licence: str
+    seed: int
+    renderer: str
+    simulation: Simulation
+    prior: RenderPrior
+    sides: tuple[Side, ...]
+    camera: CameraSpec
+    anemometer: AnemometerSpec
+    photos: Path | None = None
+    sessions: SessionSpec | None = None
+
+    def side(self, name: str) -> Side:
+        """The side of that name."""
+        return next(side for side in self.sides if side.name == name)
+
+    def filming(self) -> dict[str, Any]:
+        """All that shapes a recording beside its mesh sequence and its seed, as JSON."""
+        camera, anemometer = self.camera, self.anemometer
+        return {
+            "film": RECIPE_VERSION,
+            "renderer": self.renderer,
+            "prior": self.prior.identity(),
+            "photos": None if self.photos is None else _content(self.photos),
+            "camera": {
+                "jpeg_quality": plain(camera.jpeg_quality), "read_noise": plain(camera.read_noise),
+                "shot_noise": plain(camera.shot_noise), "frame_slot": camera.frame_slot,
+            },
+            "anemometer": {
+                "truth": anemometer.truth.value, "rate": anemometer.rate, "before": anemometer.before,
+                "noise": plain(anemometer.noise), "resolution": anemometer.resolution,
+                "accuracy": anemometer.accuracy,
+                "effects": {
+                    name: {key: plain(value) for key, value in parameters.items()}
+                    for name, parameters in anemometer.effects.items()
+                },
+            },
+        }  # fmt: skip
+
+    def identity(self) -> dict[str, Any]:
+        """All that shapes the data set, as JSON."""
+        return {
+            "dataset": RECIPE_VERSION, "name": self.name, "seed": self.seed,
+            "simulation": self.simulation.identity(), "filming": self.filming(),
+            "sessions": None if self.sessions is None else vars(self.sessions).copy(),
+            "sides": [vars(side).copy() for side in self.sides],
+        }  # fmt: skip
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the identity."""
+        return recipe_hash(self.identity())
+
+
+@cache
+def _content(folder: Path) -> str:
+    """SHA-256 of the names and bytes of a folder's photographs."""
+    return digest(canonical({name: file_hash(folder / name) for name in Photos.of(folder).members}))

@@ -1,0 +1,101 @@
+"""A film's record: frames, anemometer and parameters in one MCAP file, as a real recording has them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flagdata.provenance import canonical, recipe_hash
+from flagdata.record import RecordWriter
+from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
+from flagdata.signals import CameraInfo, Instants, WindSeries
+from flagdata.timebase import NANOSECONDS
+from sim.datasets.films import Film
+from sim.datasets.recipe import Truth
+from sim.render.parameters import RenderParameters
+from sim.run.members import Member, Parameter
+
+FILL = "fill"
+"""Attachment that makes all records of a data set equally long."""
+MEAN_WIND = "mean_wind_speed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Content:
+    """What goes into a record.
+
+    Attributes:
+        film: which.
+        times: (n,) of the frames [UTC ns].
+        frames: their JPEGs.
+        wind: the anemometer's samples.
+        parameters: numbers by name, SI.
+        zeta: what the picture was made with.
+        slot: the record's length is a whole multiple of this [B].
+    """
+
+    film: Film
+    times: Instants
+    frames: Sequence[bytes]
+    wind: WindSeries
+    parameters: Mapping[str, float]
+    zeta: RenderParameters
+    slot: int
+
+
+def record_bytes(content: Content) -> bytes:
+    """The file. The code's version is not in it but in the catalog: the same film gives the same bytes."""
+    with tempfile.TemporaryDirectory(prefix="flagdata-film-") as folder:
+        whole = Path(folder) / "whole.mcap"
+        _write(Path(folder) / "bare.mcap", content, fill=0)
+        size = (Path(folder) / "bare.mcap").stat().st_size
+        _write(whole, content, fill=-size % content.slot)
+        return whole.read_bytes()
+
+
+def _write(path: Path, content: Content, *, fill: int) -> None:
+    film, zeta, times = content.film, content.zeta, content.times
+    row = film.artifact(frames=len(times))
+    start, end = int(times[0]), int(times[-1])
+    rate = (len(times) - 1) * NANOSECONDS / (end - start) if len(times) > 1 else film.cast.simulation.time.rate
+    camera = CameraInfo(
+        container="render", codec=film.filming["renderer"], width=zeta.width, height=zeta.height, container_rate=rate,
+        true_rate=rate, variable_rate=False, rotation=0, start=start, start_from="simulation",
+        duration=(end - start) / NANOSECONDS, crop=(0, 0, zeta.width, zeta.height),
+    )  # fmt: skip
+    provenance = {"meshes": film.sequence, "recipe": canonical(row.recipe), "recipe_hash": recipe_hash(row.recipe)}
+    with RecordWriter(path, metadata={PROVENANCE: provenance, CAMERA: camera_metadata(camera)}) as record:
+        for time, frame in zip(times.tolist(), content.frames, strict=True):
+            record.frame(log_time=time, publish_time=time, timestamp=time, image=frame)
+        record.wind(content.wind)
+        record.truth(content.parameters, log_time=start)
+        record.attach(FILL, bytes(fill), media_type="application/octet-stream", log_time=start)
+
+
+def parameters_of(member: Member, zeta: RenderParameters, drawn: Mapping[str, float], truth: Truth) -> dict[str, float]:
+    """θ, ζ and what the instruments drew, numbers by name in SI; lists as "name.0", "name.1", …
+
+    Where the anemometer is to be believed, the simulated mean wind has another name than ground truth goes by.
+    """
+    found: dict[str, float] = {}
+    for name, value in member.parameters.items():
+        found |= _numbers(MEAN_WIND if name == "wind_speed" and truth is Truth.MEASURED else name, value)
+    for name, value in zeta.as_dict().items():
+        found |= _numbers(f"render.{name}", value)
+    return {**found, **drawn}
+
+
+def _numbers(name: str, value: Parameter) -> dict[str, float]:
+    if isinstance(value, str):
+        return {}
+    if isinstance(value, tuple):
+        return {f"{name}.{index}": float(entry) for index, entry in enumerate(value)}
+    return {name: float(value)}
+
+
+def texts_of(member: Member, zeta: RenderParameters) -> dict[str, str]:
+    """The parameters that are names."""
+    drawn = {f"render.{name}": value for name, value in zeta.as_dict().items()}
+    return {name: value for name, value in {**member.parameters, **drawn}.items() if isinstance(value, str)}
