@@ -9,6 +9,7 @@ BENCHMARKS = {
     "pairs": "tests.benchmarks.bench_pairs",
     "records": "tests.benchmarks.bench_records",
     "sim": "tests.benchmarks.bench_sim",
+    "sim-cost": "tests.benchmarks.bench_sim_cost",
 }
 
 if __name__ == "__main__":

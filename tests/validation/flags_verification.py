@@ -17,6 +17,7 @@ from scipy.special import jn_zeros
 
 from tests.verification.cases import (
     FRAME,
+    OCTAVES,
     SWING_SLOWING,
     G,
     drooped_tips,
@@ -38,6 +39,8 @@ _CELLS = (10, 15, 20, 30, 40)
 _NESTED = (6, 12, 24, 48)
 _MEMBERS = 16
 _STATISTICS = ("droop [m]", "downwind [m]", "speed [m/s]", "frequency [Hz]")
+_BANDS = tuple(f"{low:g} to {high:g} Hz" for low, high in OCTAVES)
+_ORDERS_TRIED = np.linspace(0.25, 5.0, 96)
 
 
 def rates(sizes: list[float] | tuple[float, ...], errors: list[float]) -> list[float]:
@@ -117,20 +120,57 @@ def _pendulum() -> dict[str, Any]:
 
 
 def _summary(runs: NDArray[np.float64]) -> dict[str, list[float]]:
-    """Droop, downwind distance, speed and frequency of the free edge: means and standard errors."""
+    """Droop, downwind distance, speed and frequency of the free edge, powers of the tip: means and standard errors."""
     error = runs.std(0, ddof=1) / math.sqrt(len(runs))
-    return {"mean": (runs.mean(0) * [-1, 1, 1, 1]).tolist(), "error": error.tolist()}
+    mean = runs.mean(0)
+    mean[0] *= -1
+    return {"mean": mean.tolist(), "error": error.tolist()}
+
+
+def observed_order(
+    sizes: NDArray[np.float64], values: NDArray[np.float64], errors: NDArray[np.float64]
+) -> tuple[float, float, float, float]:
+    """Weighted least squares of v = v0 + c sᵖ: p with its 68 % range (χ² within 1 of its least), and v0.
+
+    The range ends at the ends of what is tried where the values tell no more.
+    """
+    fits = []
+    for order in _ORDERS_TRIED:
+        design = np.stack([np.ones_like(sizes), sizes**order], axis=1) / errors[:, None]
+        solution, *_ = np.linalg.lstsq(design, values / errors, rcond=None)
+        fits.append((float(((design @ solution - values / errors) ** 2).sum()), float(solution[0])))
+    squares, limits = np.array(fits).T
+    best = int(squares.argmin())
+    likely = _ORDERS_TRIED[squares <= squares[best] + 1]
+    return float(_ORDERS_TRIED[best]), float(likely[0]), float(likely[-1]), float(limits[best])
 
 
 def _mesh(seed: int) -> dict[str, Any]:
     each = [edge_statistics(n, seed=seed + n, wind=4.0, members=_MEMBERS, share=1.0) for n in _CELLS]
-    return {"cell": [1.5 / n for n in _CELLS], "statistics": [_summary(runs) for runs in each]}
+    cells = np.array([1.5 / n for n in _CELLS])
+    statistics = [_summary(runs) for runs in each]
+    mean, error = (np.array([s[key] for s in statistics]) for key in ("mean", "error"))
+    orders = {}
+    for index, name in enumerate(_STATISTICS + _BANDS):
+        order, low, high, limit = observed_order(cells, mean[:, index], error[:, index])
+        orders[name] = {"order": order, "from": low, "to": high, "at_no_cell_size": limit}
+    return {"cell": cells.tolist(), "statistics": statistics, "orders": orders}
 
 
 def _statistics_step(seed: int) -> dict[str, Any]:
     shares = (1.0, 0.5, 0.25)
     each = [edge_statistics(15, seed=seed + i, wind=4.0, members=_MEMBERS, share=s) for i, s in enumerate(shares)]
-    return {"share": list(shares), "statistics": [_summary(runs) for runs in each]}
+    statistics = [_summary(runs) for runs in each]
+    mean, error = (np.array([s[key] for s in statistics]) for key in ("mean", "error"))
+    centre = (mean / error**2).sum(0) / (1 / error**2).sum(0)
+    return {
+        "share": list(shares),
+        "statistics": statistics,
+        "quantities": [*_STATISTICS, *_BANDS],
+        # Of the three values about their mean: 2 is expected where the step changes nothing, 6 is exceeded by chance
+        # in one of twenty.
+        "chi_squared": (((mean - centre) / error) ** 2).sum(0).tolist(),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,14 +228,10 @@ def draw_verification(result: dict[str, Any], path: Path) -> None:
     _draw_fall(panels[0, 3], result["fall"])
     _draw_elastica(panels[1, 0], result["elastica"])
     _draw_pendulum(panels[1, 2], panels[1, 3], result["pendulum"])
-    cells = [1e3 * cell for cell in result["mesh"]["cell"]]
-    shares = result["statistics_step"]["share"]
-    for offset, names in enumerate((_STATISTICS[:2], _STATISTICS[2:])):
-        _draw_statistics(panels[2, 1 + offset], cells, result["mesh"]["statistics"], names, xlabel="cell [mm]")
-        _draw_statistics(
-            panels[2, 3 + offset], shares, result["statistics_step"]["statistics"], names,
-            xlabel="step / default, cell 100 mm",
-        )  # fmt: skip
+    for offset, names in enumerate((_STATISTICS[:2], _STATISTICS[2:], _BANDS)):
+        _draw_statistics(panels[2, 1 + offset], result["mesh"], names)
+    panels[2, 3].set(ylabel="upper corner across the wind,\nmean square [m²]", yscale="log", ylim=(5e-4, 0.3))
+    _draw_steps(panels[2, 4], result["statistics_step"])
     figure.savefig(path, dpi=90)
 
 
@@ -257,13 +293,40 @@ def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
     _mark_sizes(errors, size)
 
 
-def _draw_statistics(
-    axes: Axes, x: list[float], statistics: list[dict[str, list[float]]], names: tuple[str, ...], *, xlabel: str
-) -> None:
-    for name, colour in zip(names, (MEASURED, THEORY), strict=True):
-        column = _STATISTICS.index(name)
-        mean, error = (np.array([s[key][column] for s in statistics]) for key in ("mean", "error"))
-        axes.errorbar(x, mean, yerr=error, fmt="o-", color=colour, lw=1, ms=4, capsize=3, label=name)
-    axes.set(xlabel=xlabel, xlim=(0, 1.1 * max(x)), ylim=(0, None))
-    axes.set_title(f"7  settled free edge, 4 m/s:\n{_MEMBERS} runs of 7 s, ± standard error", fontsize=9)
-    axes.legend(frameon=False, fontsize=8, loc="center left")
+def _draw_statistics(axes: Axes, result: dict[str, Any], names: tuple[str, ...]) -> None:
+    """Against the cell, with the order that each approaches its limit in."""
+    x = 1e3 * np.array(result["cell"])
+    colours = (MEASURED, THEORY, "#6a8f3c", MARK)
+    for name, colour in zip(names, colours, strict=False):
+        column = (_STATISTICS + _BANDS).index(name)
+        mean, error = (np.array([s[key][column] for s in result["statistics"]]) for key in ("mean", "error"))
+        label = f"{name}: {_order_text(result['orders'][name])}"
+        axes.errorbar(x, mean, yerr=error, fmt="o-", color=colour, lw=1, ms=4, capsize=3, label=label)
+    axes.set(xlabel="cell [mm]", xlim=(0, 1.1 * max(x)), ylim=(0, None))
+    axes.set_title(f"7  settled, 4 m/s: {_MEMBERS} runs of 7 s,\n± standard error; order (68 %)", fontsize=9)
+    axes.legend(frameon=False, fontsize=7, loc="upper left" if len(names) > 2 else "center left")
+
+
+def _order_text(fit: dict[str, float]) -> str:
+    """The range alone where it is open to one side."""
+    if fit["from"] == _ORDERS_TRIED[0]:
+        return "any" if fit["to"] == _ORDERS_TRIED[-1] else f"below {fit['to']:.1f}"
+    if fit["to"] == _ORDERS_TRIED[-1]:
+        return f"above {fit['from']:.1f}"
+    return f"{fit['order']:.1f} ({fit['from']:.1f}–{fit['to']:.1f})"
+
+
+def _draw_steps(axes: Axes, result: dict[str, Any]) -> None:
+    """How far the statistics are from their mean over the steps, in standard errors."""
+    mean, error = (np.array([s[key] for s in result["statistics"]]) for key in ("mean", "error"))
+    centre = (mean / error**2).sum(0) / (1 / error**2).sum(0)
+    places = np.arange(len(result["quantities"]))
+    for share, values, colour in zip(result["share"], (mean - centre) / error, (MEASURED, THEORY, MARK), strict=True):
+        axes.plot(values, places, "o", color=colour, mfc="none", ms=5, label=f"{share:g} × default")
+    axes.axvline(0, color=MARK, lw=0.6)
+    axes.set_yticks(places, [name.partition(" [")[0] for name in result["quantities"]], fontsize=7)
+    axes.invert_yaxis()
+    axes.set(xlabel="from the mean of the three\n[standard errors]", xlim=(-3.5, 3.5))
+    worst = max(result["chi_squared"])
+    axes.set_title(f"7  against the step, cell 100 mm:\nχ² at most {worst:.1f}, 2 expected", fontsize=9)
+    axes.legend(frameon=False, fontsize=7, loc="lower left", bbox_to_anchor=(-0.03, -0.03), handletextpad=0.0)

@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_bvp
 from scipy.optimize import brentq
+from scipy.signal import welch
 from scipy.special import j0, jn_zeros
 
 from sim.air import QuadraticNormal
@@ -33,6 +34,8 @@ FRAME = 0.04
 SWING_SLOWING = 0.2 * G / (4 * 2000.0)
 """Half the static stretch ρ g L/(2 K) of the sheet of `swing`, over its length: about what its frequencies lose by it:
 the inextensible theory holds no closer."""
+OCTAVES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0), (4.0, 8.0))
+"""Bands of the tip's spectrum [Hz]."""
 KICKED_MESH = grid(width=0.5, height=0.4, columns=5, rows=4)
 
 
@@ -248,7 +251,8 @@ def mesh_differences(counts: Sequence[int], *, frames: int = 4) -> NDArray[np.fl
 
 
 def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share: float) -> NDArray[np.float64]:
-    """(member, 4) of a settled flag's free edge: height [m], distance downwind [m], speed [m/s], frequency [Hz]."""
+    """(member, 8) of a settled flag: its free edge's height [m], distance downwind [m], speed [m/s] and frequency [Hz],
+    and the power of its upper corner's motion across the wind in each of `OCTAVES` [m²]."""
     scene = flag(material=named("camel-ponte-roma"), wind_speed=wind, columns=columns)
     edge = np.flatnonzero(scene.mesh.rest[:, 0] > 1.5 - 1e-6)
     noise = np.random.default_rng(seed).normal(0, 1e-3, (members, *scene.position.shape))
@@ -261,4 +265,12 @@ def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share
             track.append(state.position[edge].numpy())
     assert bool(state.healthy().all())
     runs = [edge_motion(np.stack(track)[..., b], rate=1 / FRAME) for b in range(members)]
-    return np.array([[run.position[2] - 0.5, run.position[0], run.speed, run.frequency] for run in runs])
+    motion = np.array([[run.position[2] - 0.5, run.position[0], run.speed, run.frequency] for run in runs])
+    return np.concatenate([motion, _tip_power(np.stack(track)[:, -1, 1])], axis=1)
+
+
+def _tip_power(across: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(member, octave) mean square of a displacement (frame, member) in each of `OCTAVES`, from pieces of 4 s."""
+    frequency, density = welch(across.astype(np.float64), fs=1 / FRAME, nperseg=100, detrend="linear", axis=0)
+    inside = [(low <= frequency) & (frequency < high) for low, high in OCTAVES]
+    return np.stack([density[band].sum(0) * frequency[1] for band in inside], axis=1)
