@@ -1,0 +1,184 @@
+"""What was observed: tracked points of one cloth in one or more recordings, and the wind beside each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from sim.air import AirForce, QuadraticNormal
+from sim.handles import ARCSIM_STIFFNESS
+from sim.material import Material
+from sim.mesh import Mesh
+from sim.scene import GRAVITY
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WindTrack:
+    """The wind as it was logged, linear between its samples.
+
+    Attributes:
+        times: (n,) since the recording's first frame [s], increasing.
+        velocity: (n, 3) where the air goes to [m/s]. One sample stands for a constant wind.
+
+    Raises:
+        InputError: shapes that disagree, values that are not finite, times that do not increase.
+    """
+
+    times: Floats
+    velocity: Floats
+
+    def __post_init__(self) -> None:
+        times, velocity = _frozen(self.times), _frozen(self.velocity)
+        if times.ndim != 1 or velocity.shape != (len(times), 3) or not len(times):
+            raise InputError(
+                f"{times.shape} times with velocities of shape {velocity.shape}",
+                where="wind", fix="give (n,) seconds and (n, 3) m/s",
+            )  # fmt: skip
+        if not (np.isfinite(times).all() and np.isfinite(velocity).all()) or (np.diff(times) <= 0).any():
+            raise InputError(
+                "times that do not increase, or a value that is not finite", where="wind",
+                fix="sort the log and leave its gaps out",
+            )  # fmt: skip
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "velocity", velocity)
+
+    @classmethod
+    def constant(cls, velocity: tuple[float, float, float]) -> WindTrack:
+        """The same wind (x, y, z) [m/s] all the time."""
+        return cls(times=np.zeros(1), velocity=np.array([velocity], dtype=np.float64))
+
+    @property
+    def steady(self) -> bool:
+        """Whether it never changes."""
+        return bool((self.velocity == self.velocity[0]).all())
+
+    @property
+    def speed(self) -> float:
+        """Mean speed [m/s]."""
+        return float(np.linalg.norm(self.velocity, axis=1).mean())
+
+    def at(self, times: Floats) -> Floats:
+        """(k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
+        return np.stack([np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """One recording: tracked points at a constant rate.
+
+    Attributes:
+        name: what reports call it.
+        markers: (marker, 2) where the points are on the flat cloth [m].
+        positions: (frame, marker, 3) [m], z up; NaN where a point was not tracked.
+        rate: frames a second [Hz].
+        wind: beside it.
+        noise: standard deviation of a coordinate [m].
+        source: identity of the artifact it was read from; empty where there is none.
+
+    Raises:
+        InputError: shapes that disagree, a rate or noise that makes no sense, infinite positions.
+    """
+
+    name: str
+    markers: Floats
+    positions: Floats
+    rate: float
+    wind: WindTrack
+    noise: float = 0.0
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        markers, positions = _frozen(self.markers), _frozen(self.positions)
+        where = f"recording {self.name!r}"
+        if markers.ndim != 2 or markers.shape[1] != 2 or positions.shape[1:] != (len(markers), 3):
+            raise InputError(
+                f"markers of shape {markers.shape} with positions of shape {positions.shape}",
+                where=where, fix="give (marker, 2) and (frame, marker, 3), in metres",
+            )  # fmt: skip
+        if not np.isfinite(markers).all() or np.isinf(positions).any():
+            raise InputError("a coordinate is not finite", where=where, fix="mark points that were lost by NaN")
+        if not (np.isfinite(self.rate) and self.rate > 0):
+            raise InputError(f"a rate of {self.rate!r} frames a second", where=where, fix="give Hz")
+        if not (np.isfinite(self.noise) and self.noise >= 0):
+            raise InputError(f"a noise of {self.noise!r} m", where=where, fix="give at least 0 metres")
+        object.__setattr__(self, "markers", markers)
+        object.__setattr__(self, "positions", positions)
+
+    @property
+    def times(self) -> Floats:
+        """(frame,) since the first frame [s]."""
+        return np.arange(len(self.positions)) / self.rate
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Specimen:
+    """What is known of the cloth before anything is fitted.
+
+    Attributes:
+        mesh: the model's, in its flat rest state; as wide and high as the cloth.
+        material: nominal.
+        held: vertices of `mesh` that are attached.
+        anchors: (held, 3) where they are tied [m].
+        stiffness: of each attachment, on each axis [N/m].
+        gravity: (x, y, z) [m/s²].
+        air: the base model's force.
+
+    Raises:
+        InputError: attachments and anchors that do not fit.
+    """
+
+    mesh: Mesh
+    material: Material
+    held: tuple[int, ...]
+    anchors: Floats
+    stiffness: float = ARCSIM_STIFFNESS
+    gravity: tuple[float, float, float] = GRAVITY
+    air: AirForce = field(default_factory=QuadraticNormal)
+
+    def __post_init__(self) -> None:
+        anchors = _frozen(self.anchors)
+        if not self.held or anchors.shape != (len(self.held), 3) or not np.isfinite(anchors).all():
+            raise InputError(
+                f"{len(self.held)} attachments with anchors of shape {anchors.shape}",
+                where="specimen", fix="give one finite (x, y, z) for each attached vertex",
+            )  # fmt: skip
+        object.__setattr__(self, "anchors", anchors)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experiment:
+    """One cloth in one or more recordings.
+
+    Raises:
+        InputError: no recording, two of one name, or markers beyond the cloth.
+    """
+
+    specimen: Specimen
+    recordings: tuple[Trajectory, ...]
+
+    def __post_init__(self) -> None:
+        names = [r.name for r in self.recordings]
+        if not names or len(set(names)) != len(names):
+            raise InputError(f"recordings {names!r}", where="experiment", fix="give one or more, each its own name")
+        rest = self.specimen.mesh.rest
+        slack = 1e-3 * float(np.ptp(rest, axis=0).max())
+        for recording in self.recordings:
+            beyond = (recording.markers < rest.min(axis=0) - slack) | (recording.markers > rest.max(axis=0) + slack)
+            if beyond.any():
+                marker = int(np.flatnonzero(beyond.any(axis=1))[0])
+                raise InputError(
+                    f"{int(beyond.any(axis=1).sum())} markers are not on the cloth",
+                    where=f"recording {recording.name!r}, marker {marker}",
+                    fix="give rest coordinates in the cloth's own frame and in metres",
+                )
+
+
+def _frozen(values: Floats) -> Floats:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
