@@ -124,6 +124,14 @@ class Table:
             raise self._wrong(key, value, 'a list of texts, ["…", "…"]')
         return tuple(value)
 
+    def numbers(self, key: str) -> tuple[float, ...]:
+        value = self._take(key, [])
+        if not isinstance(value, list) or not all(
+            isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item) for item in value
+        ):
+            raise self._wrong(key, value, "a list of finite numbers")
+        return tuple(float(item) for item in value)
+
     def choice(self, key: str, default: E) -> E:
         value = self._take(key, default.value)
         options = [option.value for option in type(default)]
