@@ -1,8 +1,10 @@
-"""The largest stable step of an explicit method, from the stiffest vibration of the cloth."""
+"""The largest stable step of an explicit method, from the stiffest vibration of the cloth, and how long what the base
+model lacks may act as impulses, from how fast it changes with shape and velocity."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -11,13 +13,20 @@ from torch import Tensor
 
 from sim import bending, membrane
 from sim.cloth import gather_sum
-from sim.system import System
+from sim.state import State
+from sim.system import Drive, System
 
 _ITERATIONS = 80
 # Power iteration approaches from below; after 80 steps the deficit on such meshes is under 5 %.
 _DEFICIT = 1.05
 # Strain the stiffness is taken at: faces rarely exceed it where strain is not limited.
 _STRETCH = 1.15
+
+# Of the outer step: how far a slow force may be damped or turned in one impulse. Damping beyond twice the inverse rate
+# overshoots; a stiffness ω² beyond about d π³/H³ feeds the vibrations of period 2 H faster than the damping d takes
+# from them, which is ω H = 1.2 at d = 0.25 ms and H = 5 ms.
+_DAMPED, _TURNED = 0.5, 1.0
+_OUTER_ITERATIONS = 12
 
 _LIMITS: WeakKeyDictionary[System, float] = WeakKeyDictionary()
 
@@ -46,7 +55,7 @@ def stiffest(system: System) -> Tensor:
     bend = torch.tensor([float(m.bending.max()) for m in cloth.materials], dtype=cloth.dtype, device=cloth.device)
     bend = bend if cloth.stiffening is None else bend * (1 + cloth.stiffening)
     folds = replace(folds, k=(cloth.hinge_shape[:, None] / 2 * bend).expand_as(folds.k))
-    free = _free(system)
+    free = system.free
 
     def apply(field: Tensor) -> Tensor:
         product = gather_sum(at.corner_products(field), cloth.face_slots)
@@ -58,9 +67,7 @@ def stiffest(system: System) -> Tensor:
             product = product + tie.stiffest(cloth).unsqueeze(1) * field
         return product / cloth.mass.unsqueeze(1) * free
 
-    # A fixed start that has a part along every mode: no generator is needed, and results repeat.
-    index = torch.arange(position[..., 0].numel(), dtype=cloth.dtype, device=cloth.device)
-    field = torch.sin(index * index).reshape(-1, 3, 1).expand_as(position) * free
+    field = _start(position) * free
     value = torch.zeros_like(cloth.damping)
     for _ in range(_ITERATIONS):
         field = field / (field**2).sum((0, 1)).sqrt()
@@ -88,10 +95,43 @@ def stable_step(system: System) -> float:
     return _LIMITS[system]
 
 
-def _free(system: System) -> Tensor:
-    """(vertex, 1, 1): 0 for rigidly held vertices, 1 for all others."""
-    cloth = system.cloth
-    free = torch.ones((cloth.mesh.vertex_count, 1, 1), dtype=cloth.dtype, device=cloth.device)
-    if system.clamped:
-        free[system.held] = 0
-    return free
+def outer_limit(system: System, state: State, drive: Drive) -> float:
+    """The longest outer step [s] of what the base model lacks, for the whole batch, estimated at a state.
+
+    With r and ω² the largest changes of its acceleration with velocity and with position, by power iteration on
+    differences, it is the smaller of 0.5/r and 1/ω. Air's damping 2 ρ w/σ is included as far as it is not the base's.
+    Members that have diverged do not count.
+    """
+    x, v = state.position, state.velocity
+    inverse = system.free / system.cloth.mass.unsqueeze(1)
+
+    def accelerated(position: Tensor, velocity: Tensor) -> Tensor:
+        memory = system.remembered(state.memory, position)
+        force = system.extra_force(drive, 0.0, state.time, position, velocity, memory=memory)
+        return inverse * system.effective(position, force)
+
+    # Small beside what moves, large beside rounding: differences are taken of forces that are smooth on these scales.
+    size = 1e-3 * float(system.cloth.areas.mean()) ** 0.5
+    speed = 1e-2 * max(1.0, float(drive.wind[0].norm(dim=0).max()))
+    with torch.no_grad():
+        damped = _largest(lambda field: accelerated(x, v + field) - accelerated(x, v - field), x, speed)
+        turned = _largest(lambda field: accelerated(x + field, v) - accelerated(x - field, v), x, size)
+    return min(_DAMPED / damped if damped > 0 else math.inf, _TURNED / math.sqrt(turned) if turned > 0 else math.inf)
+
+
+def _largest(difference: Callable[[Tensor], Tensor], like: Tensor, size: float) -> float:
+    """The largest factor of an operator, half of whose differences over ± a field of some size are given."""
+    field = _start(like)
+    value = torch.zeros_like(like[0, 0])
+    for _ in range(_OUTER_ITERATIONS):
+        field = size * field / (field**2).amax((0, 1)).sqrt().clamp(min=torch.finfo(like.dtype).tiny)
+        before = (field**2).sum((0, 1)).sqrt()
+        field = difference(field) / 2
+        value = (field**2).sum((0, 1)).sqrt() / before.clamp(min=torch.finfo(like.dtype).tiny)
+    return float(torch.where(torch.isfinite(value), value, 0.0).max())
+
+
+def _start(like: Tensor) -> Tensor:
+    """A fixed field that has a part along every mode: no generator is needed, and results repeat."""
+    index = torch.arange(like[..., 0].numel(), dtype=like.dtype, device=like.device)
+    return torch.sin(index * index).reshape(-1, 3, 1).expand_as(like)

@@ -19,18 +19,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.integrate.backend import Backend, kernel_for
-from sim.integrate.stability import stable_step
+from sim.integrate.stability import outer_limit, stable_step
 from sim.kernel.fused import Kernel
 from sim.state import State
 from sim.system import Drive, System
 
 # Share of the linear stability limit that is used: large deformation stiffens faces beyond the estimate.
 _SAFETY = 0.7
+# Wind and cloth so much faster together call for another estimate of the longest outer step.
+_RISEN = 1.3
+
+_OUTER: WeakKeyDictionary[System, tuple[float, float]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,6 +169,7 @@ def _impulses(
     system: System, drive: Drive, state: State, duration: float, *, inner: int, outer: int, backend: Backend
 ) -> State:
     base, length = system.base, duration / outer
+    _check_outer(system, state, drive, length)
     x, v, memory = state.position, state.velocity, state.memory
     kernel = None if kernel_for(system, state, backend) is None else Kernel.of(base)
     inverse_mass, acceleration = _inverse_mass(system), 0.0 * v
@@ -179,6 +185,22 @@ def _impulses(
             x, v = _base(base, part, time, x, v, length / inner, inner, kernel)
             memory = system.remembered(memory, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
+
+
+def _check_outer(system: System, state: State, drive: Drive, length: float) -> None:
+    """Refuse an outer step [s] beyond the limit, which is estimated anew where wind and cloth have become faster."""
+    moving = (state.velocity**2).sum(1).mean(0).sqrt()
+    healthy = moving[state.healthy()]
+    speed = max(float(wind.norm(dim=0).max()) for wind in drive.wind) + float(healthy.max() if len(healthy) else 0)
+    known = _OUTER.get(system)
+    if known is None or speed > _RISEN * known[0]:
+        known = _OUTER[system] = (speed, outer_limit(system, state, drive))
+    if length > known[1]:
+        raise UsageError(
+            f"an outer step of {length:.3g} s is too long: what acts beside the base model changes within "
+            f"{known[1]:.3g} s, the longest that is stable",
+            where="integrator symplectic", fix="give a shorter outer step, or none",
+        )  # fmt: skip
 
 
 def _inverse_mass(system: System) -> Tensor:
