@@ -52,7 +52,9 @@ class StripRun:
 
     def __post_init__(self) -> None:
         if self.columns < 4 or min(self.stretching, self.duration, self.rate) <= 0 or self.settle < 0:
-            raise InputError(f"{self} cannot be simulated", where="strip", fix="give positive values, 4 columns or more")
+            raise InputError(
+                f"{self} cannot be simulated", where="strip", fix="give positive values, 4 columns or more"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,3 +127,19 @@ def simulate(
         time=(np.arange(kept) + 1) * interval, along=track[:, :, 0], across=track[:, :, 1],
         arc=np.unique(np.round(x, 12)),
     )  # fmt: skip
+
+
+def as_columns(motion: StripMotion, member: int, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The member's line as a camera sees it: heights at fixed distances from the clamp along the stream [m].
+
+    Args:
+        columns: (column,) [m].
+
+    Returns:
+        (frame, column) [m]; NaN beyond the tip, and in frames in which the line is folded over.
+    """
+    heights = np.full((len(motion.time), len(columns)), np.nan)
+    for frame, (along, across) in enumerate(zip(motion.along[..., member], motion.across[..., member], strict=True)):
+        if (np.diff(along) > 0).all():
+            heights[frame] = np.interp(columns, along, across, right=np.nan)
+    return heights

@@ -1,0 +1,164 @@
+"""What is known of a case before it is measured: the sheet, the air, the camera, which clips and lengths may be fitted.
+
+A recipe is TOML in catalogs/cases. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.resources import files
+from math import nan
+
+from flagdata.errors import InputError, UnknownNameError
+from measure.cases.limit_cycle import StripRun
+from measure.cases.sheet import Sheet
+from sim.run.tables import Table
+
+
+class Group(StrEnum):
+    """What a clip may be used for."""
+
+    FIT = "fit"
+    HELD_OUT = "held-out"
+    OTHER = "other-sheets"
+    """Another sheet: predicted with this one's parameters."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipSpec:
+    """One clip.
+
+    Attributes:
+        speed: of the tunnel [m/s].
+        whole: whether sheet and clamp are in view.
+    """
+
+    name: str
+    speed: float
+    group: Group
+    whole: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A sheet filmed edge-on in a tunnel.
+
+    Attributes:
+        sheet: its length, mass and rigidity, no air.
+        density: of the air [kg/m³].
+        true_rate: of the camera [Hz].
+        column_scale, row_scale: [m/px] along the stream and across it.
+        folder, suffix: where the clips are: folder/NAME + suffix.
+        tables: "stop", "onset", "authors", "curve" → path in the data.
+        fit_lengths, held_out_lengths: [m].
+        reactive_share: declared M / (ρ L).
+        shear_factor: declared speed at the sheet over the tunnel's.
+        shares, speeds: the grid on which the strip is simulated: M / (ρ L), and [m/s] at the sheet.
+    """
+
+    name: str
+    about: str
+    seed: int
+    sheet: Sheet
+    density: float
+    true_rate: float
+    column_scale: float
+    row_scale: float
+    folder: str
+    suffix: str
+    clips: tuple[ClipSpec, ...]
+    tables: Mapping[str, str]
+    fit_lengths: tuple[float, ...]
+    held_out_lengths: tuple[float, ...]
+    reactive_share: float
+    shear_factor: float
+    shares: tuple[float, ...]
+    speeds: tuple[float, ...]
+    run: StripRun
+
+    def __post_init__(self) -> None:
+        shared = set(self.fit_lengths) & set(self.held_out_lengths)
+        if shared:
+            raise InputError(
+                f"length {min(shared):g} m is both fitted and held out", where=self.name, fix="give it to one of them"
+            )
+        names = [clip.name for clip in self.clips]
+        if len(set(names)) != len(names):
+            raise InputError("a clip is in two groups", where=self.name, fix="give it to one of them")
+
+    def of(self, group: Group) -> tuple[ClipSpec, ...]:
+        """Its clips, by rising speed."""
+        return tuple(sorted((c for c in self.clips if c.group is group), key=lambda c: c.speed))
+
+
+def load_case(name: str) -> Case:
+    """The case of that name in the catalog.
+
+    Raises:
+        UnknownNameError: no such case, or a key that is not known.
+        InputError: a value that does not fit.
+    """
+    folder = files("catalogs") / "cases"
+    known = sorted(e.name.removesuffix(".toml") for e in folder.iterdir() if e.name.endswith(".toml"))
+    if name not in known:
+        raise UnknownNameError.of("case", name, known)
+    return parse_case((folder / f"{name}.toml").read_text(encoding="utf-8"), where=name)
+
+
+def parse_case(text: str, *, where: str) -> Case:
+    """A case of TOML text.
+
+    Raises:
+        UnknownNameError, InputError: as `load_case`.
+    """
+    try:
+        top = Table(tomllib.loads(text), where=where)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from error
+    sheet, air, camera = top.table("sheet"), top.table("air"), top.table("camera")
+    clips, thresholds, declared = top.table("clips"), top.table("thresholds"), top.table("declared")
+    simulation = top.table("simulation")
+    whole = camera.texts("whole")
+    specs = []
+    for group in Group:
+        table = clips.table(group.value)
+        specs += [
+            ClipSpec(name=n, speed=table.number(n, nan, above=0), group=group, whole=n in whole) for n in table.names()
+        ]
+    case = Case(
+        name=top.text("name", where) or where,
+        about=top.text("about", "") or "",
+        seed=top.whole("seed", 1, least=0),
+        sheet=Sheet(
+            length=sheet.number("length", nan, above=0),
+            mass=sheet.number("mass", nan, above=0),
+            rigidity=sheet.number("rigidity", nan, above=0),
+        ),
+        density=air.number("density", nan, above=0),
+        true_rate=camera.number("true-rate", nan, above=0),
+        column_scale=camera.number("column-scale", nan, above=0),
+        row_scale=camera.number("row-scale", nan, above=0),
+        folder=clips.text("folder", "") or "",
+        suffix=clips.text("suffix", "") or "",
+        clips=tuple(specs),
+        tables={key: thresholds.text(key, "") or "" for key in ("stop", "onset", "authors", "curve")},
+        fit_lengths=thresholds.numbers("fit-lengths"),
+        held_out_lengths=thresholds.numbers("held-out-lengths"),
+        reactive_share=declared.number("reactive-share", nan, least=0),
+        shear_factor=declared.number("shear-factor", nan, above=0),
+        shares=simulation.numbers("shares"),
+        speeds=simulation.numbers("speeds"),
+        run=StripRun(
+            columns=simulation.whole("columns", 24, least=4),
+            stretching=simulation.number("stretching", 300.0, above=0),
+            settle=simulation.number("settle", 1.0, least=0),
+            duration=simulation.number("duration", 1.0, above=0),
+        ),
+    )
+    sheet.text("source", None)
+    for table in (sheet, air, camera, clips, thresholds, declared, simulation, top):
+        table.done()
+    return case
