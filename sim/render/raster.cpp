@@ -184,6 +184,13 @@ class Frame {
   }
 
  private:
+  // What a triangle's samples have in common, worked out when its first sample is seen.
+  struct Surface {
+    float scale, near[3], side, through;
+    int32_t level;  // of the texture; −1 for the pole
+    bool known;
+  };
+
   const Sample& in;
   const int64_t stride;
   int64_t faces = 0, cloth_faces = 0;
@@ -193,6 +200,7 @@ class Frame {
   std::vector<Shadow> shadows;
   Steps steps;
   std::vector<Triangle> triangles;
+  std::vector<Surface> surfaces;
 
   // Normals, the mean of the faces' around a vertex weighted by their areas, and what else is interpolated.
   void prepare(const Vertices& v) {
@@ -286,6 +294,7 @@ class Frame {
   }
 
   void paint(float* out) {
+    surfaces.assign(faces, Surface{});
     int64_t count = 0;
     for (int64_t y = 0; y < in.height; ++y) {
       const int32_t* row = &seen[y * stride];
@@ -301,23 +310,22 @@ class Frame {
   // One chunk of samples: what they see, its light, its colour.
   void paint(float* out, int64_t count) {
     for (int64_t i = 0; i < count; ++i) {
+      const Surface& on = surface(face[i]);
       const Triangle& t = triangles[face[i]];
       const Edge<int64_t> ab(steps, t.a, t.b, pixel_x[i], pixel_y[i]), ca(steps, t.c, t.a, pixel_x[i], pixel_y[i]);
-      const float scale = 1.0f / float(t.area), b = float(ca.start) * scale, c = float(ab.start) * scale;
-      const float wa = (1 - (b + c)) * nearness[t.a], wb = b * nearness[t.b], wc = c * nearness[t.c];
-      const float sum = 1.0f / (wa + wb + wc);
-      floats at = attributes[t.a] * (wa * sum) + attributes[t.b] * (wb * sum) + attributes[t.c] * (wc * sum);
-      const float length = std::max(std::sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]), 1e-12f);
-      const int32_t* own = &corner[3 * face[i]];
-      const Vec from = point(own[0]) - Vec{in.camera[0], in.camera[1], in.camera[2]};
-      const float side = (dot(from, normal(own[0], own[1], own[2])) < 0 ? 1.0f : -1.0f) / length;
-      nx[i] = at[0] * side, ny[i] = at[1] * side, nz[i] = at[2] * side;
-      px[i] = at[5], py[i] = at[6], pz[i] = at[7];
-      const bool cloth = face[i] < cloth_faces;
-      through[i] = cloth ? in.translucency : 0.0f;
-      const four colour = cloth ? texel(t, at[3], at[4]) : load<four>(in.pole_albedo);
+      const float b = float(ca.start) * on.scale, c = float(ab.start) * on.scale;
+      const float wa = (1 - (b + c)) * on.near[0], wb = b * on.near[1], wc = c * on.near[2];
+      const float whole = 1.0f / (wa + wb + wc);
+      const floats at = attributes[t.a] * (wa * whole) + attributes[t.b] * (wb * whole) + attributes[t.c] * (wc * whole);
+      nx[i] = at[0], ny[i] = at[1], nz[i] = at[2], px[i] = at[5], py[i] = at[6], pz[i] = at[7];
+      side[i] = on.side, through[i] = on.through;
+      const four colour = on.level < 0 ? load<four>(in.pole_albedo) : texel(on.level, at[3], at[4]);
       std::memcpy(&albedo[4 * i], &colour, sizeof colour);
-      sum_light[i] = 0;
+    }
+    for (int64_t i = 0; i < count; ++i) {
+      const float length = std::max(std::sqrt(nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i]), 1e-12f);
+      const float scale = side[i] / length;
+      nx[i] *= scale, ny[i] *= scale, nz[i] *= scale, sum_light[i] = 0;
     }
     for (int64_t k = 0; k < in.suns; ++k) light(k, count);
     const float share = 1.0f / in.samples;
@@ -331,24 +339,66 @@ class Frame {
     }
   }
 
+  const Surface& surface(int32_t f) {
+    Surface& on = surfaces[f];
+    if (on.known) return on;
+    const Triangle& t = triangles[f];
+    const int32_t* own = &corner[3 * f];
+    const Vec from = point(own[0]) - Vec{in.camera[0], in.camera[1], in.camera[2]};
+    const bool cloth = f < cloth_faces;
+    on = {1.0f / float(t.area), {nearness[t.a], nearness[t.b], nearness[t.c]},
+          dot(from, normal(own[0], own[1], own[2])) < 0 ? 1.0f : -1.0f, cloth ? in.translucency : 0.0f,
+          cloth ? level(t) : -1, true};
+    return on;
+  }
+
+  // The level of the texture whose texels are about as large as the distance of a pixel's samples.
+  int32_t level(const Triangle& t) const {
+    const floats &a = attributes[t.a], &b = attributes[t.b], &c = attributes[t.c];
+    const float uv_area = std::fabs((b[3] - a[3]) * (c[4] - a[4]) - (b[4] - a[4]) * (c[3] - a[3])) / 2;
+    const float texels = uv_area * float(in.level_width[0] * in.level_height[0]);
+    const float image = float(t.area) * (0.5f / 65536);
+    const float spacing = std::max(texels / std::max(image * in.samples, 1e-6f), 1e-12f);
+    return int32_t(std::clamp(std::nearbyint(0.5f * std::log2(spacing) + 0.5f), 0.0f, float(in.levels - 1)));
+  }
+
+  // The texture at (u, v), bilinear.
+  four texel(int32_t level, float u, float v) const {
+    const int32_t width = int32_t(in.level_width[level]), height = int32_t(in.level_height[level]);
+    const float x = std::max(u * width - 0.5f, 0.0f), y = std::max((1 - v) * height - 0.5f, 0.0f);
+    const int32_t left = std::min(int32_t(x), width - 1), top = std::min(int32_t(y), height - 1);
+    const int32_t right = std::min(left + 1, width - 1), down = std::min(top + 1, height - 1) - top;
+    const float s = std::min(x - left, 1.0f), q = std::min(y - top, 1.0f);
+    const float* base = in.texels + 4 * (in.level_start[level] + int64_t(top) * width);
+    const float* under = base + 4 * int64_t(down) * width;
+    const four upper = load<four>(base + 4 * left) * (1 - s) + load<four>(base + 4 * right) * s;
+    const four lower = load<four>(under + 4 * left) * (1 - s) + load<four>(under + 4 * right) * s;
+    return upper * (1 - q) + lower * q;
+  }
+
+  // Adds the light of one point of the sun, as far as its shadow map lets it through.
   void light(int64_t k, int64_t count) {
-    const float* m = in.basis + 9 * k;
+    const float* basis = in.basis + 9 * k;
+    const Vec r{basis[0], basis[1], basis[2]}, u{basis[3], basis[4], basis[5]}, d{basis[6], basis[7], basis[8]};
     const Shadow& map = shadows[k];
-    const float texel = map.texel, inverse = 1.0f / texel, most = float(in.map - 2), size = float(in.map);
-    const float* nearest = map.nearest.data();
+    const float size = float(in.map), texel = map.texel, inverse = 1.0f / texel;
+    const float shift_a = size / 2 - 0.5f - map.middle[0] * inverse, shift_b = size / 2 - 0.5f - map.middle[1] * inverse;
+    const float* __restrict nearest = map.nearest.data();
     const int32_t row = int32_t(in.map);
+#pragma GCC ivdep
     for (int64_t i = 0; i < count; ++i) {
-      const float cosine = nx[i] * m[6] + ny[i] * m[7] + nz[i] * m[8];
+      const float cosine = nx[i] * d.x + ny[i] * d.y + nz[i] * d.z;
       const float sine = std::sqrt(std::max(0.0f, 1 - cosine * cosine));
       const float away = (cosine < 0 ? -AWAY : AWAY) * sine * texel;
       const float x = px[i] + away * nx[i], y = py[i] + away * ny[i], z = pz[i] + away * nz[i];
-      const float a = (x * m[0] + y * m[1] + z * m[2] - map.middle[0]) * inverse + (size / 2 - 0.5f);
-      const float b = (x * m[3] + y * m[4] + z * m[5] - map.middle[1]) * inverse + (size / 2 - 0.5f);
-      const float limit = x * m[6] + y * m[7] + z * m[8] + BIAS * texel;
-      const bool within = a >= 0 && a < size - 1 && b >= 0 && b < size - 1;
-      const float ca = std::floor(std::min(std::max(a, 0.0f), most)), cb = std::floor(std::min(std::max(b, 0.0f), most));
-      const float s = std::min(std::max(a - ca, 0.0f), 1.0f), t = std::min(std::max(b - cb, 0.0f), 1.0f);
-      const int32_t index = int32_t(cb) * row + int32_t(ca);
+      const float a = (x * r.x + y * r.y + z * r.z) * inverse + shift_a;
+      const float b = (x * u.x + y * u.y + z * u.z) * inverse + shift_b;
+      const float limit = x * d.x + y * d.y + z * d.z + BIAS * texel;
+      const bool within = (a >= 0) & (a < size - 1) & (b >= 0) & (b < size - 1);
+      const float ka = std::min(std::max(a, 0.0f), size - 2), kb = std::min(std::max(b, 0.0f), size - 2);
+      const int32_t ia = int32_t(ka), ib = int32_t(kb);
+      const float s = std::min(std::max(a - ia, 0.0f), 1.0f), t = std::min(std::max(b - ib, 0.0f), 1.0f);
+      const int32_t index = ib * row + ia;
       const float f0 = nearest[index] <= limit ? 1.0f : 0.0f, f1 = nearest[index + 1] <= limit ? 1.0f : 0.0f;
       const float f2 = nearest[index + row] <= limit ? 1.0f : 0.0f, f3 = nearest[index + row + 1] <= limit ? 1.0f : 0.0f;
       const float upper = f0 + s * (f1 - f0), lower = f2 + s * (f3 - f2);
@@ -357,35 +407,64 @@ class Frame {
     }
   }
 
-  // The texture at (u, v), bilinear in the level that fits the triangle.
-  four texel(const Triangle& t, float u, float v) const {
-    const floats &a = attributes[t.a], &b = attributes[t.b], &c = attributes[t.c];
-    const float uv_area = std::fabs((b[3] - a[3]) * (c[4] - a[4]) - (b[4] - a[4]) * (c[3] - a[3])) / 2;
-    const float texels = uv_area * float(in.level_width[0] * in.level_height[0]);
-    const float image = float(t.area) * (0.5f / 65536);
-    const float spacing = std::max(texels / std::max(image * in.samples, 1e-6f), 1e-12f);
-    const int64_t level = std::clamp(int64_t(std::nearbyint(0.5f * std::log2(spacing) + 0.5f)), int64_t(0), in.levels - 1);
-    const int64_t width = in.level_width[level], height = in.level_height[level];
-    const float x = std::max(u * width - 0.5f, 0.0f), y = std::max((1 - v) * height - 0.5f, 0.0f);
-    const int64_t left = std::min(int64_t(x), width - 1), top = std::min(int64_t(y), height - 1);
-    const int64_t right = std::min(left + 1, width - 1), bottom = std::min(top + 1, height - 1);
-    const float s = std::min(x - left, 1.0f), q = std::min(y - top, 1.0f);
-    const float* base = in.texels + 4 * in.level_start[level];
-    const four upper = load<four>(base + 4 * (top * width + left)) * (1 - s) + load<four>(base + 4 * (top * width + right)) * s;
-    const four lower =
-        load<four>(base + 4 * (bottom * width + left)) * (1 - s) + load<four>(base + 4 * (bottom * width + right)) * s;
-    return upper * (1 - q) + lower * q;
-  }
-
   std::vector<float> scratch[3];
   int32_t pixel_x[CHUNK], pixel_y[CHUNK], face[CHUNK];
-  float nx[CHUNK], ny[CHUNK], nz[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
+  float side[CHUNK], nx[CHUNK], ny[CHUNK], nz[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
   float through[CHUNK], sum_light[CHUNK], albedo[4 * CHUNK];
+};
+
+// Linear values as sRGB bytes: a table finds the byte or a neighbour of it, the exact bounds between bytes decide.
+class Encoding {
+ public:
+  Encoding() {
+    for (int i = 0; i <= 256; ++i) {
+      const double code = (i - 0.5) / 255;
+      bound[i] = i == 0 ? -1.0f : i == 256 ? 2.0f : float(code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4));
+    }
+    for (int i = 0, code = 0; i <= FINE; ++i) {
+      while (float(i) / FINE >= bound[code + 1]) ++code;
+      guess[i] = uint8_t(code);
+    }
+  }
+  uint8_t operator()(float linear) const {
+    const float value = std::min(std::max(linear, 0.0f), 1.0f);
+    const int code = guess[int(value * FINE)];
+    return uint8_t(code + (value >= bound[code + 1]) - (value < bound[code]));
+  }
+
+ private:
+  static constexpr int FINE = 4096;
+  float bound[257];
+  uint8_t guess[FINE + 1];
 };
 
 }  // namespace
 
+// Field by field as in raster_kernel.py.
+struct Film {
+  int64_t frames, pixels;
+  const float* scene;   // (frames, pixels, 4) radiance times coverage, and coverage
+  const float* behind;  // (pixels, 3) linear
+  uint8_t* out;         // (frames, pixels, 3)
+  float gain;
+};
+
 extern "C" void add_sample(const Sample* sample) {
   Frame frame(*sample);
   for (int64_t i = 0; i < sample->frames; ++i) frame.add(i);
+}
+
+extern "C" void develop(const Film* film) {
+  static const Encoding encode;
+  std::vector<uint8_t> plain(3 * film->pixels);
+  for (int64_t i = 0; i < 3 * film->pixels; ++i) plain[i] = encode(film->behind[i]);
+  for (int64_t f = 0; f < film->frames; ++f) {
+    uint8_t* out = film->out + 3 * f * film->pixels;
+    const float* scene = film->scene + 4 * f * film->pixels;
+    std::memcpy(out, plain.data(), plain.size());
+    for (int64_t i = 0; i < film->pixels; ++i, scene += 4) {
+      if (scene[3] == 0) continue;
+      for (int k = 0; k < 3; ++k) out[3 * i + k] = encode(scene[k] * film->gain + (1 - scene[3]) * film->behind[3 * i + k]);
+    }
+  }
 }

@@ -60,4 +60,6 @@ class Raster:
                 raster_torch.add_sample(out, now, view=view, light=light, pyramid=pyramid)
             else:
                 raster_kernel.add_sample(code, out, now, view=view, light=light, pyramid=pyramid)
-        return develop(out, behind, gain=zeta.gain)
+        if code is None:
+            return develop(out, behind, gain=zeta.gain)
+        return raster_kernel.develop(code, out, behind, gain=zeta.gain)

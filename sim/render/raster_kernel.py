@@ -36,6 +36,16 @@ class _Sample(ctypes.Structure):
     ]
 
 
+class _Film(ctypes.Structure):
+    """Mirrors `Film` of raster.cpp field by field."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("frames", "pixels")),
+        *((name, ctypes.c_void_p) for name in ("scene", "behind", "out")),
+        ("gain", ctypes.c_float),
+    ]
+
+
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """The compiled kernel; None, with one warning, where it cannot be built."""
@@ -66,3 +76,15 @@ def add_sample(
     for name, tensor in tensors.items():
         setattr(sample, name, tensor.data_ptr())
     code.add_sample(ctypes.byref(sample))
+
+
+def develop(code: ctypes.CDLL, scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
+    """`develop.develop` on the CPU."""
+    frames, height, width, _ = scene.shape
+    out = torch.empty((frames, height, width, 3), dtype=torch.uint8)
+    film = _Film(
+        frames=frames, pixels=height * width, gain=gain,
+        scene=scene.data_ptr(), behind=behind.data_ptr(), out=out.data_ptr(),
+    )  # fmt: skip
+    code.develop(ctypes.byref(film))
+    return out
