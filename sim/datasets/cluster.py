@@ -77,6 +77,11 @@ def _threads_per_process(count: int) -> Iterator[None]:
                 os.environ[name] = value
 
 
+def threads(client: Client) -> int:
+    """Of all workers together, at least 1."""
+    return max(1, sum(cast("dict[str, int]", client.nthreads()).values()))
+
+
 def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
     """The jobs' results as they come; a few wait beside those that run, so that memory stays bounded.
 
@@ -86,7 +91,7 @@ def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
         WorkerError: workers kept dying over one job.
         FlagdataError: a job failed; its own error.
     """
-    threads = max(1, sum(cast("dict[str, int]", client.nthreads()).values()))
+    ahead = threads(client) * _AHEAD
     waiting = iter(jobs)
     running = as_completed(loop=client.loop)
 
@@ -95,7 +100,7 @@ def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
             running.add(client.submit(function, *arguments, pure=False, retries=_RETRIES))
 
     try:
-        submit(threads * _AHEAD)
+        submit(ahead)
         for future in running:
             try:
                 result = future.result()

@@ -1,0 +1,157 @@
+"""The card of a data set that was built: what is in it, how it was made, what it looks like. One HTML file."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, StrictUndefined
+from numpy.typing import NDArray
+from PIL import Image
+
+from flagdata.lake import Lake
+from flagdata.provenance import canonical, code_version
+from flagdata.record import Record
+from flagdata.rng import stream
+from sim.datasets.recipe import DatasetRecipe
+
+_SHOWN = 24  # pictures of the contact sheet
+_COLUMNS = 6
+_PICTURE = 160  # px
+_BINS = 20
+_BAR = (120, 24)  # px of a histogram
+
+
+@dataclass(frozen=True, kw_only=True)
+class Distribution:
+    """A parameter over all films.
+
+    Attributes:
+        name: in the catalog.
+        low, middle, high: least value, median, greatest.
+        counts: of equal bins between them; None where all are equal.
+    """
+
+    name: str
+    low: float
+    middle: float
+    high: float
+    counts: list[int] | None
+
+
+def side_filter(recipe: DatasetRecipe, side: str) -> str:
+    """SQL over the catalog that takes one side: `ExplicitSplit(where={side: side_filter(recipe, side), …})`."""
+    return f"name like '{recipe.name}-{side}-%'"
+
+
+def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None) -> Path:
+    """Write the card of a data set, read off the lake.
+
+    Args:
+        path: the file; None for `cards/NAME-HASH.html` in the lake's folder.
+
+    Returns:
+        Where it is.
+    """
+    target = path or lake.path / "cards" / f"{recipe.name}-{recipe.hash[:12]}.html"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    sides, rows = _sides(lake, recipe, branch)
+    parameters = [json.loads(row["parameters"]) for row in rows]
+    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
+        files("sim.datasets").joinpath("card.html.j2").read_text(encoding="utf-8")
+    )
+    text = page.render(
+        recipe=recipe, sides=sides, version=code_version(), branch=branch,
+        sheet=_sheet(lake, recipe, rows), size=sum(row["object_bytes"] for row in rows),
+        frames=recipe.simulation.time.frames, rate=recipe.simulation.time.rate, bar=_BAR,
+        theta=distributions(parameters, rendered=False), zeta=distributions(parameters, rendered=True),
+        names=_names(parameters), recipe_text=json.dumps(json.loads(canonical(recipe.identity())), indent=1),
+        filters={side.name: side_filter(recipe, side.name) for side in recipe.sides},
+    )  # fmt: skip
+    target.write_text(text, encoding="utf-8")
+    return target
+
+
+def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Counts of each side, and all recordings, by name."""
+    sides: list[dict[str, Any]] = []
+    every: list[dict[str, Any]] = []
+    columns = ["artifact", "name", "seed", "session", "parameters", "object", "object_bytes"]
+    for side in recipe.sides:
+        where = side_filter(recipe, side.name)
+        rows = lake.rows(f"kind = 'recording' and {where}", at=branch, columns=columns).to_pylist()
+        clips = lake.rows(f"kind = 'clip' and {where}", at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
+        sides.append(
+            {
+                "name": side.name, "sequences": len({row["seed"] for row in rows}), "films": len(rows),
+                "sessions": len({row["session"] for row in rows} - {None}), "clips": len(clips),
+                "seeds": (min(row["seed"] for row in rows), max(row["seed"] for row in rows)) if rows else None,
+                "wind": (float(clips.min()), float(np.median(clips)), float(clips.max())) if len(clips) else None,
+            }
+        )  # fmt: skip
+        every += sorted(rows, key=lambda row: row["name"])
+    return sides, every
+
+
+def distributions(parameters: Sequence[dict[str, Any]], *, rendered: bool) -> list[Distribution]:
+    """Of all numbers of ζ, or of θ and the instruments, by name.
+
+    Args:
+        parameters: of each film.
+    """
+    names = dict.fromkeys(name for values in parameters for name, value in values.items() if not isinstance(value, str))
+    found: list[Distribution] = []
+    for name in names:
+        if name.startswith("render.") != rendered:
+            continue
+        values = np.array([entry[name] for entry in parameters if name in entry], dtype=np.float64)
+        low, high = float(values.min()), float(values.max())
+        counts = None if math.isclose(low, high) else np.histogram(values, bins=_BINS, range=(low, high))[0].tolist()
+        found.append(
+            Distribution(
+                name=name.removeprefix("render."), low=low, middle=float(np.median(values)), high=high, counts=counts
+            )
+        )
+    return found
+
+
+def _names(parameters: Sequence[dict[str, Any]]) -> list[tuple[str, list[tuple[str, int]]]]:
+    """Names of materials, textures and kinds of background, with how many films have each."""
+    found: dict[str, dict[str, int]] = {}
+    for values in parameters:
+        for name, value in values.items():
+            if isinstance(value, str):
+                shown = value.partition("/")[0] if name == "render.background" else value
+                counts = found.setdefault(name.removeprefix("render."), {})
+                counts[shown] = counts.get(shown, 0) + 1
+    return [(name, sorted(counts.items())) for name, counts in sorted(found.items())]
+
+
+def _sheet(lake: Lake, recipe: DatasetRecipe, rows: Sequence[dict[str, Any]]) -> str:
+    """Frames of a few films drawn by chance, as a data URL."""
+    order = stream(recipe.seed, "card").permutation(len(rows))[:_SHOWN].tolist()
+    pictures: list[NDArray[np.uint8]] = []
+    for number in order:
+        record = Record.open(lake.object_path(rows[number]["object"]))
+        frame = record.frames(len(record.frame_times) // 2, 1)[0]
+        shape = Image.fromarray(frame)
+        shape.thumbnail((_PICTURE, _PICTURE))
+        cell = np.full((_PICTURE, _PICTURE), 255, dtype=np.uint8)
+        cell[: shape.height, : shape.width] = np.asarray(shape)
+        pictures.append(cell)
+    if not pictures:
+        return ""
+    blank = np.full((_PICTURE, _PICTURE), 255, dtype=np.uint8)
+    pictures += [blank] * (-len(pictures) % _COLUMNS)
+    lines = [np.concatenate(pictures[i : i + _COLUMNS], axis=1) for i in range(0, len(pictures), _COLUMNS)]
+    stream_ = io.BytesIO()
+    Image.fromarray(np.concatenate(lines)).save(stream_, format="JPEG", quality=85)
+    return "data:image/jpeg;base64," + base64.b64encode(stream_.getvalue()).decode()

@@ -1,0 +1,183 @@
+"""What a build will take: counts from the recipe and the lake, bytes and hours from a measurement of a few frames."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any, TypeVar
+
+from flagdata.errors import FlagdataError
+from flagdata.lake import Lake
+from flagdata.lake.meshes import MeshSequence, write_meshes
+from flagdata.lake.objects import files_of
+from flagdata.schema import CLIP_FRAMES
+from sim.datasets import jobs
+from sim.datasets.cast import Cast, Roll, casts
+from sim.datasets.films import Sequences
+from sim.datasets.recipe import DatasetRecipe
+
+T = TypeVar("T")
+_FEW, _MORE = 3, 9  # frames of the two runs between which costs are linear
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rates:
+    """What one takes.
+
+    Attributes:
+        sequence_seconds, film_seconds: of one core (or the device), for a whole sequence and a whole film.
+        sequence_bytes, film_bytes: in the lake.
+    """
+
+    sequence_seconds: float
+    film_seconds: float
+    sequence_bytes: float
+    film_bytes: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is to be made.
+
+    Attributes:
+        sequences, films, clips: side → how many the data set has.
+        missing_sequences, missing_films: how many of them are not in the lake.
+        rates: as measured.
+        workers: that share the work.
+    """
+
+    recipe: DatasetRecipe
+    sequences: dict[str, int]
+    films: dict[str, int]
+    clips: dict[str, int]
+    missing_sequences: int
+    missing_films: int
+    rates: Rates
+    workers: int
+
+    @property
+    def seconds(self) -> float:
+        """Wall time [s]."""
+        work = self.missing_sequences * self.rates.sequence_seconds + self.missing_films * self.rates.film_seconds
+        return work / self.workers
+
+    @property
+    def size(self) -> float:
+        """Of what is missing [B]."""
+        return self.missing_sequences * self.rates.sequence_bytes + self.missing_films * self.rates.film_bytes
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "recipe": self.recipe.name, "recipe_hash": self.recipe.hash, "renderer": self.recipe.renderer,
+            "sequences": self.sequences, "films": self.films, "clips": self.clips,
+            "missing": {"sequences": self.missing_sequences, "films": self.missing_films}, "rates": vars(self.rates),
+            "workers": self.workers, "bytes": round(self.size), "hours": self.seconds / 3600,
+        }  # fmt: skip
+
+
+def plan(recipe: DatasetRecipe, lake: Lake | None, *, workers: int, branch: str = "main", device: str = "cpu") -> Plan:
+    """Count what a build makes, and measure what it takes.
+
+    Args:
+        lake: what is in it is not made again; None where there is none yet.
+        workers: that will share the work.
+
+    Raises:
+        FlagdataError: the measurement failed, as the build would.
+    """
+    known: set[str] = set()
+    if lake is not None:
+        known = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
+    rolls = [Roll(cast=cast) for cast in casts(recipe)]
+    frames = recipe.simulation.time.frames
+    films = 0
+    for side in recipe.sides:
+        own = [roll for roll in rolls if roll.cast.side.name == side.name]
+        members = tuple((roll.cast, index, roll.id(index)) for roll in own for index in roll.chosen)
+        every = Sequences(recipe=recipe, side=side.name, members=members).films()
+        films += sum(film.artifact(frames=frames).id not in known for film in every)
+    return Plan(
+        recipe=recipe, sequences={side.name: side.sequences for side in recipe.sides},
+        films={side.name: side.renders for side in recipe.sides},
+        clips={side.name: side.renders * (frames // CLIP_FRAMES) for side in recipe.sides},
+        missing_sequences=sum(len(roll.pending(known)) for roll in rolls), missing_films=films,
+        rates=measure(recipe, rolls[0].cast, device=device), workers=workers,
+    )  # fmt: skip
+
+
+def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
+    """Simulate and film two short sequences, and go on in proportion to their frames. Every material has its share.
+
+    Raises:
+        FlagdataError: no sequence can be simulated, or a renderer that is not installed or fails.
+    """
+    few, more = (_shortened(cast, frames) for frames in (_FEW, _MORE))
+    whole = cast.simulation.time
+    bases = range(len(cast.simulation.material.bases))
+    runs = [(_simulated(few, base, device), _simulated(more, base, device)) for base in bases]
+    sequences = [_line(a.seconds, b.seconds, whole.total) for a, b in runs]
+    films = [_filmed(recipe, short, run, device) for short, run in zip((few, more), runs[0], strict=True)]
+    return Rates(
+        sequence_seconds=sum(sequences) / len(sequences),
+        film_seconds=_line(films[0][0], films[1][0], whole.frames),
+        sequence_bytes=_line(_stored(runs[0][0].sequence), _stored(runs[0][1].sequence), whole.frames),
+        film_bytes=_line(films[0][1], films[1][1], whole.frames),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Run:
+    """A short sequence: its index, its meshes, and the seconds it took of its batch's."""
+
+    index: int
+    sequence: MeshSequence
+    seconds: float
+
+
+def _shortened(cast: Cast, frames: int) -> Cast:
+    time_ = replace(cast.simulation.time, settle=0.0, frames=frames)
+    return replace(cast, simulation=replace(cast.simulation, time=time_))
+
+
+def _simulated(cast: Cast, base: int, device: str) -> _Run:
+    simulation, crew = cast.simulation, Roll(cast=cast).crew
+    indices = list(islice((i for i in itertools.count() if crew.base(i) == base), simulation.batch))
+    jobs.simulate(_shortened(cast, 1).simulation, base, indices[:1], device)  # the kernel is compiled once
+    done, seconds = _timed(partial(jobs.simulate, simulation, base, indices, device))
+    for outcome in done.outcomes:
+        if outcome.sequence is not None:
+            return _Run(index=outcome.member.index, sequence=outcome.sequence, seconds=seconds / len(indices))
+    raise FlagdataError("no sequence could be simulated", where=simulation.name, fix="correct the scene")
+
+
+def _filmed(recipe: DatasetRecipe, cast: Cast, run: _Run, device: str) -> tuple[float, float]:
+    """Seconds and bytes of a film."""
+    members = ((cast, run.index, "0" * 32),)
+    film = next(Sequences(recipe=recipe, side=cast.side.name, members=members).films())
+    jobs.film(recipe, film, run.sequence, device)  # the renderer starts once
+    filmed, seconds = _timed(partial(jobs.film, recipe, film, run.sequence, device))
+    return seconds, len(filmed.data)
+
+
+def _timed(function: Callable[[], T]) -> tuple[T, float]:
+    begun = time.perf_counter()
+    return function(), time.perf_counter() - begun
+
+
+def _stored(sequence: MeshSequence) -> float:
+    """What a sequence takes in the lake [B]."""
+    with tempfile.TemporaryDirectory(prefix="flagdata-plan-") as folder:
+        path = Path(folder) / "sequence.zarr"
+        write_meshes(path, sequence)
+        return sum(file.stat().st_size for file in files_of(path))
+
+
+def _line(few: float, more: float, frames: int) -> float:
+    """What `frames` frames take, where two numbers of them take these; never less than the larger one."""
+    return max(few, more, few + (more - few) / (_MORE - _FEW) * (frames - _FEW))
