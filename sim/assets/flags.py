@@ -1,8 +1,12 @@
-"""National flags, drawn from their construction sheets."""
+"""Twelve national flags of proportion 2:3, drawn from their construction sheets.
+
+Where an act names colours only in words or as dyes, the usual sRGB values are taken.
+"""
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -12,7 +16,8 @@ from numpy.typing import NDArray
 from flagdata.errors import UnknownNameError
 from sim.assets.drawing import Sheet
 
-ROWS = 512  # px; every flag here is 2:3
+ROWS = 384  # px; every flag here is 2:3
+_WHITE = "#ffffff"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +27,7 @@ class NationalFlag:
     Attributes:
         country: English short name.
         source: the act or standard its sheet is from.
-        draw: paints it on a sheet of height 1, width 3/2.
+        draw: paints it on a white sheet of height 1, width 3/2.
     """
 
     country: str
@@ -30,14 +35,161 @@ class NationalFlag:
     draw: Callable[[Sheet], None]
 
 
+def _chile(sheet: Sheet) -> None:
+    sheet.box(0, 0.5, 1.5, 0.5, "#d52b1e")
+    sheet.box(0, 0, 0.5, 0.5, "#0039a6")
+    sheet.star(0.25, 0.25, 0.125, _WHITE)
+
+
+def _china(sheet: Sheet) -> None:
+    unit = 1 / 20  # the upper hoist quarter is 15 by 10 units
+    red, yellow = "#ee1c25", "#ffff00"
+    sheet.fill(red)
+    sheet.star(5 * unit, 5 * unit, 3 * unit, yellow)
+    for column, row in ((10, 2), (12, 4), (12, 7), (10, 9)):
+        towards = math.atan2(5 - row, 5 - column)
+        sheet.star(column * unit, row * unit, unit, yellow, points_to=towards)
+
+
+def _czechia(sheet: Sheet) -> None:
+    sheet.box(0, 0.5, 1.5, 0.5, "#d7141a")
+    sheet.polygon([(0, 0), (0.75, 0.5), (0, 1)], "#11457e")
+
+
+def _france(sheet: Sheet) -> None:
+    _upright_thirds(sheet, "#000091", _WHITE, "#e1000f")
+
+
+def _greece(sheet: Sheet) -> None:
+    blue, stripe = "#0d5eaf", 1 / 9
+    for index in range(0, 9, 2):
+        sheet.box(0, index * stripe, 1.5, stripe, blue)
+    sheet.box(0, 0, 5 * stripe, 5 * stripe, blue)
+    sheet.box(0, 2 * stripe, 5 * stripe, stripe, _WHITE)
+    sheet.box(2 * stripe, 0, stripe, 5 * stripe, _WHITE)
+
+
+def _italy(sheet: Sheet) -> None:
+    _upright_thirds(sheet, "#008c45", "#f4f9ff", "#cd212a")
+
+
 def _japan(sheet: Sheet) -> None:
-    sheet.fill("#ffffff")
     sheet.disc(0.75, 0.5, 0.3, "#bc002d")
 
 
+def _netherlands(sheet: Sheet) -> None:
+    sheet.box(0, 0, 1.5, 1 / 3, "#ae1c28")
+    sheet.box(0, 2 / 3, 1.5, 1 / 3, "#21468b")
+
+
+def _south_africa(sheet: Sheet) -> None:
+    triangle = [(0.0, 0.0), (0.75, 0.5), (0.0, 1.0)]
+    sheet.box(0, 0, 1.5, 0.5, "#e03c31")
+    sheet.box(0, 0.5, 1.5, 0.5, "#001489")
+    for mirrored in (False, True):
+        sheet.polygon(_arm(1 / 6, mirrored), _WHITE)
+    inner = sheet.inside(triangle)
+    sheet.where(inner, "#000000")
+    for mirrored in (False, True):
+        sheet.where(inner & sheet.inside(_arm(1 / 6, mirrored)), "#ffb81c")
+    for mirrored in (False, True):
+        sheet.polygon(_arm(1 / 10, mirrored), "#007749")
+
+
+def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
+    """One arm of the pall and its level part: half its width on either side of (0, 0), (0.75, 0.5), (1.5, 0.5)."""
+    length = math.hypot(0.75, 0.5)
+    along, aside = (0.75 / length, 0.5 / length), (0.5 / length * half, -0.75 / length * half)
+    corners = [(1.5, 0.5 - half), (1.5, 0.5 + half)]
+    for sign in (-1, 1):  # the arm's lower edge to its start beyond the corner, then its upper edge back
+        x, y = sign * aside[0], sign * aside[1]
+        reach = (0.5 - sign * half - y) / along[1]
+        meets, starts = (x + reach * along[0], y + reach * along[1]), (x - along[0], y - along[1])
+        corners += [meets, starts] if sign < 0 else [starts, meets]
+    return [(x, 1 - y) for x, y in corners] if mirrored else corners
+
+
+def _south_korea(sheet: Sheet) -> None:
+    red, blue, black = "#cd2e3a", "#0047a0", "#000000"
+    diagonal = math.atan2(2, 3)
+    to_upper_hoist = sheet.turned(0.75, 0.5, math.pi + diagonal)  # its x axis runs to that corner, y to the right of it
+    x, y = to_upper_hoist
+    disc = sheet.in_disc(0.75, 0.5, 0.25)
+    lower = (y < 0) & ((x - 0.125) ** 2 + y**2 > 0.125**2)
+    lower |= (x + 0.125) ** 2 + y**2 <= 0.125**2
+    sheet.where(disc, red)
+    sheet.where(disc & lower, blue)
+    broken = {  # bars from the middle of the flag outwards, corner by corner
+        math.pi + diagonal: (False, False, False),
+        diagonal: (True, True, True),
+        math.pi - diagonal: (False, True, False),
+        -diagonal: (True, False, True),
+    }
+    for direction, bars in broken.items():
+        out, across = sheet.turned(0.75, 0.5, direction)
+        for index, gap in enumerate(bars):
+            middle = (9.5 + 1.5 * index) / 24
+            bar = (np.abs(out - middle) <= 0.5 / 24) & (np.abs(across) <= 3 / 24)
+            sheet.where(bar & (np.abs(across) >= (0.25 / 24 if gap else 0.0)), black)
+
+
+def _turkey(sheet: Sheet) -> None:
+    red = "#e30a17"
+    sheet.fill(red)
+    sheet.disc(0.5, 0.5, 0.25, _WHITE)
+    sheet.disc(0.5 + 1 / 16, 0.5, 0.2, red)
+    inner_edge = 0.5 + 1 / 16 - 0.2
+    sheet.star(inner_edge + 1 / 3 + 0.125, 0.5, 0.125, _WHITE, points_to=math.pi)
+
+
+def _ukraine(sheet: Sheet) -> None:
+    sheet.fill("#0057b7")
+    sheet.box(0, 0.5, 1.5, 0.5, "#ffd700")
+
+
+def _upright_thirds(sheet: Sheet, hoist: str, middle: str, fly: str) -> None:
+    sheet.fill(middle)
+    sheet.box(0, 0, 0.5, 1, hoist)
+    sheet.box(1, 0, 0.5, 1, fly)
+
+
 FLAGS: Mapping[str, NationalFlag] = {
-    "japan": NationalFlag(country="Japan", source="Act on National Flag and Anthem, No. 127 of 1999", draw=_japan),
-}
+    "chile": NationalFlag(
+        country="Chile", draw=_chile,
+        source="Decreto Supremo 1534 of 1967: canton a square of half the height, star of half its side",
+    ),
+    "china": NationalFlag(country="China", source="GB 12982-2004, annex: stars on a grid of 15 × 10", draw=_china),
+    "czechia": NationalFlag(country="Czechia", source="Act 3/1993 Coll., annex 3", draw=_czechia),
+    "france": NationalFlag(
+        country="France", source="Constitution, article 2; colours of the State's graphic charter of 2020", draw=_france
+    ),
+    "greece": NationalFlag(
+        country="Greece", source="Law 851/1978, article 1: nine stripes, canton of five", draw=_greece
+    ),
+    "italy": NationalFlag(
+        country="Italy", source="Constitution, article 12; colours of the D.P.C.M. of 14 April 2006", draw=_italy
+    ),
+    "japan": NationalFlag(
+        country="Japan", source="Act on National Flag and Anthem, No. 127 of 1999: disc of three fifths of the height",
+        draw=_japan,
+    ),
+    "netherlands": NationalFlag(country="Netherlands", source="Royal Decree of 19 February 1937", draw=_netherlands),
+    "south-africa": NationalFlag(
+        country="South Africa",
+        source="Proclamation R. 59 of 20 April 1994: pall of a fifth of the height, borders of a fifteenth",
+        draw=_south_africa,
+    ),
+    "south-korea": NationalFlag(
+        country="South Korea",
+        source="National Flag Act, enforcement decree, annex: disc of half the height, trigrams on the diagonals",
+        draw=_south_korea,
+    ),
+    "turkey": NationalFlag(
+        country="Türkiye", draw=_turkey,
+        source="Law 2893 of 22 September 1983, annexed drawing, without the hoist's band",
+    ),
+    "ukraine": NationalFlag(country="Ukraine", source="DSTU 4512:2006", draw=_ukraine),
+}  # fmt: skip
 
 
 class _National:
@@ -55,9 +207,11 @@ class _National:
 
 @functools.cache
 def _painted(name: str) -> NDArray[np.uint8]:
-    sheet = Sheet.blank(rows=ROWS, columns=ROWS * 3 // 2)
+    sheet = Sheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
     FLAGS[name].draw(sheet)
-    return sheet.bytes()
+    image = sheet.bytes()
+    image.setflags(write=False)
+    return image
 
 
 NATIONAL = _National()
