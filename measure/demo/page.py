@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from jinja2 import Environment, StrictUndefined
 from PIL import Image
 
 import flagdata
@@ -25,6 +22,7 @@ from flagdata.record import Record
 from flagdata.schema import CLIP_FRAMES, FRAME_RATE
 from flagdata.timebase import NANOSECONDS
 from measure.demo.field import BEFORE, WIND_RATE, Field
+from measure.pages.render import data_url, render
 from models.spectral import SpectralDecomposition
 
 _SHOWN = 6
@@ -58,30 +56,25 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
     shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
-    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
-        files("measure.demo").joinpath("page.html.j2").read_text(encoding="utf-8")
-    )
     wind_image, caption = _wind_plot(record, lake, at, made)
     target = folder / "index.html"
-    target.write_text(
-        page.render(
-            minutes=f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",
-            seconds=seconds,
-            clock=recovered(row, made.clock_offset),
-            images={"wind": wind_image, "alignment": _data_url((folder / "alignment.png").read_bytes(), "image/png")},
-            wind_caption=caption,
-            counts={
-                "pairs": len(pairs),
-                "refused": len(pairs.refused),
-                "reason": "; ".join(pairs.refused[0].reasons) if pairs.refused else "",
-            },
-            clips=[_clip_card(sample) for sample in shown],
-            findings=_findings(lake, at),
-            transcript=transcript,
-            version=f"flagdata {code_version()}",
-        ),
-        encoding="utf-8",
-    )
+    values = {
+        "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",
+        "seconds": seconds,
+        "clock": recovered(row, made.clock_offset),
+        "images": {"wind": wind_image, "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png")},
+        "wind_caption": caption,
+        "counts": {
+            "pairs": len(pairs),
+            "refused": len(pairs.refused),
+            "reason": "; ".join(pairs.refused[0].reasons) if pairs.refused else "",
+        },
+        "clips": [_clip_card(sample) for sample in shown],
+        "findings": _findings(lake, at),
+        "transcript": transcript,
+        "version": f"flagdata {code_version()}",
+    }
+    target.write_text(render("measure.demo", "page.html.j2", values), encoding="utf-8")
     return target
 
 
@@ -126,7 +119,7 @@ def _animation(clip: torch.Tensor) -> str:
     images[0].save(
         buffer, "WEBP", save_all=True, append_images=images[1:], duration=round(1000 / FRAME_RATE), loop=0, quality=70
     )
-    return _data_url(buffer.getvalue(), "image/webp")
+    return data_url(buffer.getvalue(), "image/webp")
 
 
 def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, str]:
@@ -159,7 +152,7 @@ def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, s
         f"{len(logged.time)} one-second means on the common clock; the gap and the stretch that stuck are left out of "
         f"the averages. {len(clips)} clips of {CLIP_FRAMES} frames."
     )
-    return _data_url(buffer.getvalue(), "image/png"), caption
+    return data_url(buffer.getvalue(), "image/png"), caption
 
 
 def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:
@@ -168,7 +161,3 @@ def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:
         report = json.loads(row["report"])
         found += [{"source": row["source_name"], **finding} for finding in report["findings"]]
     return found
-
-
-def _data_url(data: bytes, media_type: str) -> str:
-    return f"data:{media_type};base64,{base64.b64encode(data).decode()}"

@@ -1,0 +1,41 @@
+"""Fills a page's template. What comes out is one file that refers to no other."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+
+def render(
+    package: str, template: str, values: Mapping[str, Any], *, filters: Mapping[str, Callable[..., Any]] | None = None
+) -> str:
+    """The page that `template` of `package` makes of `values`.
+
+    Templates extend "base.html.j2" and may use `filters` and `asset(name)`, the text of a style or script of theirs.
+    Values are escaped unless they are `Markup`; a name the template uses and `values` lacks is an error.
+    """
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader("measure.pages", ".")]),
+    )
+    environment.filters.update(filters or {})
+    environment.globals["base_style"] = Markup(_text("measure.pages", "base.css"))
+    environment.globals["asset"] = lambda name: Markup(_text(package, name))
+    return environment.get_template(template).render(**values)
+
+
+def data_url(data: bytes, media_type: str) -> str:
+    """The bytes as a URL that holds them."""
+    return f"data:{media_type};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _text(package: str, name: str) -> str:
+    return files(package).joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,174 @@
+"""The error over the cloth: maps over the material coordinates (u, v), or profiles where the markers lie on a line."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup, escape
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import Delaunay
+
+from measure.loop.verdict import Residual
+from measure.pages.render import data_url
+from measure.report.chart import Chart, Linear, drawing
+from measure.report.quantity import Display, display
+
+_WIDTH = 300.0
+_LEFT, _TOP, _BOTTOM = 46.0, 26.0, 40.0
+_PIXELS = 150  # across a map; the browser smooths
+_SLIVER = 1e-3  # triangles smaller than this part of the median are rounding along straight edges
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shade:
+    """What the colours of several maps mean: `low` to `high` [m] over a colour map of matplotlib."""
+
+    low: float
+    high: float
+    colours: str
+
+    def shown(self) -> Display:
+        return display((self.low, self.high), "m")
+
+    def colour(self, values: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """RGBA (..., 4) uint8; transparent where there is no value."""
+        part = (values - self.low) / (self.high - self.low)
+        shaded = colormaps[self.colours](np.where(np.isfinite(part), part, 0.0))
+        shaded[..., 3] = np.isfinite(values)
+        return (255 * shaded).round().astype(np.uint8)
+
+
+def size_shade(residuals: Sequence[Residual]) -> Shade:
+    """One scale for the errors of all recordings, before and after, from zero."""
+    return Shade(low=0.0, high=_largest([v for r in residuals for v in (*r.in_space, *r.in_space_after)]),
+                 colours="viridis")  # fmt: skip
+
+
+def mean_shade(residuals: Sequence[Residual]) -> Shade:
+    """One scale for the components of the mean errors of all recordings, symmetric about zero."""
+    reach = _largest([c for r in residuals for m in r.mean for c in m])
+    return Shade(low=-reach, high=reach, colours="RdBu_r")
+
+
+def size_maps(residual: Residual, shade: Shade) -> list[tuple[str, Markup]]:
+    """(heading, chart) of the root mean square error over the cloth: of the base model, then with the effect."""
+    parts = [("base model", residual.in_space)]
+    if residual.in_space_after:
+        parts.append(("with the effect", residual.in_space_after))
+    return _maps(residual, parts, shade, "root mean square error")
+
+
+def mean_maps(residual: Residual, shade: Shade) -> list[tuple[str, Markup]]:
+    """(heading, chart) of x, y and z of the base model's mean error over the cloth."""
+    parts = [(f"mean error in {axis}", [m[i] for m in residual.mean]) for i, axis in enumerate("xyz")]
+    return _maps(residual, parts, shade, "mean error of the base model") if residual.mean else []
+
+
+def colour_bar(shade: Shade, meaning: str) -> Markup:
+    """What the colours mean."""
+    shown = shade.shown()
+    scale = Linear(shade.low * shown.factor, shade.high * shown.factor, 12, 288)
+    image = _png(shade.colour(np.linspace(shade.low, shade.high, 128)[None, :]))
+    parts = [f'<image href="{image}" x="12" y="0" width="276" height="10" preserveAspectRatio="none"/>']
+    for value, label in scale.ticks():
+        parts.append(f'<path class="tick" d="M{scale(value):.1f} 10v4"/>')
+        parts.append(f'<text x="{scale(value):.1f}" y="26" text-anchor="middle">{escape(label)}</text>')
+    parts.append(f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{shown.unit}]</text>')
+    ends = f"{scale.low:.3g} to {scale.high:.3g} {shown.unit}"
+    return drawing(300, 48, f"Colours of the {meaning}", ends, "".join(parts))
+
+
+def triangles(markers: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(triangle, 3) over markers (marker, 2) [m], without slivers; empty where they lie on a line."""
+    if on_a_line(markers):
+        return np.zeros((0, 3), dtype=np.int64)
+    found = Delaunay(markers).simplices.astype(np.int64)
+    a, b, c = (markers[found[:, i]] for i in range(3))
+    area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    return found[area > _SLIVER * np.median(area)]
+
+
+def on_a_line(markers: NDArray[np.float64]) -> bool:
+    """Whether markers (marker, 2) span no area."""
+    if len(markers) < 4:
+        return True
+    spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
+    return bool(spread[1] <= 1e-6 * spread[0])
+
+
+def _maps(
+    residual: Residual, parts: Sequence[tuple[str, Sequence[float]]], shade: Shade, meaning: str
+) -> list[tuple[str, Markup]]:
+    markers = np.asarray(residual.markers, dtype=np.float64).reshape(-1, 2)
+    draw = _profile if on_a_line(markers) else _map
+    return [
+        (heading, draw(markers, np.asarray(values, dtype=np.float64), shade, f"{meaning}, {heading}"))
+        for heading, values in parts
+    ]
+
+
+def _map(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade, title: str) -> Markup:
+    (left, bottom), (right, top) = markers.min(axis=0), markers.max(axis=0)
+    across = _WIDTH - _LEFT - 14
+    tall = float(np.clip(across * (top - bottom) / (right - left), 30, 320))
+    known = np.isfinite(values)
+    chart = Chart(
+        title=title,
+        description="colours over the cloth",
+        x=Linear(float(left), float(right), _LEFT, _LEFT + across),
+        y=Linear(float(bottom), float(top), _TOP + tall, _TOP),
+        x_label="u [m]",
+        y_label="v [m]",
+        width=_WIDTH,
+        height=_TOP + tall + _BOTTOM,
+    )
+    if np.count_nonzero(known) >= 4 and not on_a_line(markers[known]):
+        rows = max(2, round(_PIXELS * tall / across))
+        grid = np.meshgrid(np.linspace(left, right, _PIXELS), np.linspace(top, bottom, rows))
+        image = _png(shade.colour(LinearNDInterpolator(markers[known], values[known])(*grid)))
+        chart.marks.append(
+            f'<image href="{image}" x="{_LEFT:g}" y="{_TOP:g}" width="{across:.1f}" height="{tall:.1f}" '
+            'preserveAspectRatio="none"/>'
+        )
+    kinds = ("marker lost", "marker")
+    for (u, v), there in zip(markers.tolist(), known.tolist(), strict=True):
+        chart.marks.append(f'<circle class="{kinds[there]}" cx="{chart.x(u):.1f}" cy="{chart.y(v):.1f}" r="1"/>')
+    return chart.svg()
+
+
+def _profile(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade, title: str) -> Markup:
+    """Markers on a line: the value against the distance along it."""
+    along = np.linalg.norm(markers - markers[:1], axis=1) if len(markers) else np.zeros(0)
+    order = np.argsort(along)
+    shown = shade.shown()
+    chart = Chart(
+        title=title,
+        description="against the distance along the markers",
+        x=Linear.over(along.tolist(), 50, 288),
+        y=Linear(shade.low * shown.factor, shade.high * shown.factor, 150, _TOP),
+        x_label="along the markers [m]",
+        y_label=f"error [{shown.unit}]",
+        width=_WIDTH,
+        height=192,
+    )
+    if shade.low < 0:
+        chart.line([chart.x.low, chart.x.high], [0.0, 0.0], "zero")
+    chart.line(along[order].tolist(), (values[order] * shown.factor).tolist(), "before")
+    return chart.svg()
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max((abs(v) for v in values if math.isfinite(v)), default=0.0) or 1e-3
+
+
+def _png(rgba: NDArray[np.uint8]) -> str:
+    buffer = io.BytesIO()
+    Image.fromarray(rgba, "RGBA").quantize(128, method=Image.Quantize.FASTOCTREE).save(buffer, "PNG", optimize=True)
+    return data_url(buffer.getvalue(), "image/png")

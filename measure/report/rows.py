@@ -1,0 +1,99 @@
+"""Small charts inside tables: errors before and after, held-out gains, the strength on each recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from markupsafe import Markup
+
+from measure.loop.verdict import Candidate, Comparison, Estimate
+from measure.report.chart import Linear, drawing
+from measure.report.quantity import estimate_text, known, with_error
+
+_WIDTH = 200.0
+_INSET = 8.0
+_STEP = 13.0
+
+
+def errors_scale(comparisons: Sequence[Comparison]) -> Linear:
+    """One axis for the errors of all comparisons, from zero."""
+    shown = [e for c in comparisons for e in (c.before, c.after, c.floor, c.oracle, c.control) if e is not None]
+    ends = [v for e in shown for v in (e.value, e.low, e.high)]
+    return Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
+
+
+def errors_row(comparison: Comparison, scale: Linear) -> Markup:
+    """The errors of one comparison: before, after and control with their intervals, floor shaded, oracle ticked."""
+    parts, at = [], 9.0
+    if known(comparison.floor):
+        edge = scale(min(max(comparison.floor.value, scale.low), scale.high))
+        parts.append(f'<rect class="floor" x="{scale(0):.1f}" y="0" width="{edge - scale(0):.1f}" height="48"/>')
+    if comparison.oracle is not None and scale.shows(comparison.oracle.value):
+        parts.append(f'<path class="line oracle" d="M{scale(comparison.oracle.value):.1f} 0V48"/>')
+    for estimate, kind in ((comparison.before, "before"), (comparison.after, "after"), (comparison.control, "control")):
+        if estimate is not None and known(estimate):
+            parts.append(_whisker(estimate, scale, at, kind))
+            at += 15
+    told = f"before {estimate_text(comparison.before)}, after {estimate_text(comparison.after)}"
+    return drawing(_WIDTH, 48, f"Errors, {comparison.what}", told, "".join(parts))
+
+
+def gain_scale(candidates: Sequence[Candidate]) -> Linear:
+    """One axis for all held-out gains."""
+    ends = [c.gain + side * c.gain_error for c in candidates for side in (-1, 1)]
+    return Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
+
+
+def gain_row(candidate: Candidate, scale: Linear, kind: str) -> Markup:
+    """A candidate's held-out gain ± its standard error."""
+    if math.isnan(candidate.gain):
+        return Markup("")
+    estimate = Estimate(
+        value=candidate.gain,
+        low=candidate.gain - candidate.gain_error,
+        high=candidate.gain + candidate.gain_error,
+        unit="1",
+    )
+    inside = _zero(scale, 18) + _whisker(estimate, scale, 9, kind)
+    told = with_error(candidate.gain, candidate.gain_error)
+    return drawing(_WIDTH, 18, f"Held-out gain of {candidate.effect}", told, inside)
+
+
+def strength_row(candidate: Candidate) -> Markup:
+    """The strength on each recording alone, top to bottom in their order, over the interval of all together."""
+    single = [e for e in candidate.by_recording if known(e)]
+    if not single or not known(candidate.strength):
+        return Markup("")
+    ends = _finite(v for e in (candidate.strength, *single) for v in (e.value, e.low, e.high))
+    scale = Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
+    height = _STEP * len(candidate.by_recording) + 6
+    low, high = (scale(min(max(v, scale.low), scale.high)) for v in (candidate.strength.low, candidate.strength.high))
+    parts = [_zero(scale, height)]
+    if math.isfinite(low) and math.isfinite(high):
+        parts.append(f'<rect class="band" x="{low:.1f}" y="0" width="{max(high - low, 1):.1f}" height="{height:g}"/>')
+    for place, estimate in enumerate(candidate.by_recording):
+        if known(estimate):
+            parts.append(_whisker(estimate, scale, 9.5 + _STEP * place, "single"))
+    told = "; ".join(estimate_text(e) for e in candidate.by_recording)
+    return drawing(_WIDTH, height, f"{candidate.effect} on each recording alone", told, "".join(parts))
+
+
+def _zero(scale: Linear, height: float) -> str:
+    return f'<path class="line zero" d="M{scale(0):.1f} 0V{height:g}"/>'
+
+
+def _whisker(estimate: Estimate, scale: Linear, y: float, kind: str) -> str:
+    """A dot with its interval; an open end runs to the edge."""
+    low, high, value = (
+        scale(min(max(v if not math.isnan(v) else estimate.value, scale.low), scale.high))
+        for v in (estimate.low, estimate.high, estimate.value)
+    )
+    return (
+        f'<path class="line {kind}" d="M{low:.1f} {y:.1f}H{high:.1f}"/>'
+        f'<circle class="dot {kind}" cx="{value:.1f}" cy="{y:.1f}" r="4"/>'
+    )
+
+
+def _finite(values: Iterable[float]) -> list[float]:
+    return [v for v in values if math.isfinite(v)]
