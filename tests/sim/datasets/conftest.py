@@ -1,0 +1,191 @@
+"""A tiny data set: six sequences of a coarse flag, fifteen films of 32 × 32 pixels; and where it is built."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from flagdata.lake import Lake
+from sim.datasets.reading import parse
+from sim.datasets.recipe import DatasetRecipe
+
+SCENE = """
+batch = 2
+[scene]
+columns = 6
+[material]
+name = "camel-ponte-roma"
+density = { low = 0.10, high = 0.17 }
+bending-factors = { low = 0.1, high = 10.0 }
+[wind]
+speed = { low = 0.0, high = 10.0 }
+[time]
+settle = 0.2
+frames = 30
+"""
+RECIPE = """
+title = "A tiny data set"
+licence = "CC0-1.0"
+seed = 1
+[simulation]
+scene = "scene.toml"
+[render]
+prior = "flags"
+width = 32
+height = 32
+raster-samples = 2
+[sides.train]
+sequences = 4
+renders = 11
+[sides.test]
+sequences = 2
+renders = 4
+[camera]
+jpeg-quality = { low = 70, high = 90 }
+read-noise = 1.0
+shot-noise = 2.0
+frame-slot = 2048
+[anemometer]
+noise = 0.1
+[anemometer.effects.anemometer-lag]
+distance = { low = 1.0, high = 3.0 }
+[anemometer.effects.anemometer-gain]
+gain = { low = 0.95, high = 1.05 }
+"""
+WORKER = Path(__file__).with_name("build_worker.py")
+Rows = dict[str, tuple[str, ...]]
+
+
+@pytest.fixture(scope="session")
+def recipe_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The tiny data set's recipe beside its scene."""
+    folder = tmp_path_factory.mktemp("recipe")
+    (folder / "scene.toml").write_text(SCENE)
+    (folder / "tiny.toml").write_text(RECIPE)
+    return folder / "tiny.toml"
+
+
+@pytest.fixture(scope="session")
+def make(recipe_file: Path) -> Callable[..., DatasetRecipe]:
+    """The tiny recipe with pieces of its text replaced: old → new."""
+
+    def made(replaced: dict[str, str] | None = None, *, scene: dict[str, str] | None = None) -> DatasetRecipe:
+        text = _replaced(RECIPE, replaced or {})
+        folder = recipe_file.parent
+        if scene:
+            folder = folder / str(abs(hash(tuple(scene.items()))))
+            folder.mkdir(exist_ok=True)
+            (folder / "scene.toml").write_text(_replaced(SCENE, scene))
+        return parse(text, name="tiny", folder=folder, where="tiny.toml")
+
+    return made
+
+
+def _replaced(text: str, changes: dict[str, str]) -> str:
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+class Cluster:
+    """A scheduler and two workers in processes of their own, on loopback."""
+
+    def __init__(self, folder: Path) -> None:
+        file = folder / "scheduler.json"
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"}
+        start = [sys.executable, "-m", "dask"]
+        options = ["--scheduler-file", str(file), "--no-dashboard"]
+        command = [*start, "scheduler", "--host", "127.0.0.1", "--port", "0", *options]
+        self.scheduler = subprocess.Popen(command, env=environment, **quiet)
+        worker = [*start, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        self.workers = [
+            subprocess.Popen([*worker, "--local-directory", str(folder / f"worker-{i}")], env=environment, **quiet)
+            for i in range(2)
+        ]
+        self.file = file
+
+    @property
+    def address(self) -> str:
+        for _ in range(600):
+            with suppress(OSError, ValueError, KeyError):
+                return json.loads(self.file.read_text())["address"]
+            time.sleep(0.1)
+        raise TimeoutError("the scheduler did not start")
+
+    def close(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture(scope="session")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    running = Cluster(tmp_path_factory.mktemp("dask"))
+    try:
+        yield running
+    finally:
+        running.close()
+
+
+class Builds:
+    """Builds in processes of their own, through the cluster."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        self._cluster = cluster
+
+    def start(self, recipe: Path, lake: Path) -> subprocess.Popen[bytes]:
+        """`flagdata build`, which commits every two films."""
+        command = [sys.executable, str(WORKER), "build", str(recipe), "--lake", str(lake)]
+        return subprocess.Popen(
+            [*command, "--scheduler", self._cluster.address], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+
+    def finish(self, process: subprocess.Popen[bytes]) -> str:
+        """What it printed."""
+        out, err = process.communicate(timeout=300)
+        assert process.returncode == 0, err.decode()
+        return out.decode()
+
+    def wait_for(self, process: subprocess.Popen[bytes], lake: Path, artifacts: int) -> None:
+        """Until the lake shows that many artifacts."""
+        while True:
+            assert process.poll() is None, "it ended too early"
+            with suppress(Exception):
+                if Lake.open(lake).rows(columns=["artifact"]).num_rows >= artifacts:
+                    return
+            time.sleep(0.02)
+
+    def kill(self, process: subprocess.Popen[bytes]) -> None:
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+
+    def rows(self, lake: Path) -> Rows:
+        """Artifact → all of its row that does not say when it was committed, and by which code."""
+        columns = ["artifact", "kind", "name", "object", "recipe_hash", "seed", "start", "parameters", "wind"]
+        rows = Lake.open(lake).rows(columns=columns).to_pylist()
+        assert len({row["artifact"] for row in rows}) == len(rows)
+        return {row["artifact"]: tuple(str(row[column]) for column in columns) for row in rows}
+
+
+@pytest.fixture(scope="session")
+def builds(cluster: Cluster) -> Builds:
+    return Builds(cluster)
+
+
+@pytest.fixture(scope="session")
+def built(recipe_file: Path, builds: Builds, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The tiny data set, built without interruption."""
+    lake = tmp_path_factory.mktemp("built") / "lake"
+    builds.finish(builds.start(recipe_file, lake))
+    return lake

@@ -1,0 +1,113 @@
+"""A build: complete, loadable like real data, and the same whatever was killed on the way."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flagdata
+from flagdata.dataset import ExplicitSplit
+from flagdata.lake import Lake
+from flagdata.lake.health import doctor, object_names, verify
+from flagdata.record import Record
+from sim.datasets.recipe import DatasetRecipe
+
+SIDES = {"train": "name like 'tiny-train-%'", "test": "name like 'tiny-test-%'"}
+SEQUENCES, FILMS = 6, 15
+
+
+def test_a_build_holds_what_its_recipe_says(built: Path) -> None:
+    lake = Lake.open(built)
+    rows = lake.rows().to_pylist()
+    assert Counter(row["kind"] for row in rows) == {"meshes": SEQUENCES, "recording": FILMS, "clip": FILMS}
+    for side, sequences, films in (("train", 4, 11), ("test", 2, 4)):
+        own = [row for row in rows if row["kind"] == "recording" and row["name"].startswith(f"tiny-{side}-")]
+        often = Counter(row["seed"] for row in own)
+        assert len(own) == films
+        assert len(often) == sequences
+        assert max(often.values()) - min(often.values()) <= 1
+        assert sorted(row["name"] for row in own) == [f"tiny-{side}-{place:05d}" for place in range(films)]
+    assert [finding for finding in doctor(lake) if finding.severity != "note"] == []
+    assert verify(lake, object_names(lake)) == ()
+
+
+def test_clips_load_as_real_ones_do_with_the_simulated_wind_as_their_truth(built: Path) -> None:
+    lake = Lake.open(built)
+    winds = {row["seed"]: row["wind"] for row in lake.rows("kind = 'meshes'").to_pylist()}
+    source = flagdata.open(built)
+    seen: dict[str, set[int | None]] = {}
+    for side in SIDES:
+        pairs = source.pairs(split=side, split_by=ExplicitSplit(where=SIDES))
+        assert pairs.refused == ()
+        for index in range(len(pairs)):
+            sample = pairs[index]
+            seen.setdefault(side, set()).add(sample.seed)
+            assert sample.clip.shape == (1, 30, 32, 32)
+            assert sample.wind == winds[sample.seed]
+            assert (sample.wind_sigma, sample.clock_sigma, sample.coverage) == (0.0, 0.0, 1.0)
+            assert 0.10 <= sample.parameters["density"] <= 0.17
+            assert {f"bending.{i}" for i in range(15)} < set(sample.parameters)
+            assert sample.parameters["render.width"] == 32
+    assert not seen["train"] & seen["test"]
+    batch = next(iter(source.pairs().loader(4)))
+    assert batch.clip.shape == (4, 1, 30, 32, 32)
+
+
+def test_a_films_anemometer_is_a_log_of_its_wind_at_1_hz(built: Path) -> None:
+    lake = Lake.open(built)
+    for row in lake.rows("kind = 'recording'").to_pylist():
+        record = Record.open(lake.object_path(row["object"]))
+        series, truth = record.wind(), record.truth
+        assert series is not None
+        assert truth is not None
+        np.testing.assert_array_equal(np.diff(series.time), 10**9)
+        assert series.time[-1] <= record.frame_times[-1]
+        assert record.frame_times[0] - series.time[0] > 60 * 10**9
+        expected = truth["wind_speed"] * truth["anemometer-gain.gain"]
+        # Noise of 0.1 m/s over some 75 samples: 5 standard errors and half a step; near 0, readings are cut off.
+        assert np.mean(series.channels["wind_speed"]) == pytest.approx(expected, abs=0.06 + 0.05)
+        parameters = json.loads(row["parameters"])
+        assert {name: value for name, value in parameters.items() if not isinstance(value, str)} == truth
+        assert parameters["material"] == "camel-ponte-roma"
+
+
+def test_a_build_that_is_killed_three_times_ends_as_an_unbroken_one(
+    recipe_file: Path, builds: Any, built: Path, tmp_path: Path
+) -> None:
+    lake = tmp_path / "lake"
+    for artifacts in (2, SEQUENCES + 4, SEQUENCES + 12):
+        process = builds.start(recipe_file, lake)
+        builds.wait_for(process, lake, artifacts)
+        builds.kill(process)
+    builds.finish(builds.start(recipe_file, lake))
+    assert builds.rows(lake) == builds.rows(built)
+    version = Lake.open(lake).resolve(None)
+    builds.finish(builds.start(recipe_file, lake))  # nothing is made again
+    assert Lake.open(lake).resolve(None) == version
+
+
+def test_a_killed_workers_jobs_are_done_by_the_other(
+    recipe_file: Path, builds: Any, cluster: Any, built: Path, tmp_path: Path
+) -> None:
+    process = builds.start(recipe_file, tmp_path / "lake")
+    builds.wait_for(process, tmp_path / "lake", SEQUENCES + 2)
+    cluster.workers[0].kill()
+    builds.finish(process)
+    assert builds.rows(tmp_path / "lake") == builds.rows(built)
+
+
+def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRecipe]) -> None:
+    (card,) = (built / "cards").iterdir()
+    text = card.read_text()
+    assert make().hash in text
+    assert "CC0-1.0" in text
+    assert "data:image/jpeg;base64," in text
+    for name in ("wind_speed", "density", "camera_radius", "anemometer-lag.distance", "flag/"):
+        assert name in text
+    assert "<td>train</td><td>4</td><td>–</td><td>11</td><td>11</td>" in text
