@@ -1,32 +1,176 @@
-"""Procedural backgrounds: skies, hills, foliage, buildings."""
+"""Procedural backgrounds: skies, hills, foliage, buildings, each with its own weather, light, colours and focus.
+
+They are no likenesses. They vary in what a picture's statistics have (brightness, colour, contrast, spectral slope,
+edges, horizons), so that nothing about a scene can be told from what is behind it.
+"""
 
 from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assets.noise import fractal, smoothstep
+from sim.assets.noise import Picture, Plane, defocused, fractal, over, ridge, smoothstep
 from sim.assets.seeded import Seeded
 
-_ROWS, _COLUMNS = 500, 640  # px
+_ROWS, _COLUMNS = 400, 512  # px
+_HEIGHT: Plane = np.linspace(1.0, 0.0, _ROWS)[:, None] * np.ones((1, _COLUMNS))  # 1 at the upper edge
+_X: Plane = np.linspace(0.0, _COLUMNS / _ROWS, _COLUMNS)[None, :] * np.ones((_ROWS, 1))
 
 
-def _sky(rng: np.random.Generator) -> NDArray[np.float64]:
-    zenith = np.array([0.25, 0.45, 0.8]) * rng.uniform(0.6, 1.2)
-    horizon = np.array([0.75, 0.85, 0.95]) * rng.uniform(0.8, 1.05)
-    height = np.linspace(1, 0, _ROWS)[:, None, None] ** rng.uniform(0.5, 1.5)
-    clear = horizon + (zenith - horizon) * height
-    cover = rng.uniform(-1.5, 1.5)
-    cloud = smoothstep(cover - 0.8, cover + 0.8, fractal(rng, _ROWS, _COLUMNS, slope=1.7, stretch=1 / 1.8))[:, :, None]
-    light = rng.uniform(0.55, 1.0) + 0.06 * fractal(rng, _ROWS, _COLUMNS, slope=1.5)[:, :, None]
-    return clear * (1 - cloud) + light * cloud
+Band = tuple[float, float]
+Hue = tuple[Band, Band, Band]
 
 
-def _hills(rng: np.random.Generator) -> NDArray[np.float64]:
-    return _sky(rng)
+def _hue(rng: np.random.Generator, hue: Band, saturation: Band, brightness: Band) -> NDArray[np.float64]:
+    """A colour (3,) with its hue [turn], saturation and brightness uniform in ranges."""
+    return np.array(colorsys.hsv_to_rgb(rng.uniform(*hue), rng.uniform(*saturation), rng.uniform(*brightness)))
 
 
-SKY = Seeded(kind="sky", paint=_sky)
-HILLS = Seeded(kind="hills", paint=_hills)
-FOLIAGE = Seeded(kind="foliage", paint=_hills)
-BUILDINGS = Seeded(kind="buildings", paint=_hills)
+# Weather → (hue, saturation, brightness) at the zenith and at the horizon.
+_SKIES: Mapping[str, tuple[Hue, Hue]] = {
+    "clear": (((0.55, 0.62), (0.4, 0.85), (0.5, 0.95)), ((0.52, 0.6), (0.05, 0.35), (0.75, 1.0))),
+    "clouds": (((0.55, 0.62), (0.4, 0.85), (0.5, 0.95)), ((0.52, 0.6), (0.05, 0.35), (0.75, 1.0))),
+    "overcast": (((0.5, 0.68), (0.0, 0.15), (0.4, 0.9)), ((0.5, 0.68), (0.0, 0.1), (0.55, 1.0))),
+    "dusk": (((0.58, 0.72), (0.2, 0.55), (0.25, 0.6)), ((0.0, 0.13), (0.15, 0.55), (0.65, 1.0))),
+}
+_GROUNDS: tuple[Hue, ...] = (
+    ((0.18, 0.36), (0.3, 0.7), (0.2, 0.6)),  # grass
+    ((0.08, 0.13), (0.2, 0.5), (0.5, 0.9)),  # sand
+    ((0.0, 1.0), (0.0, 0.1), (0.25, 0.55)),  # asphalt
+    ((0.48, 0.62), (0.2, 0.6), (0.25, 0.7)),  # water
+    ((0.55, 0.65), (0.0, 0.1), (0.8, 1.0)),  # snow
+)
+_WALLS: tuple[Hue, ...] = (((0.0, 0.15), (0.0, 0.45), (0.3, 0.95)), ((0.5, 0.7), (0.0, 0.3), (0.2, 0.9)))
+
+
+def _weather(rng: np.random.Generator) -> Picture:
+    """A sky from zenith to horizon, with clouds of some cover, or fog, or dusk."""
+    kind = rng.choice(["clear", "clouds", "overcast", "dusk"], p=[0.2, 0.4, 0.25, 0.15])
+    above, below = _SKIES[kind]
+    zenith, horizon = _hue(rng, *above), _hue(rng, *below)
+    sky = over(np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6))
+    if kind == "clear":
+        return sky
+    stretch = rng.uniform(1.2, 3.0)
+    form = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(1.4, 2.0), stretch=stretch)
+    cover, edge = (rng.uniform(-1.3, 0.9), rng.uniform(0.2, 1.5)) if kind != "overcast" else (-3.0, 3.0)
+    lit = rng.uniform(0.75, 1.05) - rng.uniform(0.05, 0.2) * np.roll(form, -int(rng.integers(4, 14)), axis=0)
+    tint = _hue(rng, (0.0, 1.0), (0.0, 0.08), (0.85, 1.0)) if kind != "dusk" else horizon
+    cloud = np.clip(lit, 0.25, 1.1)[:, :, None] * tint
+    return over(sky, cloud, smoothstep(cover, cover + edge, form) * rng.uniform(0.6, 1.0))
+
+
+def _ground(rng: np.random.Generator) -> Picture:
+    """Grass, sand, asphalt, water or snow, with features that shrink towards the horizon."""
+    colour = _hue(rng, *_GROUNDS[int(rng.integers(len(_GROUNDS)))])
+    coarse = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.9, 1.5), stretch=rng.uniform(2.0, 6.0))
+    fine = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.3, 0.8), stretch=rng.uniform(1.0, 4.0))
+    light = 1 + rng.uniform(0.05, 0.25) * coarse + rng.uniform(0.03, 0.15) * fine
+    return light[:, :, None] * colour
+
+
+def _sky(rng: np.random.Generator) -> Picture:
+    return _weather(rng)
+
+
+def _hills(rng: np.random.Generator) -> Picture:
+    picture, horizon = _weather(rng), rng.uniform(0.2, 0.7)
+    haze = picture[-1].mean(axis=0)
+    layers = int(rng.integers(1, 6))
+    for layer in range(layers):
+        near = (layer + 1) / layers
+        line = horizon * (1 - 0.75 * (layer / layers)) + rng.uniform(0.01, 0.08) * ridge(
+            rng, _COLUMNS, slope=rng.uniform(0.9, 1.8)
+        )
+        colour = _hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (0.3 + 0.7 * near) + haze * 0.7 * (1 - near)
+        grain = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.4, 1.2))
+        body = (1 + 0.18 * near * grain)[:, :, None] * colour
+        picture = over(picture, body, smoothstep(-0.004, 0.004, line - _HEIGHT))
+    floor = rng.uniform(0.0, horizon * 0.6)
+    return over(picture, _ground(rng), smoothstep(-0.005, 0.005, floor - _HEIGHT))
+
+
+def _foliage(rng: np.random.Generator) -> Picture:
+    picture = _weather(rng)
+    floor = rng.uniform(-0.1, 0.25)
+    picture = over(picture, _ground(rng), smoothstep(-0.005, 0.005, floor - _HEIGHT))
+    season = [(0.2, 0.38), (0.05, 0.18), (0.22, 0.3)][int(rng.integers(3))]
+    for _ in range(int(rng.integers(2, 9))):
+        picture = _tree(rng, picture, season, floor)
+    return picture
+
+
+def _tree(rng: np.random.Generator, picture: Picture, season: tuple[float, float], floor: float) -> Picture:
+    """A crown of leaves on a trunk, lit from above, in front of a picture."""
+    x, z, size = rng.uniform(-0.1, 1.4), rng.uniform(floor + 0.15, 0.9), rng.uniform(0.15, 0.45)
+    trunk = (np.abs(_X - x - 0.02 * np.sin(8 * _HEIGHT)) < 0.05 * size + 0.03 * size * (z - _HEIGHT)) & (z > _HEIGHT)
+    bark = _hue(rng, (0.04, 0.12), (0.1, 0.5), (0.1, 0.4))
+    picture = over(picture, bark, (trunk & (floor - 0.05 < _HEIGHT)).astype(np.float64))
+    rough = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.8, 1.2))
+    leaves = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.2, 0.6))
+    reach = np.hypot((_X - x) / size, (_HEIGHT - z) / (size * rng.uniform(0.7, 1.5)))
+    crown = smoothstep(-0.05, 0.05, 1 - reach + 0.22 * rough + 0.1 * leaves)
+    light = np.clip(0.75 + 0.35 * (_HEIGHT - z) / size + 0.2 * rough + 0.22 * leaves, 0.1, 1.6)
+    return over(picture, light[:, :, None] * _hue(rng, season, (0.3, 0.8), (0.25, 0.6)), crown)
+
+
+def _buildings(rng: np.random.Generator) -> Picture:
+    picture, street = _weather(rng), rng.uniform(-0.1, 0.25)
+    haze = picture[-1].mean(axis=0)
+    count = int(rng.integers(3, 14))
+    for index in range(count):
+        far = 0.6 * (1 - (index + 1) / count)
+        picture = _house(rng, picture, far, haze)
+    return over(picture, _ground(rng), smoothstep(-0.004, 0.004, street - _HEIGHT))
+
+
+def _house(rng: np.random.Generator, picture: Picture, far: float, haze: NDArray[np.float64]) -> Picture:
+    """A façade with rows of windows, some lit, some mirroring the sky, in front of a picture."""
+    left, width, top = rng.uniform(-0.2, 1.2), rng.uniform(0.12, 0.6), rng.uniform(0.25, 1.05) * (1 - 0.4 * far)
+    first, last = np.searchsorted(_X[0], [left, left + width])
+    highest = int(np.searchsorted(-_HEIGHT[:, 0], -top))
+    part = (slice(highest, None), slice(int(first), int(last)))
+    if last <= first or highest >= _ROWS:
+        return picture
+    x, height = _X[part], _HEIGHT[part]
+    wall = _hue(rng, *_WALLS[int(rng.random() < 0.3)])
+    storey, bay = rng.uniform(0.03, 0.1), rng.uniform(0.025, 0.1)
+    row, column = np.floor((top - height) / storey), np.floor((x - left) / bay)
+    down, along = (top - height) / storey - row, (x - left) / bay - column
+    high, wide = rng.uniform(0.3, 0.8), rng.uniform(0.3, 0.85)
+    pane = (np.abs(down - 0.5) < high / 2) & (np.abs(along - 0.5) < wide / 2)
+    states = rng.uniform(0.0, 1.0, (64, 64))[row.astype(np.int64) % 64, column.astype(np.int64) % 64]
+    glass = over(
+        np.broadcast_to(_hue(rng, (0.5, 0.65), (0.05, 0.4), (0.1, 0.5)), (*x.shape, 3)),
+        haze, 0.8 * smoothstep(0.55, 0.95, states),
+    )  # fmt: skip
+    shade = 1 + 0.05 * fractal(rng, *x.shape, slope=rng.uniform(0.5, 1.2)) if min(x.shape) > 1 else np.ones(x.shape)
+    shade *= 1 - rng.uniform(0.0, 0.25) * (down < 0.08)
+    shade *= 1 - rng.uniform(0.0, 0.4) * (x > left + width * 0.97)
+    front = over(shade[:, :, None] * wall, glass, pane.astype(np.float64))
+    result = picture.copy()
+    result[part] = front * (1 - far) + haze * far
+    return result
+
+
+def _photographed(paint: Callable[[np.random.Generator], Picture]) -> Callable[[np.random.Generator], Picture]:
+    """A picture with a focus, a tint, a contrast and a side of its own."""
+
+    def painted(rng: np.random.Generator) -> Picture:
+        picture = np.clip(paint(rng), 0.0, 1.2)
+        if rng.random() < 0.6:
+            picture = defocused(picture, rng.uniform(0.3, 3.0))
+        picture = picture * (1 + rng.uniform(-0.06, 0.06, 3)) * rng.uniform(0.8, 1.15)
+        picture = 0.5 + (picture - 0.5) * rng.uniform(0.75, 1.2)
+        return picture[:, ::-1] if rng.random() < 0.5 else picture
+
+    return painted
+
+
+SKY = Seeded(kind="sky", paint=_photographed(_sky))
+HILLS = Seeded(kind="hills", paint=_photographed(_hills))
+FOLIAGE = Seeded(kind="foliage", paint=_photographed(_foliage))
+BUILDINGS = Seeded(kind="buildings", paint=_photographed(_buildings))

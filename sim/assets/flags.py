@@ -70,7 +70,7 @@ def _greece(sheet: Sheet) -> None:
 
 
 def _italy(sheet: Sheet) -> None:
-    _upright_thirds(sheet, "#008c45", "#f4f9ff", "#cd212a")
+    _upright_thirds(sheet, "#008c45", "#f4f5f0", "#cd212a")
 
 
 def _japan(sheet: Sheet) -> None:

@@ -4,32 +4,53 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
+
+Plane = NDArray[np.float64]
+"""(row, column)."""
+Picture = NDArray[np.float64]
+"""(row, column, 3) sRGB in [0, 1], or about."""
 
 
-def fractal(
-    rng: np.random.Generator, rows: int, columns: int, *, slope: float, stretch: float = 1.0
-) -> NDArray[np.float64]:
+def fractal(rng: np.random.Generator, rows: int, columns: int, *, slope: float, stretch: float = 1.0) -> Plane:
     """A Gaussian field whose amplitude spectrum falls as f^−slope, scaled to mean 0 and standard deviation 1.
 
-    Natural scenes have slopes about 1 (Field 1987); clouds about 1.5 to 2.
+    Photographs have slopes of about 1 (Field 1987, J. Opt. Soc. Am. A 4, 2379); clouds 1.5 to 2.
 
     Args:
-        stretch: how many times longer features are along the rows than across.
+        stretch: how many times longer features are along rows than across.
 
     Returns:
         (rows, columns), periodic.
     """
-    fy = np.fft.fftfreq(rows)[:, None] * max(rows, columns)
-    fx = np.fft.rfftfreq(columns)[None, :] * max(rows, columns) * stretch
+    longer = max(rows, columns)
+    fy = np.fft.fftfreq(rows)[:, None] * longer
+    fx = np.fft.rfftfreq(columns)[None, :] * longer * stretch
     frequency = np.hypot(fx, fy)
     frequency[0, 0] = np.inf
-    shape = frequency.shape
-    spectrum = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * frequency**-slope
-    field = np.fft.irfft2(spectrum, s=(rows, columns))
+    real, imaginary = rng.standard_normal((2, *frequency.shape))
+    field = np.asarray(fft.irfft2((real + 1j * imaginary) * frequency**-slope, s=(rows, columns)))
     return (field - field.mean()) / field.std()
+
+
+def ridge(rng: np.random.Generator, columns: int, *, slope: float) -> NDArray[np.float64]:
+    """(columns,) a random line with mean 0 and standard deviation 1, as `fractal`, not periodic."""
+    return fractal(rng, 2, 2 * columns, slope=slope)[0, :columns]
 
 
 def smoothstep(low: float, high: float, value: NDArray[np.float64]) -> NDArray[np.float64]:
     """0 below `low`, 1 above `high`, a smooth cubic between."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)
+
+
+def over(below: Picture, colour: NDArray[np.float64], share: Plane) -> Picture:
+    """A colour or picture laid over another one with the share (row, column) that it covers."""
+    return below + share[:, :, None] * (colour - below)
+
+
+def defocused(picture: Picture, radius: float) -> Picture:
+    """A picture seen through a Gaussian of standard deviation `radius` [px], mirrored at its edges."""
+    from scipy.ndimage import gaussian_filter
+
+    return gaussian_filter(picture, sigma=(radius, radius, 0.0), mode="reflect", truncate=3.0)
