@@ -1,18 +1,19 @@
-"""Which effect may have been missing: each candidate as a load on the sheet, with the range of its strength.
+"""What may have been missing: each candidate as a load on the sheet, with the strengths that are tried.
 
 A model of the paper flag is a candidate and a factor s on the logged speed, which is 1 or free: the sheet hangs in the
-jet's shear layer and meets s U. The declared hypothesis is the reactive loading; the others are the wrong-effect controls,
-which are given the same freedom.
+jet's shear layer and meets s U. The declared hypothesis is the reactive loading; the others are the wrong-effect
+controls, which are given the same freedom.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from measure.cases.sheet import Sheet
 from sim.effects import Effect
@@ -22,11 +23,9 @@ from sim.effects.lift import Lift
 from sim.effects.reactive_loading import ReactiveLoading
 from sim.effects.tangential_linear_drag import TangentialLinearDrag
 
-STEPS = 25
-
 
 class Candidate(StrEnum):
-    """An effect; the base model is the candidate of no strength. Names are those of `sim.effects.EFFECTS`."""
+    """Names are those of `sim.effects.EFFECTS`; the base model is the one without any."""
 
     NONE = "base"
     REACTIVE = "reactive-loading"
@@ -34,6 +33,7 @@ class Candidate(StrEnum):
     DAMPING = "internal-damping"
     LIFT = "lift"
     FRICTION = "tangential-linear-drag"
+    REACTIVE_AND_LIFT = "reactive-loading + lift"
 
 
 class Shear(StrEnum):
@@ -46,63 +46,68 @@ class Shear(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Strengths:
-    """Values of a candidate's strength that are tried, and what it is in.
+class Load:
+    """Strengths of the effects; 0 is none.
 
     Attributes:
-        unit: of the values; "ρL" for the mass of air per area over ρ L.
-        symbol: of the strength.
+        reactive, added: mass of air per area over ρ L.
+        damping: d [s].
+        lift: C, slope of the lift coefficient.
+        friction: c [kg/(m² s)].
     """
 
-    low: float
-    high: float
-    unit: str
-    symbol: str
+    reactive: float = 0.0
+    added: float = 0.0
+    damping: float = 0.0
+    lift: float = 0.0
+    friction: float = 0.0
 
-    def grid(self) -> NDArray[np.float64]:
-        """(STEPS,) values, logarithmic."""
-        return np.geomspace(self.low, self.high, STEPS)
-
-
-STRENGTHS = {
-    Candidate.NONE: Strengths(low=1.0, high=1.0, unit="", symbol="–"),
-    Candidate.REACTIVE: Strengths(low=0.03, high=1.0, unit="ρL", symbol="M"),
-    Candidate.ADDED_MASS: Strengths(low=0.03, high=1.0, unit="ρL", symbol="M₀"),
-    Candidate.DAMPING: Strengths(low=1e-5, high=2.5e-3, unit="s", symbol="d"),
-    Candidate.LIFT: Strengths(low=0.04, high=6.3, unit="", symbol="C"),
-    Candidate.FRICTION: Strengths(low=5e-4, high=0.2, unit="kg/(m² s)", symbol="c"),
-}
-"""The priors of `sim.effects`, widened at the lower end to where they do nothing; masses up to ρ L."""
+    def __str__(self) -> str:
+        units = {"reactive": "M {} ρL", "added": "M₀ {} ρL", "damping": "d {} s", "lift": "C {}",
+                 "friction": "c {} kg/(m² s)"}  # fmt: skip
+        parts = [text.format(f"{value:.2g}") for name, text in units.items() if (value := getattr(self, name))]
+        return ", ".join(parts) or "–"
 
 
-def loaded(candidate: Candidate, strength: float, *, bare: Sheet, length: float, density: float) -> Sheet:
-    """The sheet at this length with the candidate's load."""
-    sheet = replace(bare, length=length)
+def tried(candidate: Candidate) -> tuple[Load, ...]:
+    """Loads of a candidate for linear stability: the priors of `sim.effects`, from where they do next to nothing."""
+    masses = np.geomspace(0.03, 1.0, 29).tolist()
+    lifts = np.geomspace(0.04, 6.3, 25).tolist()
     match candidate:
         case Candidate.NONE:
-            return sheet
+            return (Load(),)
         case Candidate.REACTIVE:
-            return replace(sheet, reactive_mass=strength * density * length)
+            return tuple(Load(reactive=m) for m in masses)
         case Candidate.ADDED_MASS:
-            return replace(sheet, still_mass=strength * density * length)
+            return tuple(Load(added=m) for m in masses[::2])
         case Candidate.DAMPING:
-            return replace(sheet, damping=strength)
+            return tuple(Load(damping=d) for d in np.geomspace(1e-5, 2.5e-3, 13).tolist())
         case Candidate.LIFT:
-            return replace(sheet, lift=density * strength / 2)
+            return tuple(Load(lift=c) for c in lifts)
         case Candidate.FRICTION:
-            return replace(sheet, friction=strength)
+            return tuple(Load(friction=c) for c in np.geomspace(5e-4, 0.2, 13).tolist())
+        case Candidate.REACTIVE_AND_LIFT:
+            return tuple(Load(reactive=m, lift=c) for m, c in itertools.product(masses[::3], lifts[::3]))
 
 
-def effects(members: list[tuple[Candidate, float]], *, length: float, density: float) -> list[Effect]:
-    """The effects of a batch whose members each have one candidate at one strength."""
+def loaded(load: Load, *, bare: Sheet, length: float, density: float) -> Sheet:
+    """The sheet at this length with this load."""
+    return replace(
+        bare, length=length, reactive_mass=load.reactive * density * length, still_mass=load.added * density * length,
+        damping=load.damping, lift=density * load.lift / 2, friction=load.friction,
+    )  # fmt: skip
 
-    def of(candidate: Candidate) -> torch.Tensor:
-        return torch.tensor([strength if which is candidate else 0.0 for which, strength in members], dtype=torch.float64)
+
+def effects(loads: Sequence[Load], *, length: float, density: float) -> list[Effect]:
+    """The effects of a batch whose members have these loads."""
+
+    def each(name: str) -> torch.Tensor:
+        return torch.tensor([getattr(load, name) for load in loads], dtype=torch.float64)
 
     return [
-        ReactiveLoading(mass=of(Candidate.REACTIVE) * density * length),
-        AddedMass(mass=of(Candidate.ADDED_MASS) * density * length),
-        InternalDamping(time=of(Candidate.DAMPING)),
-        Lift(coefficient=of(Candidate.LIFT), density=density),
-        TangentialLinearDrag(coefficient=of(Candidate.FRICTION)),
+        ReactiveLoading(mass=each("reactive") * density * length),
+        AddedMass(mass=each("added") * density * length),
+        InternalDamping(time=each("damping")),
+        Lift(coefficient=each("lift"), density=density),
+        TangentialLinearDrag(coefficient=each("friction")),
     ]

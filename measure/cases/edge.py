@@ -1,9 +1,9 @@
 """The centre line of a sheet seen edge-on: a dark line on a bright ground, one height a column, to parts of a pixel.
 
-In every column the line is the run of dark pixels around the darkest one, and its height is that run's centroid, weighted
-with darkness above a floor. A line that moves during the exposure is smeared into a band, whose centroid is the line's
-place at mid-exposure as long as it moves evenly; its width says how far it moved. What cannot be told is flagged and left
-out, never filled.
+In every column the line is the run of dark pixels around the darkest one, and its height is that run's centroid,
+weighted with darkness above a floor. A line that moves during the exposure is smeared into a band, whose centroid is
+the line's place at mid-exposure as long as it moves evenly; its width says how far it moved. What cannot be told is
+flagged and left out, never filled.
 
 The error of a height is estimated from the track itself: `scatter` compares every column with the parabola through its
 neighbours, which a sheet with bending stiffness follows over a few pixels.
@@ -106,7 +106,9 @@ class EdgeTrack:
         return float((self.seen == what).mean())
 
 
-def line_in(image: NDArray[np.uint8], options: EdgeOptions) -> tuple[NDArray[np.float64], ...]:
+def line_in(
+    image: NDArray[np.uint8], options: EdgeOptions
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8]]:
     """Height, width and kind of what each column of one picture shows.
 
     Args:
@@ -219,10 +221,10 @@ def track_edge(
         findings = stream.findings
     if len(times) < 2:
         raise InputError("a clip of fewer than two frames", where=str(path), fix="give a moving picture")
-    height, width, seen = (np.stack([each[part] for each in found]) for part in range(3))
     time = np.array(times)
     return EdgeTrack(
-        time=time - time[0], height=height, width=width, seen=seen.astype(np.uint8), findings=findings
+        time=time - time[0], height=np.stack([each[0] for each in found]), width=np.stack([each[1] for each in found]),
+        seen=np.stack([each[2] for each in found]), findings=findings,
     )  # fmt: skip
 
 

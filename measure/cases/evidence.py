@@ -1,8 +1,7 @@
-"""Before and after on data no fit has seen: each model's predictions of frequencies and of stop speeds.
+"""Before and after on data no fit has seen: what models predict for each condition, and how wrong they are.
 
-Errors are natural logarithms of predicted over measured, so that twice too fast and half as fast weigh alike, and 0.1 is
-10 %. A model that has no flutter at a speed has no frequency there: its error is that of the mode that decays slowest, and
-it is said to have none. One that never flutters at a length has no stop speed; that counts as a factor of ten.
+Errors are natural logarithms of predicted over measured, so that twice too fast and half as fast weigh alike, and 0.1
+is 10 %. A model without flutter where flutter was measured has no prediction: that counts as a factor of ten.
 """
 
 from __future__ import annotations
@@ -12,161 +11,166 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from measure.cases.candidates import STRENGTHS, Candidate, Shear, loaded
+from flagdata.errors import UsageError
+from measure.cases.candidates import Load, Shear, loaded
 from measure.cases.sheet import Sheet, leading, onset
 
 NEVER = math.log(10.0)
-"""The error of a stop speed where the model has none."""
-_SPEEDS = np.arange(0.4, 14.01, 0.1)
+"""The error where a model has no prediction."""
+_SPEEDS = np.arange(0.4, 20.01, 0.1)
 _HIGHEST = 40.0  # m/s, of onsets
 FACTORS = np.geomspace(0.25, 1.6, 94)
 """s that are tried, 2 % apart."""
 
 
-class Target(StrEnum):
-    """What is fitted."""
+class Kind(StrEnum):
+    """What was measured."""
 
     FREQUENCY = "frequency"
-    STOP = "stop"
-    BOTH = "both"
+    """Of the flutter at a tunnel speed [Hz]."""
+    WAVE = "wave speed"
+    """Of the travelling wave at a tunnel speed [m/s]."""
+    AMPLITUDE = "amplitude"
+    """Largest first harmonic of the deflection, over the length, at a tunnel speed."""
+    STOP = "stop speed"
+    """Tunnel speed at which a sheet of a length stops fluttering [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Observed:
-    """Measurements of one group.
+class Condition:
+    """One measurement.
 
     Attributes:
-        speeds, frequencies: (clip,) of the tunnel [m/s], and of the flutter [Hz].
-        lengths, stops: (length,) [m], and the median tunnel speed at which flutter stops [m/s].
+        at: tunnel speed [m/s], or length of the sheet [m] for a stop speed.
+        low, high: its interval at 90 %, NaN where it has none.
     """
 
-    speeds: NDArray[np.float64]
-    frequencies: NDArray[np.float64]
-    lengths: NDArray[np.float64]
-    stops: NDArray[np.float64]
+    kind: Kind
+    at: float
+    value: float
+    low: float = math.nan
+    high: float = math.nan
 
 
-@dataclass(frozen=True, kw_only=True)
-class Model:
-    """A candidate of given strength, in s times the logged speed."""
+class Predictor(Protocol):
+    """A candidate over its loads."""
 
-    candidate: Candidate
-    strength: float
-    factor: float
+    @property
+    def loads(self) -> Sequence[Load]: ...
+
+    def predict(self, load: int, factor: float, condition: Condition) -> float:
+        """What the load at this index gives at `factor` times the tunnel's speed; NaN where it does not flutter."""
+        ...
 
 
 class LinearTable:
-    """Frequencies and onsets of a candidate over its strengths, by linear stability; computed once.
+    """Frequencies and onsets over loads, by linear stability; computed once.
 
     Args:
-        length: of the filmed sheet [m].
-        lengths: at which onsets will be asked for [m].
+        bare: the filmed sheet without air.
+        lengths: at which stop speeds will be asked for [m].
     """
 
-    def __init__(self, candidate: Candidate, *, bare: Sheet, density: float, lengths: Sequence[float]) -> None:
-        self.candidate = candidate
+    def __init__(self, loads: Sequence[Load], *, bare: Sheet, density: float, lengths: Sequence[float]) -> None:
+        self.loads = tuple(loads)
         self._bare = bare
         self._density = density
-        self._lengths = sorted(set(lengths))
-        grid = STRENGTHS[candidate].grid()
-        self.strengths = grid[:1] if candidate is Candidate.NONE else grid
+        self._lengths = np.array(sorted(set(lengths)))
 
-    def _sheet(self, strength: float, length: float) -> Sheet:
-        return loaded(self.candidate, strength, bare=self._bare, length=length, density=self._density)
+    def _sheets(self, length: float) -> list[Sheet]:
+        return [loaded(load, bare=self._bare, length=length, density=self._density) for load in self.loads]
 
     @cached_property
-    def _modes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(strength, speed) log frequency and growth of the filmed sheet."""
-        found = [
-            [leading(self._sheet(float(k), self._bare.length), float(u)) for u in _SPEEDS] for k in self.strengths
-        ]
-        least = 1e-3  # Hz: a mode that does not oscillate (divergence) has no frequency
-        frequency = np.array([[max(mode.frequency, least) for mode in row] for row in found])
-        return np.log(frequency), np.array([[mode.growth for mode in row] for row in found])
+    def _frequencies(self) -> NDArray[np.float64]:
+        """(load, speed) [Hz], NaN where no oscillation grows."""
+        found = np.full((len(self.loads), len(_SPEEDS)), np.nan)
+        for row, sheet in enumerate(self._sheets(self._bare.length)):
+            for column, speed in enumerate(_SPEEDS):
+                mode = leading(sheet, float(speed))
+                if mode.growth > 1e-3 and mode.frequency > 0:
+                    found[row, column] = mode.frequency
+        return found
 
     @cached_property
     def _onsets(self) -> NDArray[np.float64]:
-        """(strength, length) [m/s], NaN without."""
-        return np.array(
-            [[onset(self._sheet(float(k), length), highest=_HIGHEST) for length in self._lengths] for k in self.strengths]
-        )
+        """(load, length) [m/s], NaN without."""
+        columns = [[onset(sheet, highest=_HIGHEST) for sheet in self._sheets(float(h))] for h in self._lengths]
+        return np.array(columns).T
 
-    def frequency(self, strength: float, speed: float) -> tuple[float, bool]:
-        """[Hz] of the leading mode at a speed at the sheet, and whether it grows."""
-        row = int(np.abs(np.log(self.strengths / strength)).argmin())
-        logarithm, growth = self._modes
-        return (
-            float(np.exp(np.interp(speed, _SPEEDS, logarithm[row]))),
-            bool(np.interp(speed, _SPEEDS, growth[row]) > 1e-3),
-        )
+    def predict(self, load: int, factor: float, condition: Condition) -> float:
+        """As `Predictor.predict`.
 
-    def stop(self, strength: float, length: float) -> float:
-        """[m/s] at the sheet, NaN without."""
-        row = int(np.abs(np.log(self.strengths / strength)).argmin())
-        return float(self._onsets[row, int(np.abs(np.array(self._lengths) - length).argmin())])
-
-    def errors(self, model: Model, observed: Observed) -> Errors:
-        """Of the model's predictions."""
-        frequency = [self.frequency(model.strength, model.factor * u) for u in observed.speeds]
-        stops = np.array([self.stop(model.strength, length) for length in observed.lengths]) / model.factor
-        return Errors(
-            frequency=np.log([f for f, _ in frequency]) - np.log(observed.frequencies),
-            flutters=np.array([grows for _, grows in frequency], dtype=bool),
-            stop=np.where(np.isfinite(stops), np.log(stops / observed.stops), NEVER),
-            stops=np.isfinite(stops),
-        )
+        Raises:
+            UsageError: a kind that linear stability does not give, or a length that was not named.
+        """
+        if condition.kind is Kind.FREQUENCY:
+            return float(np.interp(factor * condition.at, _SPEEDS, self._frequencies[load], right=np.nan))
+        if condition.kind is Kind.STOP:
+            column = int(np.abs(self._lengths - condition.at).argmin())
+            if abs(self._lengths[column] - condition.at) < 1e-6:
+                return float(self._onsets[load, column]) / factor
+            raise UsageError(f"no onset at {condition.at:g} m", where="linear table", fix="name the length")
+        raise UsageError(f"no {condition.kind} in linear stability", where="linear table", fix="simulate in time")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Errors:
-    """Logarithms of predicted over measured.
+class Fitted:
+    """A load and a factor that were fitted, and the mean square errors of the kinds fitted to, summed."""
 
-    Attributes:
-        frequency, flutters: (clip,), and whether the model flutters there.
-        stop, stops: (length,), and whether it has a stop speed.
-    """
-
-    frequency: NDArray[np.float64]
-    flutters: NDArray[np.bool_]
-    stop: NDArray[np.float64]
-    stops: NDArray[np.bool_]
-
-    def loss(self, target: Target) -> float:
-        """Mean square."""
-        parts = {
-            Target.FREQUENCY: [(self.frequency**2).mean()],
-            Target.STOP: [(self.stop**2).mean()],
-            Target.BOTH: [(self.frequency**2).mean(), (self.stop**2).mean()],
-        }
-        return float(sum(parts[target]))
+    load: int
+    factor: float
+    loss: float
 
 
-def fit(table: LinearTable, shear: Shear, observed: Observed, target: Target) -> Model:
-    """The strength and, where it is free, the factor with the least loss on the grid of both."""
+def errors(predictor: Predictor, load: int, factor: float, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+    """(condition,) logarithms of predicted over measured; NEVER where there is no prediction."""
+    predicted = np.array([predictor.predict(load, factor, condition) for condition in conditions])
+    measured = np.array([condition.value for condition in conditions])
+    flutters = np.isfinite(predicted) & (predicted > 0)
+    return np.where(flutters, np.log(np.where(flutters, predicted, 1.0) / measured), NEVER)
+
+
+def fit(predictor: Predictor, shear: Shear, conditions: Sequence[Condition]) -> Fitted:
+    """The load and, where it is free, the factor with the least loss; each kind of condition weighs alike."""
     factors = FACTORS if shear is Shear.FREE else np.ones(1)
-    tried = [
-        Model(candidate=table.candidate, strength=float(k), factor=float(s)) for k in table.strengths for s in factors
-    ]
-    return min(tried, key=lambda model: table.errors(model, observed).loss(target))
+    kinds = [[c for c in conditions if c.kind is kind] for kind in Kind]
+
+    def loss(load: int, factor: float) -> float:
+        return float(sum((errors(predictor, load, factor, part) ** 2).mean() for part in kinds if part))
+
+    return min(
+        (Fitted(load=k, factor=float(s), loss=loss(k, float(s))) for k in range(len(predictor.loads)) for s in factors),
+        key=lambda fitted: fitted.loss,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Paired:
-    """Mean of |error before| − |error after| over the same conditions, and Student's interval at 90 %."""
+class Interval:
+    """A mean over conditions and Student's interval at 90 % about it; infinite for a single condition."""
 
     mean: float
     low: float
     high: float
     count: int
 
+    @classmethod
+    def of(cls, values: NDArray[np.float64]) -> Interval:
+        half = math.inf
+        if len(values) > 1:
+            half = float(stats.t.ppf(0.95, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+        mean = float(values.mean())
+        return cls(mean=mean, low=mean - half, high=mean + half, count=len(values))
 
-def paired(before: NDArray[np.float64], after: NDArray[np.float64]) -> Paired:
-    """How much smaller the errors became, condition by condition."""
-    gain = np.abs(before) - np.abs(after)
-    half = float(stats.t.ppf(0.95, len(gain) - 1) * gain.std(ddof=1) / math.sqrt(len(gain))) if len(gain) > 1 else math.inf
-    return Paired(mean=float(gain.mean()), low=float(gain.mean() - half), high=float(gain.mean() + half), count=len(gain))
+    def as_dict(self) -> dict[str, float | int | None]:
+        return {k: v if math.isfinite(v) else None for k, v in vars(self).items()}
+
+
+def paired(before: NDArray[np.float64], after: NDArray[np.float64]) -> Interval:
+    """How much smaller the errors became, condition by condition: |before| − |after|."""
+    return Interval.of(np.abs(before) - np.abs(after))

@@ -7,9 +7,9 @@ Per width, with mass m, flexural rigidity B (1 + d ∂t), length L and a stream 
 
 M is the air's mass of the reactive loading (`sim.effects.reactive_loading`), M₀ that of still-air inertia alone
 (`sim.effects.added_mass`), C the slope of the lift coefficient (`sim.effects.lift`), and τ = U (L − x) the tension by
-friction of coefficient c (`sim.effects.tangential_linear_drag`), which turns with the sheet: its load is −c U (L − x) w_xx.
-The base model's air, ρ |w_n| w_n, is of second order in the deflection and so has no part here: to first order the base
-model is a sheet in a vacuum, at every speed.
+friction of coefficient c (`sim.effects.tangential_linear_drag`), which turns with the sheet: its load is −c U (L − x)
+w_xx. The base model's air, ρ |w_n| w_n, is of second order in the deflection and so has no part here: to first order
+the base model is a sheet in a vacuum, at every speed.
 
 Solved by Galerkin's method on the sheet's modes in a vacuum; M only, it is the equation of a pipe that conveys fluid
 (Gregory and Païdoussis, Proc. R. Soc. A 293:512, 1966), and of a flag in Argentina and Mahadevan, PNAS 102:1829 (2005),
@@ -19,7 +19,9 @@ without their wake.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +75,10 @@ class Leading:
     frequency: float
 
 
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    return cast("float", brentq(function, low, high, xtol=1e-13))
+
+
 @functools.cache
 def _integrals() -> dict[str, NDArray[np.float64]]:
     """∫ f g dξ of the modes in a vacuum and their derivatives: (MODES, MODES) each, and the roots λ."""
@@ -80,9 +86,8 @@ def _integrals() -> dict[str, NDArray[np.float64]]:
     def characteristic(root: float) -> float:
         return float(np.cos(root) + 1 / np.cosh(root))
 
-    roots = np.array(
-        [brentq(characteristic, np.pi * (n + 0.5) - 0.4, np.pi * (n + 0.5) + 0.4, xtol=1e-14) for n in range(MODES)]
-    )[:, None]
+    middles = [np.pi * (n + 0.5) for n in range(MODES)]
+    roots = np.array([_root(characteristic, middle - 0.4, middle + 0.4) for middle in middles])[:, None]
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     xi, weight = (nodes + 1) / 2, weights / 2
     below = np.sinh(roots) + np.sin(roots)
@@ -100,7 +105,7 @@ def _integrals() -> dict[str, NDArray[np.float64]]:
         "01": (f * weight) @ f1.T,
         "02": (f * weight) @ f2.T,
         "02 (1 − ξ)": (f * weight * (1 - xi)) @ f2.T,
-        "22": np.diag(roots[:, 0] ** 4),
+        "22": np.diag(np.square(np.square(roots[:, 0]))),
     }
 
 
@@ -150,11 +155,6 @@ def onset(sheet: Sheet, *, highest: float, samples: int = 160) -> float:
         if growth(float(speed)) > 0:
             if growth(before) > 0:
                 return float(speed)
-            return float(brentq(growth, before, float(speed), rtol=1e-8))
+            return _root(growth, before, float(speed))
         before = float(speed)
     return float("nan")
-
-
-def with_length(sheet: Sheet, length: float, *, reactive_share: float, density: float) -> Sheet:
-    """The sheet at another length, the air's mass following it: M = share · ρ L."""
-    return replace(sheet, length=length, reactive_mass=reactive_share * density * length)

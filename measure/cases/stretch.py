@@ -2,8 +2,8 @@
 
 A sheet that is in view from its clamp to its tip has the same arc length in every frame, if rows and columns are given
 their true ratio. Where its tip is smeared away the seen line is too short, never too long: so the arc lengths of all
-frames pile up at their upper end, and the ratio is the one at which they pile up most sharply. The upper end itself is the
-sheet's length, and gives the scale.
+frames pile up at their upper end, and the ratio is the one at which they pile up most sharply. The upper end itself is
+the sheet's length, and gives the scale.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def _rows(path: Path, needed: set[str]) -> Iterator[tuple[int, dict[str, str]]]:
     reader = csv.DictReader(path.read_text(encoding="utf-8-sig").splitlines())
     absent = needed - set(reader.fieldnames or ())
     if absent:
-        raise InputError(f"no column {sorted(absent)[0]!r}", where=str(path), fix=f"give {', '.join(sorted(needed))}")
+        raise InputError(f"no column {min(absent)!r}", where=str(path), fix=f"give {', '.join(sorted(needed))}")
     yield from enumerate(reader, start=2)
 
 

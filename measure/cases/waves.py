@@ -2,8 +2,8 @@
 
 Heights y(x, t) are modelled, column by column, as m(x) + Re Σ_k a_k(x) exp(2πi k f t), fitted by least squares to what
 was seen; gaps are left out, not filled. The spectrum's residual, summed over columns, gives f. Intervals are Student's
-about blocks of whole cycles: each cycle has its own frequency (from the phase of the motion on the mean shape), amplitude
-and wave speed, and neighbouring cycles are joined to blocks since they resemble each other.
+about blocks of whole cycles: each cycle has its own frequency (from the phase of the motion on the mean shape),
+amplitude and wave speed, and neighbouring cycles are joined to blocks since they resemble each other.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def waves(
 def wave_speed(columns: NDArray[np.float64], profile: NDArray[np.complex128], frequency: float) -> float:
     """ω / (−d arg a / dx), the slope weighted with |a|²: columns where nothing moves say nothing."""
     phase = np.unwrap(np.angle(profile))
-    weight = np.abs(profile) ** 2
+    weight = profile.real**2 + profile.imag**2
     slope = _slope(columns, phase, weight)
     return float(-2 * np.pi * frequency / slope) if slope else math.inf
 
