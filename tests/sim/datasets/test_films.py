@@ -1,0 +1,80 @@
+"""Films: dealt evenly, shuffled, and each with streams of its own."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from flagdata.timebase import iso
+from sim.datasets.cast import Roll, casts
+from sim.datasets.films import Film, Sequences
+from sim.datasets.reading import load
+from sim.datasets.recipe import DatasetRecipe
+
+
+def films(recipe: DatasetRecipe, side: str) -> list[Film]:
+    rolls = [Roll(cast=cast) for cast in casts(recipe) if cast.side.name == side]
+    members = tuple((roll.cast, index, roll.id(index)) for roll in rolls for index in roll.chosen)
+    return list(Sequences(recipe=recipe, side=side, members=members).films())
+
+
+def test_sequences_are_filmed_equally_often_or_once_more() -> None:
+    recipe = load("flagsim")
+    for side, less, more in (("validation", 25, 26), ("test", 41, 42)):
+        often = Counter(Counter(film.sequence for film in films(recipe, side)).values())
+        assert set(often) == {less, more}
+        assert sum(times * count for times, count in often.items()) == recipe.side(side).renders
+
+
+def test_seeds_and_identities_are_all_different() -> None:
+    every = films(load("flagsim-small"), "train")
+    for distinct in ([f.seed for f in every], [f.name for f in every], [f.artifact(frames=60).id for f in every]):
+        assert len(set(distinct)) == len(every)
+
+
+def test_the_order_of_films_tells_nothing_of_their_sequences() -> None:
+    # In a random order neighbours share their sequence with probability (r - 1)/(n - 1) = 4/1499: 4 of 1499 expected.
+    sequences = [film.sequence for film in films(load("flagsim-small"), "train")]
+    together = sum(a == b for a, b in itertools.pairwise(sequences))
+    assert together <= 14  # 5 standard deviations of a Poisson count of mean 4
+
+
+def test_another_image_size_changes_no_seed(make: Callable[..., DatasetRecipe]) -> None:
+    small, large = films(make(), "train"), films(make({"width = 32": "width = 64"}), "train")
+    assert [f.seed for f in small] == [f.seed for f in large]
+    assert [f.sequence for f in small] == [f.sequence for f in large]
+    assert not {f.artifact(frames=30).id for f in small} & {f.artifact(frames=30).id for f in large}
+
+
+def test_sessions_keep_camera_and_day_and_no_day_is_on_two_sides() -> None:
+    recipe = load("field")
+    days: dict[str, set[str]] = {}
+    for side in ("train", "validation", "test"):
+        by_session: dict[str | None, list[Film]] = {}
+        for film in films(recipe, side):
+            by_session.setdefault(film.session, []).append(film)
+        assert len(by_session) == recipe.side(side).sessions
+        for own in by_session.values():
+            assert len({film.look for film in own}) == 1
+            assert len({iso(film.begin)[:10] for film in own}) == 1
+            begins = np.sort([film.begin for film in own])
+            length = recipe.simulation.time.total / recipe.simulation.time.rate
+            assert np.diff(begins).min() > length * 1e9
+        days[side] = {iso(film.begin)[:10] for own in by_session.values() for film in own}
+        assert len(days[side]) == len(by_session)
+    for one, other in itertools.combinations(days.values(), 2):
+        assert not one & other
+
+
+def test_a_sequence_that_fails_is_replaced_by_the_next_index(make: Callable[..., DatasetRecipe]) -> None:
+    roll = Roll(cast=next(casts(make())))
+    assert roll.chosen == [0, 1, 2, 3]
+    roll.failed[1] = "it crumpled"
+    assert roll.chosen == [0, 2, 3, 4]
+    assert roll.pending({roll.id(0), roll.id(2)}) == [3, 4]
+    other = Roll(cast=replace(roll.cast, simulation=replace(roll.cast.simulation, count=2)))
+    assert other.id(0) == roll.id(0)  # how many are wanted changes no sequence

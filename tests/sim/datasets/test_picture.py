@@ -1,0 +1,69 @@
+"""The camera behind the picture: noise of the stated size, files whose length tells nothing."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+import simplejpeg
+from PIL import Image
+
+from sim.datasets.picture import filled, jpegs, settings
+from sim.datasets.recipe import CameraSpec
+from sim.run.tables import Range
+
+EXACT = {"camera.jpeg_quality": 100.0, "camera.read_noise": 0.0, "camera.shot_noise": 0.0}
+
+
+def decoded(jpeg: bytes) -> np.ndarray:
+    return simplejpeg.decode_jpeg(jpeg, colorspace="GRAY")[..., 0]
+
+
+def test_a_filled_jpeg_is_the_same_picture_for_two_decoders() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (40, 60), dtype=np.uint8)
+    plain = simplejpeg.encode_jpeg(image[..., None], quality=80, colorspace="GRAY")
+    for slot in (1, 2, 4096, 65536, len(plain)):
+        long = filled(plain, slot)
+        assert len(long) % slot == 0
+        assert 0 <= len(long) - len(plain) < slot
+        np.testing.assert_array_equal(decoded(long), decoded(plain))
+        np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(long))), decoded(plain))
+
+
+def test_gray_is_rec_601_luma() -> None:
+    # Y = 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601), within the half step of rounding and one of the JPEG.
+    frames = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [200, 100, 50]], dtype=np.uint8)
+    shown = np.broadcast_to(frames[:, None, None, :], (4, 16, 16, 3))
+    grays = [decoded(jpeg) for jpeg in jpegs(shown, EXACT, slot=1, seed=0)]
+    for gray, (r, g, b) in zip(grays, frames.astype(float), strict=True):
+        assert np.abs(gray - (0.299 * r + 0.587 * g + 0.114 * b)).max() <= 1.5
+
+
+@pytest.mark.parametrize(("level", "variance"), [(64, 4 + 9 * 64 / 255), (192, 4 + 9 * 192 / 255)])
+def test_noise_has_the_variance_of_reading_and_light(level: int, variance: float) -> None:
+    frames = np.full((1, 256, 256, 3), level, dtype=np.uint8)
+    drawn = {**EXACT, "camera.read_noise": 2.0, "camera.shot_noise": 3.0}
+    (jpeg,) = jpegs(frames, drawn, slot=1, seed=3)
+    # 1/12 of rounding and about as much of the JPEG at quality 100; 65,536 pixels: 0.6 % of the variance is one σ.
+    assert decoded(jpeg).astype(float).var() == pytest.approx(variance + 1 / 12, rel=0.05)
+
+
+def test_frames_have_noise_of_their_own_and_the_same_seed_the_same_bytes() -> None:
+    frames = np.full((2, 32, 32, 3), 128, dtype=np.uint8)
+    drawn = {**EXACT, "camera.read_noise": 2.0}
+    first, second = jpegs(frames, drawn, slot=1, seed=3)
+    assert first != second
+    assert [first, second] == list(jpegs(frames, drawn, slot=1, seed=3))
+    assert first != next(jpegs(frames, drawn, slot=1, seed=4))
+
+
+def test_each_setting_has_a_stream_of_its_own() -> None:
+    spec = CameraSpec(
+        jpeg_quality=Range(low=70, high=90), read_noise=Range(low=0, high=2), shot_noise=1.0, frame_slot=1
+    )
+    fixed = CameraSpec(jpeg_quality=80, read_noise=Range(low=0, high=2), shot_noise=1.0, frame_slot=1)
+    assert settings(spec, seed=5)["camera.read_noise"] == settings(fixed, seed=5)["camera.read_noise"]
+    drawn = [settings(spec, seed=seed)["camera.jpeg_quality"] for seed in range(40)]
+    assert all(70 <= value <= 90 and value == round(value) for value in drawn)
+    assert len(set(drawn)) > 10

@@ -1,0 +1,110 @@
+"""Recipes of data sets: those of the catalog, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from sim.datasets.cast import casts
+from sim.datasets.reading import load, names, parse, with_renderer
+from sim.datasets.recipe import DatasetRecipe, Truth
+from sim.run.tables import Range, ends
+
+Make = Callable[..., DatasetRecipe]
+
+
+def test_flagsim_has_the_papers_counts_size_and_search_space() -> None:
+    # Runia et al. 2020, section "FlagSim Dataset" and table of the search space.
+    recipe = load("flagsim")
+    assert [(s.name, s.sequences, s.renders) for s in recipe.sides] == [
+        ("train", 1000, 14000), ("validation", 150, 3800), ("test", 85, 3500),
+    ]  # fmt: skip
+    time, wind, material = recipe.simulation.time, recipe.simulation.wind, recipe.simulation.material
+    assert (time.frames, time.rate) == (60, 25.0)
+    assert ends(wind.speed) == (0.0, 10.0)
+    assert material.density == Range(low=0.10, high=0.17)
+    assert ends(material.bending_each) == (0.1, 10.0)
+    assert ends(recipe.prior.quantities["width"]) == ends(recipe.prior.quantities["height"]) == (300, 300)
+
+
+def test_clothsim_draws_from_all_ten_measured_cloths() -> None:
+    assert len(load("clothsim").simulation.material.bases) == 10
+
+
+@pytest.mark.parametrize("name", names())
+def test_recipes_of_the_catalog_are_complete_and_no_seed_is_on_two_sides(name: str) -> None:
+    recipe = load(name)
+    assert recipe.licence
+    seeds = [cast.simulation.seed for cast in casts(recipe)]
+    assert len(set(seeds)) == len(seeds)
+    counts: dict[str, int] = {}
+    for cast in casts(recipe):
+        counts[cast.side.name] = counts.get(cast.side.name, 0) + cast.simulation.count
+    assert counts == {side.name: side.sequences for side in recipe.sides}
+
+
+def test_a_field_campaign_has_one_flag_a_session_and_believes_its_anemometer() -> None:
+    recipe = load("field")
+    assert recipe.anemometer.truth is Truth.MEASURED
+    drawn = [cast.simulation for cast in casts(recipe)]
+    assert len(drawn) == 14
+    for simulation in drawn:
+        assert len(simulation.material.bases) == 1
+        assert not isinstance(simulation.material.bending, Range)
+        low, high = ends(simulation.wind.speed)
+        assert high / low == pytest.approx(1.25 / 0.75)
+    assert len({simulation.material.bases[0].density for simulation in drawn}) == 14
+
+
+def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_changes_it(make: Make) -> None:
+    base = make().hash
+    assert make({"A tiny data set": "Another title"}).hash == base
+    for old, new in (
+        ("seed = 1", "seed = 2"),
+        ("renders = 11", "renders = 12"),
+        ("read-noise = 1.0", "read-noise = 2.0"),
+    ):
+        assert make({old: new}).hash != base
+    assert make({"jpeg-quality = { low = 70,": "jpeg-quality = { low = 71,"}).hash != base
+    assert make(scene={"columns = 6": "columns = 7"}).hash != base
+    assert with_renderer(make(), "cycles").hash != base
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "says"),
+    [
+        ('licence = "CC0-1.0"', "", InputError, "licence"),
+        ("renders = 11", "renders = 3", InputError, "renders"),
+        ("[sides.test]", "[sides.tset]", UnknownNameError, "did you mean 'test'"),
+        ('prior = "flags"', 'prior = "flag"', UnknownNameError, "did you mean 'flags'"),
+        ('prior = "flags"', "", InputError, "prior"),
+        ("noise = 0.1", "nose = 0.1", UnknownNameError, "did you mean 'noise'"),
+        ("anemometer-gain", "clock-drift", UnknownNameError, "effect of an anemometer"),
+        ("gain = { low = 0.95,", "gain = { low = -0.95,", InputError, "gain"),
+        ("jpeg-quality = { low = 70, high = 90 }", "jpeg-quality = 101", InputError, "jpeg-quality"),
+        ('scene = "scene.toml"', 'scene = "absent.toml"', NotFoundError, "no such recipe file"),
+        ("noise = 0.1", 'noise = 0.1\ntruth = "measured"\nbefore = 30.0', UsageError, "30 s of wind"),
+        ("width = 32", 'width = 32\nrenderer = "povray"', UnknownNameError, "renderer"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_data_set_is_refused(make: Make, old: str, new: str, error: type[Exception], says: str) -> None:
+    with pytest.raises(error, match=says):
+        make({old: new})
+
+
+def test_gusts_whose_minute_before_is_not_simulated_cannot_be_measured(make: Make) -> None:
+    gusty = {"[time]": "[effects.gusts]\nintensity = 0.2\n[time]"}
+    assert make(scene=gusty).anemometer.truth is Truth.STATED
+    with pytest.raises(UsageError, match="settle for 60 s"):
+        make({"noise = 0.1": 'noise = 0.1\ntruth = "measured"'}, scene=gusty)
+
+
+def test_an_unknown_recipe_is_answered_with_the_nearest(tmp_path) -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'flagsim'"):
+        load("flagsin")
+    with pytest.raises(NotFoundError):
+        load(str(tmp_path / "none.toml"))
+    with pytest.raises(InputError, match="not TOML"):
+        parse("title = ", name="x", folder=tmp_path, where="x.toml")
