@@ -6,27 +6,18 @@ edges, horizons), so that nothing about a scene can be told from what is behind 
 
 from __future__ import annotations
 
-import colorsys
 from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.assets.colour import Hue, hue
 from sim.assets.noise import Picture, Plane, defocused, fractal, over, ridge, smoothstep
 from sim.assets.seeded import Seeded
 
 _ROWS, _COLUMNS = 400, 512  # px
 _HEIGHT: Plane = np.linspace(1.0, 0.0, _ROWS)[:, None] * np.ones((1, _COLUMNS))  # 1 at the upper edge
 _X: Plane = np.linspace(0.0, _COLUMNS / _ROWS, _COLUMNS)[None, :] * np.ones((_ROWS, 1))
-
-
-Band = tuple[float, float]
-Hue = tuple[Band, Band, Band]
-
-
-def _hue(rng: np.random.Generator, hue: Band, saturation: Band, brightness: Band) -> NDArray[np.float64]:
-    """A colour (3,) with its hue [turn], saturation and brightness uniform in ranges."""
-    return np.array(colorsys.hsv_to_rgb(rng.uniform(*hue), rng.uniform(*saturation), rng.uniform(*brightness)))
 
 
 # Weather → (hue, saturation, brightness) at the zenith and at the horizon.
@@ -50,7 +41,7 @@ def _weather(rng: np.random.Generator) -> Picture:
     """A sky from zenith to horizon, with clouds of some cover, or fog, or dusk."""
     kind = rng.choice(["clear", "clouds", "overcast", "dusk"], p=[0.2, 0.4, 0.25, 0.15])
     above, below = _SKIES[kind]
-    zenith, horizon = _hue(rng, *above), _hue(rng, *below)
+    zenith, horizon = hue(rng, *above), hue(rng, *below)
     sky = over(np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6))
     if kind == "clear":
         return sky
@@ -58,14 +49,14 @@ def _weather(rng: np.random.Generator) -> Picture:
     form = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(1.4, 2.0), stretch=stretch)
     cover, edge = (rng.uniform(-1.3, 0.9), rng.uniform(0.2, 1.5)) if kind != "overcast" else (-3.0, 3.0)
     lit = rng.uniform(0.75, 1.05) - rng.uniform(0.05, 0.2) * np.roll(form, -int(rng.integers(4, 14)), axis=0)
-    tint = _hue(rng, (0.0, 1.0), (0.0, 0.08), (0.85, 1.0)) if kind != "dusk" else horizon
+    tint = hue(rng, (0.0, 1.0), (0.0, 0.08), (0.85, 1.0)) if kind != "dusk" else horizon
     cloud = np.clip(lit, 0.25, 1.1)[:, :, None] * tint
     return over(sky, cloud, smoothstep(cover, cover + edge, form) * rng.uniform(0.6, 1.0))
 
 
 def _ground(rng: np.random.Generator) -> Picture:
     """Grass, sand, asphalt, water or snow, with features that shrink towards the horizon."""
-    colour = _hue(rng, *_GROUNDS[int(rng.integers(len(_GROUNDS)))])
+    colour = hue(rng, *_GROUNDS[int(rng.integers(len(_GROUNDS)))])
     coarse = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.9, 1.5), stretch=rng.uniform(2.0, 6.0))
     fine = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.3, 0.8), stretch=rng.uniform(1.0, 4.0))
     light = 1 + rng.uniform(0.05, 0.25) * coarse + rng.uniform(0.03, 0.15) * fine
@@ -85,7 +76,7 @@ def _hills(rng: np.random.Generator) -> Picture:
         line = horizon * (1 - 0.75 * (layer / layers)) + rng.uniform(0.01, 0.08) * ridge(
             rng, _COLUMNS, slope=rng.uniform(0.9, 1.8)
         )
-        colour = _hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (0.3 + 0.7 * near) + haze * 0.7 * (1 - near)
+        colour = hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (0.3 + 0.7 * near) + haze * 0.7 * (1 - near)
         grain = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.4, 1.2))
         body = (1 + 0.18 * near * grain)[:, :, None] * colour
         picture = over(picture, body, smoothstep(-0.004, 0.004, line - _HEIGHT))
@@ -107,14 +98,14 @@ def _tree(rng: np.random.Generator, picture: Picture, season: tuple[float, float
     """A crown of leaves on a trunk, lit from above, in front of a picture."""
     x, z, size = rng.uniform(-0.1, 1.4), rng.uniform(floor + 0.15, 0.9), rng.uniform(0.15, 0.45)
     trunk = (np.abs(_X - x - 0.02 * np.sin(8 * _HEIGHT)) < 0.05 * size + 0.03 * size * (z - _HEIGHT)) & (z > _HEIGHT)
-    bark = _hue(rng, (0.04, 0.12), (0.1, 0.5), (0.1, 0.4))
+    bark = hue(rng, (0.04, 0.12), (0.1, 0.5), (0.1, 0.4))
     picture = over(picture, bark, (trunk & (floor - 0.05 < _HEIGHT)).astype(np.float64))
     rough = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.8, 1.2))
     leaves = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.2, 0.6))
     reach = np.hypot((_X - x) / size, (_HEIGHT - z) / (size * rng.uniform(0.7, 1.5)))
     crown = smoothstep(-0.05, 0.05, 1 - reach + 0.22 * rough + 0.1 * leaves)
     light = np.clip(0.75 + 0.35 * (_HEIGHT - z) / size + 0.2 * rough + 0.22 * leaves, 0.1, 1.6)
-    return over(picture, light[:, :, None] * _hue(rng, season, (0.3, 0.8), (0.25, 0.6)), crown)
+    return over(picture, light[:, :, None] * hue(rng, season, (0.3, 0.8), (0.25, 0.6)), crown)
 
 
 def _buildings(rng: np.random.Generator) -> Picture:
@@ -136,7 +127,7 @@ def _house(rng: np.random.Generator, picture: Picture, far: float, haze: NDArray
     if last <= first or highest >= _ROWS:
         return picture
     x, height = _X[part], _HEIGHT[part]
-    wall = _hue(rng, *_WALLS[int(rng.random() < 0.3)])
+    wall = hue(rng, *_WALLS[int(rng.random() < 0.3)])
     storey, bay = rng.uniform(0.03, 0.1), rng.uniform(0.025, 0.1)
     row, column = np.floor((top - height) / storey), np.floor((x - left) / bay)
     down, along = (top - height) / storey - row, (x - left) / bay - column
@@ -144,7 +135,7 @@ def _house(rng: np.random.Generator, picture: Picture, far: float, haze: NDArray
     pane = (np.abs(down - 0.5) < high / 2) & (np.abs(along - 0.5) < wide / 2)
     states = rng.uniform(0.0, 1.0, (64, 64))[row.astype(np.int64) % 64, column.astype(np.int64) % 64]
     glass = over(
-        np.broadcast_to(_hue(rng, (0.5, 0.65), (0.05, 0.4), (0.1, 0.5)), (*x.shape, 3)),
+        np.broadcast_to(hue(rng, (0.5, 0.65), (0.05, 0.4), (0.1, 0.5)), (*x.shape, 3)),
         haze, 0.8 * smoothstep(0.55, 0.95, states),
     )  # fmt: skip
     shade = 1 + 0.05 * fractal(rng, *x.shape, slope=rng.uniform(0.5, 1.2)) if min(x.shape) > 1 else np.ones(x.shape)

@@ -1,18 +1,20 @@
-"""Procedural textures of cloth."""
+"""Procedural textures of cloth: plain weave, stripes, checks, prints, all with the unevenness of yarns."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.assets.colour import hue
 from sim.assets.noise import fractal
 from sim.assets.seeded import Seeded
 
 _SIZE = 512  # px
 
 
-def _colour(rng: np.random.Generator) -> NDArray[np.float64]:
-    return rng.uniform(0.05, 0.95, 3)
+def _dyes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """(count, 3) colours, from undyed to bright."""
+    return np.array([hue(rng, (0.0, 1.0), (0.0, 0.8), (0.15, 0.95)) for _ in range(count)])
 
 
 def _yarn(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -25,7 +27,7 @@ def _yarn(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _weave(rng: np.random.Generator) -> NDArray[np.float64]:
-    return _colour(rng) * _yarn(rng)
+    return _dyes(rng, 1)[0] * _yarn(rng)
 
 
 def _bands(rng: np.random.Generator) -> NDArray[np.int64]:
@@ -38,19 +40,18 @@ def _bands(rng: np.random.Generator) -> NDArray[np.int64]:
 
 
 def _stripes(rng: np.random.Generator) -> NDArray[np.float64]:
-    colours = rng.uniform(0.05, 0.95, (8, 3))
-    bands = colours[_bands(rng)]
+    bands = _dyes(rng, 8)[_bands(rng)]
     upright = rng.random() < 0.5
     return (bands[None, :] if upright else bands[:, None]) * _yarn(rng)
 
 
 def _checks(rng: np.random.Generator) -> NDArray[np.float64]:
-    warp, weft = rng.uniform(0.05, 0.95, (2, 8, 3))
+    warp, weft = _dyes(rng, 8), _dyes(rng, 8)
     return (warp[_bands(rng)][None, :] + weft[_bands(rng)][:, None]) / 2 * _yarn(rng)
 
 
 def _print(rng: np.random.Generator) -> NDArray[np.float64]:
-    colours = rng.uniform(0.05, 0.95, (4, 3))
+    colours = _dyes(rng, 4)
     image = np.broadcast_to(colours[0], (_SIZE, _SIZE, 3)).copy()
     x, y = np.meshgrid(np.arange(_SIZE), np.arange(_SIZE))
     for _ in range(int(rng.integers(8, 60))):

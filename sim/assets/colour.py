@@ -1,9 +1,21 @@
-"""sRGB (IEC 61966-2-1) as numbers in [0, 1], encoded and linear."""
+"""sRGB (IEC 61966-2-1) as numbers in [0, 1], encoded and linear, and colours drawn at random."""
 
 from __future__ import annotations
 
+import colorsys
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+Band: TypeAlias = tuple[float, float]
+Hue: TypeAlias = tuple[Band, Band, Band]
+"""Ranges of hue [turn], saturation and brightness."""
+
+
+def hue(rng: np.random.Generator, turn: Band, saturation: Band, brightness: Band) -> NDArray[np.float64]:
+    """(3,) encoded values of a colour, uniform in ranges of hue [turn], saturation and brightness."""
+    return np.array(colorsys.hsv_to_rgb(rng.uniform(*turn), rng.uniform(*saturation), rng.uniform(*brightness)))
 
 
 def of_hex(text: str) -> NDArray[np.float64]:
