@@ -6,7 +6,7 @@
   const control = (name) => player.querySelector(`[data-control="${name}"]`);
   const [play, choice, frame, turn, factor, speed] =
     ["play", "recording", "frame", "turn", "factor", "speed"].map(control);
-  const { elevation, half, gap, missing, reach: steps } = recordings.view;
+  const { elevation, half, gap, filled, missing, reach: steps } = recordings.view;
   const stage = player.querySelector(".stage");
   const still = window.matchMedia("(prefers-reduced-motion: reduce)");
   let shown, playing = false, began = 0;
@@ -32,7 +32,7 @@
   function wires(number, enlarged, centreX, centreY) {
     const angle = Number(turn.value) * Math.PI / 180;
     const [ca, sa, ce, se] = [Math.cos(angle), Math.sin(angle), Math.cos(elevation), Math.sin(elevation)];
-    const scale = half * 0.94 / shown.radius;
+    const scale = half * filled / shown.radius;
     const start = 3 * shown.markers * Number(frame.value);
     const places = [];
     for (let m = 0; m < shown.markers; m++) {

@@ -29,6 +29,10 @@ _VISIBLE = 0.12  # of the cloth's size: what the largest errors are enlarged to
 FACTORS = (1, 2, 5, 10, 20, 50, 100)
 ELEVATION = math.pi / 9
 _HALF = 150.0  # of a panel
+_GAP = 10.0
+_FILLED = 0.86  # of a panel, by the observed cloth; the rest is for errors
+VIEW = {"elevation": ELEVATION, "half": _HALF, "gap": _GAP, "filled": _FILLED, "missing": MISSING, "reach": _REACH}
+"""What the player has to know of the projection and of the packing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,17 +125,17 @@ def still(shown: Motion) -> Markup:
     panels = [("base model", "before", shown.before)]
     if shown.after is not None:
         panels.append(("with the effect", "after", shown.after))
-    scale = _HALF * 0.94 / _radius(shown.observed)
+    scale = _HALF * _FILLED / _radius(shown.observed)
     parts = []
     for number, (heading, kind, predicted) in enumerate(panels):
         enlarged = shown.observed[0] + shown.factor * (predicted[0] - shown.observed[0])
-        centre = (_HALF * (2 * number + 1) + 10 * number, _HALF + 22)
+        centre = (_HALF * (2 * number + 1) + _GAP * number, _HALF + 22)
         parts.append(
             f'<text class="label" x="{centre[0] - _HALF + 8:g}" y="14">{heading}</text>'
             f'<path class="mesh observed" d="{_wires(shown.observed[0], shown, scale, centre)}"/>'
             f'<path class="mesh {kind}" d="{_wires(enlarged, shown, scale, centre)}"/>'
         )
-    width = 2 * _HALF * len(panels) + 10 * (len(panels) - 1)
+    width = 2 * _HALF * len(panels) + _GAP * (len(panels) - 1)
     return drawing(
         width, 2 * _HALF + 26, "Observed cloth and predictions", f"a frame of {shown.recording}", "".join(parts)
     )
@@ -185,7 +189,7 @@ def _enlargement(observed: NDArray[np.float64], predicted: NDArray[np.float64]) 
 
 
 def _array(frames: Sequence[Sequence[Sequence[float]]]) -> NDArray[np.float64]:
-    return np.asarray(frames, dtype=np.float64).reshape(-1, len(frames[0]) if len(frames) else 0, 3)
+    return np.asarray(frames, dtype=np.float64).reshape(len(frames), len(frames[0]) if frames else 0, 3)
 
 
 def _spread(count: int, most: int) -> NDArray[np.int64]:

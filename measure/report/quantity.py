@@ -75,7 +75,7 @@ def probability(value: float | None) -> str:
 
 
 def estimate_text(estimate: Estimate | None, *, shown: Display | None = None) -> str:
-    """`6.2 [5.7, 6.8] m/s`, without the level, which a table's caption or `with_level` states."""
+    """`6.2 m/s [5.7, 6.8]`, without the level, which a table's caption or `with_level` states."""
     if estimate is None or not known(estimate):
         return NONE
     inside = shown or display((estimate.value, estimate.low, estimate.high), estimate.unit)
@@ -84,21 +84,22 @@ def estimate_text(estimate: Estimate | None, *, shown: Display | None = None) ->
     if math.isnan(half):
         return f"{number(value)}{inside.suffix}"
     if not 0 < half < math.inf:
-        return f"{number(value)} [{number(low)}, {number(high)}]{inside.suffix}"
+        return f"{number(value)}{inside.suffix} [{number(low)}, {number(high)}]"
     place = decimals(half)
     largest = max(abs(value), abs(low), abs(high))
-    if _NARROWEST <= largest < _WIDEST and place <= 6:
-        return f"{_fixed(value, place)} [{_fixed(low, place)}, {_fixed(high, place)}]{inside.suffix}"
-    exponent = math.floor(math.log10(largest))
-    value, low, high = (v / 10.0**exponent for v in (value, low, high))
-    place += exponent
-    ends = f"{_fixed(value, place)} [{_fixed(low, place)}, {_fixed(high, place)}]"
-    return f"{ends} × {_power(exponent)}{inside.suffix}"
+    power = ""
+    if not (_NARROWEST <= largest < _WIDEST):
+        exponent = math.floor(math.log10(largest))
+        value, low, high = (v / 10.0**exponent for v in (value, low, high))
+        place += exponent
+        power = f" × {_power(exponent)}"
+    ends = f"[{_fixed(low, place)}{power}, {_fixed(high, place)}{power}]"
+    return f"{_fixed(value, place)}{power}{inside.suffix} {ends}"
 
 
 def with_level(estimate: Estimate) -> str:
-    """`6.2 [5.7, 6.8] m/s (90 %)`."""
-    return f"{estimate_text(estimate)} ({level_text(estimate.level)})"
+    """`6.2 m/s [5.7, 6.8] 90 %`."""
+    return f"{estimate_text(estimate)} {level_text(estimate.level)}" if known(estimate) else NONE
 
 
 def level_text(level: float) -> str:

@@ -1,0 +1,166 @@
+"""The report of closing the loop as one page: HTML that refers to no other file and needs no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2.utils import htmlsafe_json_dumps
+from markupsafe import Markup, escape
+
+from measure.loop.verdict import Conclusion, Estimate, Residual, Verdict
+from measure.pages.render import render
+from measure.report import cloth, figures, motion, quantity, rows, sentences
+
+_TONES = {
+    Conclusion.SUFFICIENT: "settled",
+    Conclusion.EFFECT: "settled",
+    Conclusion.ONE_OF: "open",
+    Conclusion.PARTLY: "open",
+    Conclusion.OUTSIDE: "missed",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualView:
+    """One recording's charts."""
+
+    residual: Residual
+    sizes: list[tuple[str, Markup]]
+    means: list[tuple[str, Markup]]
+    time: Markup
+    spectrum: Markup
+
+
+def write_page(verdict: Verdict, path: Path) -> None:
+    """Write the report of `verdict` to `path`."""
+    path.write_text(page(verdict), encoding="utf-8")
+
+
+def page(verdict: Verdict) -> str:
+    """The report of `verdict`, HTML."""
+    errors = rows.errors_scale(verdict.comparisons)
+    gains = rows.gain_scale(verdict.ranking)
+    motions = [m for m in map(motion.motion, verdict.residuals) if m is not None]
+    values = {
+        "verdict": verdict,
+        "tone": _TONES[verdict.conclusion],
+        "heading": sentences.heading(verdict),
+        "test_sentence": sentences.test_sentence(verdict.test),
+        "remark": sentences.test_remark(verdict.test),
+        "p_interval": sentences.p_interval(verdict.test),
+        "named": sentences.named_candidates(verdict),
+        "rejected": sentences.rejected(verdict),
+        "warnings": sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict),
+        "after_label": sentences.after_label(verdict),
+        "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
+        "has_oracle": any(quantity.known(c.oracle) for c in verdict.comparisons),
+        "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
+        "has_shift": any(quantity.known(p.after) for p in verdict.parameters),
+        "residual_after": any(r.in_time_after for r in verdict.residuals),
+        "level": sentences.common_level(verdict.comparisons),
+        "lengths": _lengths(verdict),
+        "errors_row": lambda comparison: rows.errors_row(comparison, errors),
+        "gain_row": lambda c: rows.gain_row(c, gains, "after" if c.effect in verdict.named else "single"),
+        "strength_row": rows.strength_row,
+        "null": figures.null_distribution(verdict.test),
+        "against_wind": figures.against_wind(verdict.residuals),
+        **_residuals(verdict.residuals),
+        **_motions(motions),
+        "provenance": list(_flattened(verdict.provenance)),
+    }
+    return render("measure.report", "page.html.j2", values, filters=_FILTERS)
+
+
+def _lengths(verdict: Verdict) -> quantity.Display:
+    """Millimetres or metres for all errors of the table."""
+    shown = [e for c in verdict.comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
+    return quantity.display([e.value for e in shown], "m")
+
+
+def _residuals(residuals: tuple[Residual, ...]) -> dict[str, Any]:
+    size, mean = cloth.size_shade(residuals), cloth.mean_shade(residuals)
+    return {
+        "residuals": [
+            ResidualView(
+                residual=r,
+                sizes=cloth.size_maps(r, size),
+                means=cloth.mean_maps(r, mean),
+                time=figures.in_time(r),
+                spectrum=figures.in_frequency(r),
+            )
+            for r in residuals
+        ],
+        "size_bar": cloth.colour_bar(size, "root mean square error"),
+        "mean_bar": cloth.colour_bar(mean, "mean error"),
+    }
+
+
+def _motions(motions: list[motion.Motion]) -> dict[str, Any]:
+    """The player's data, unseen recordings first."""
+    ordered = sorted(motions, key=lambda m: not m.held_out)
+    stills = [motion.still(m) for m in ordered]
+    data = {
+        "view": motion.VIEW,
+        "list": [{**m.as_dict(), "still": str(still)} for m, still in zip(ordered, stills, strict=True)],
+    }
+    return {
+        "motions": ordered,
+        "still": stills[0] if stills else "",
+        "factors": motion.FACTORS,
+        "motion_data": htmlsafe_json_dumps(data, allow_nan=False, separators=(",", ":")),
+    }
+
+
+def _flattened(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:
+    """(dotted name, value) of nested provenance."""
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+
+def _data(value: float | None, text: str) -> Markup:
+    """A number as people read it, with the number as it is for programs."""
+    return Markup(f'<span class="none">{text}</span>') if text == quantity.NONE else Markup(
+        f'<data value="{value!r}">{escape(text)}</data>'
+    )  # fmt: skip
+
+
+def _estimate(estimate: Estimate | None, shown: quantity.Display | None = None) -> Markup:
+    return _data(estimate.value if estimate else None, quantity.estimate_text(estimate, shown=shown))
+
+
+def _full(estimate: Estimate) -> Markup:
+    return _data(estimate.value, quantity.with_level(estimate))
+
+
+def _number(value: float | None, digits: int = 3) -> Markup:
+    return _data(value, quantity.number(value, digits=digits))
+
+
+def _count(value: int) -> Markup:
+    return _data(value, str(value))
+
+
+def _probability(value: float | None) -> Markup:
+    return _data(value, quantity.probability(value))
+
+
+def _with_error(value: float, error: float) -> Markup:
+    return _data(value, quantity.with_error(value, error))
+
+
+_FILTERS = {
+    "estimate": _estimate,
+    "full": _full,
+    "number": _number,
+    "count": _count,
+    "probability": _probability,
+    "with_error": _with_error,
+    "known": quantity.known,
+}

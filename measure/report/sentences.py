@@ -1,0 +1,122 @@
+"""What every form of the report says in the same words: the conclusion, the test, what the columns mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from scipy.stats import binomtest
+
+from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from measure.report.quantity import known, level_text, number, probability
+
+_LEVEL = 0.9
+
+
+def heading(verdict: Verdict) -> str:
+    """The conclusion in one line."""
+    named = listed(verdict.named)
+    partly = f"the base model lacked {named}, and something more" if verdict.named else "something is still missing"
+    return {
+        Conclusion.SUFFICIENT: "No effect needed: the base model explains these recordings",
+        Conclusion.EFFECT: f"The base model lacked {named}",
+        Conclusion.ONE_OF: f"The base model lacked one of {named}: these recordings cannot tell which",
+        Conclusion.PARTLY: f"Partly explained: {partly}",
+        Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
+    }[verdict.conclusion]
+
+
+def listed(names: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "an unnamed effect"
+
+
+def after_label(verdict: Verdict) -> str:
+    """What the columns "after" are of."""
+    if verdict.conclusion is Conclusion.SUFFICIENT:
+        return "with an effect"
+    if not verdict.named:
+        return "with the corrective field"
+    if verdict.conclusion is Conclusion.ONE_OF:
+        return f"with the best of {listed(verdict.named)}"
+    return f"with {listed(verdict.named)}"
+
+
+def test_sentence(test: NullTest) -> str:
+    """The global test with its p-value, the interval that the number of nulls leaves it, and what it says."""
+    null = [v for v in test.null if math.isfinite(v)]
+    says = "is rejected" if test.p_value <= test.level else "is not rejected"
+    spread = p_interval(test)
+    interval = f" [{probability(spread.low)}, {probability(spread.high)}] {level_text(_LEVEL)}" if spread else ""
+    return (
+        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {number(test.level, digits=2)}. "
+        f"{as_large(test)} of {len(null)} nulls reach the observed statistic {number(test.statistic)}."
+    )
+
+
+def test_remark(test: NullTest) -> str:
+    """What limits the test; empty where nothing does."""
+    count = sum(map(math.isfinite, test.null))
+    least = 1 / (1 + count)
+    if least > test.level:
+        return (
+            f"With {count} nulls no p-value below {probability(least)} is possible: it could not have rejected at "
+            f"level {number(test.level, digits=2)}."
+        )
+    if test.p_value > test.level:
+        return "An effect too weak for these recordings to show may still be there."
+    return ""
+
+
+def as_large(test: NullTest) -> int:
+    """How many nulls are at least as large as the observed statistic."""
+    return sum(1 for v in test.null if math.isfinite(v) and v >= test.statistic)
+
+
+def p_interval(test: NullTest) -> Estimate | None:
+    """Clopper–Pearson interval of the chance that a null is at least as large; None without nulls."""
+    count = sum(map(math.isfinite, test.null))
+    if not count:
+        return None
+    interval = binomtest(as_large(test), count).proportion_ci(_LEVEL, method="exact")
+    return Estimate(
+        value=test.p_value, low=float(interval.low), high=float(interval.high), unit="1", level=_LEVEL
+    )  # fmt: skip
+
+
+def control_warnings(verdict: Verdict) -> list[str]:
+    """Where the wrong effect helps as much as the named one, the attribution fails: one sentence each."""
+    return [
+        f"On {c.what} the control {c.control_name} does as well as the named effect: the attribution fails there."
+        for c in verdict.comparisons
+        if c.control is not None and known(c.control) and known(c.after) and c.control.value <= c.after.value
+    ]
+
+
+def reduction_warnings(verdict: Verdict) -> list[str]:
+    """Where the effect changed nothing that can be told from zero, or nothing was to be gained: one sentence each."""
+    found = []
+    for c in verdict.comparisons:
+        if not known(c.after):
+            continue
+        if c.share is None and known(c.floor):
+            found.append(f"On {c.what} the base model errs no more than the numerical floor: nothing was to be gained.")
+        elif known(c.reduction) and c.reduction.low <= 0:
+            found.append(f"On {c.what} the reduction cannot be told from zero.")
+    return found
+
+
+def named_candidates(verdict: Verdict) -> list[Candidate]:
+    """The candidates that the verdict names, in its order."""
+    return [c for name in verdict.named for c in verdict.ranking if c.effect == name]
+
+
+def rejected(verdict: Verdict) -> list[Candidate]:
+    """The candidates that it does not name."""
+    return [c for c in verdict.ranking if c.effect not in verdict.named]
+
+
+def common_level(comparisons: Sequence[Comparison]) -> str:
+    """The level of all intervals, where it is one."""
+    levels = {e.level for c in comparisons for e in (c.before, c.after, c.reduction, c.floor)}
+    return level_text(levels.pop()) if len(levels) == 1 else "mixed levels"
