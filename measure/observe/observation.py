@@ -1,0 +1,144 @@
+"""One recording as it came: tracked points, z up, in metres, and what its own description says of the cloth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding
+from measure.observe.trajectory import Floats, WindTrack
+from sim.air import AirForce
+from sim.material import Material
+
+
+class Up(StrEnum):
+    """The axis of a recording that points away from the ground."""
+
+    Z = "z"
+    Y = "y"
+    X = "x"
+    MINUS_Z = "-z"
+    MINUS_Y = "-y"
+    MINUS_X = "-x"
+
+
+# Rotations that bring each axis to +z; for ±y about x, for ±x about y, for −z about x.
+_TURNS: Mapping[Up, tuple[tuple[int, int, int], ...]] = {
+    Up.Z: ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    Up.Y: ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    Up.X: ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
+    Up.MINUS_Z: ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    Up.MINUS_Y: ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    Up.MINUS_X: ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Known:
+    """What a recording's own description says of the cloth; None where it is silent.
+
+    Attributes:
+        material: of the cloth.
+        pins: (pin, 2) where it is held, in rest coordinates [m].
+        stiffness: of each attachment on each axis [N/m].
+        gravity: (x, y, z) [m/s²].
+        air: the wind's force.
+        wind: beside it.
+    """
+
+    material: Material | None = None
+    pins: Floats | None = None
+    stiffness: float | None = None
+    gravity: tuple[float, float, float] | None = None
+    air: AirForce | None = None
+    wind: WindTrack | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observation:
+    """Tracked points, before they are checked.
+
+    Attributes:
+        name: what reports call it.
+        markers: (marker, 2) rest coordinates [m].
+        positions: (frame, marker, 3) [m], z up; NaN where a point was not tracked.
+        times: (frame,) [s], from 0.
+        faces: (face, 3) of the markers, where they are a mesh's vertices.
+        outline: (corner, 2) of the cloth in rest coordinates [m], where it is known.
+        wind: beside it; None for that of `known`.
+        noise: standard deviation of a coordinate [m]; None to estimate it.
+        source: identity of the artifact it was read from; empty where there is none.
+        known: from its description.
+        findings: of reading it.
+
+    Raises:
+        InputError: shapes that disagree, or times that are not finite or do not increase.
+    """
+
+    name: str
+    markers: Floats
+    positions: Floats
+    times: Floats
+    faces: NDArray[np.int64] | None = None
+    outline: Floats | None = None
+    wind: WindTrack | None = None
+    noise: float | None = None
+    source: str = ""
+    known: Known = field(default_factory=Known)
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = f"recording {self.name!r}"
+        markers, frames = np.shape(self.markers), np.shape(self.times)
+        if len(markers) != 2 or markers[1] != 2 or np.shape(self.positions) != (*frames, markers[0], 3):
+            raise InputError(
+                f"{frames} times and markers of shape {markers} with positions of shape {np.shape(self.positions)}",
+                where=where, fix="give (frame,), (marker, 2) and (frame, marker, 3)",
+            )  # fmt: skip
+        if not np.isfinite(self.times).all() or (np.diff(self.times) <= 0).any():
+            raise InputError("its times do not increase", where=where, fix="sort the frames by time, each once")
+
+    def turned(self, up: Up) -> Observation:
+        """This recording, whose `up` axis pointed up, with z up; its wind and gravity are turned along."""
+        if up is Up.Z:
+            return self
+        turn = np.array(_TURNS[up], dtype=np.float64)
+        gravity, wind = self.known.gravity, self.known.wind
+        known = replace(
+            self.known,
+            gravity=None if gravity is None else tuple((turn @ np.array(gravity)).tolist()),
+            wind=None if wind is None else WindTrack(times=wind.times, velocity=wind.velocity @ turn.T),
+        )
+        own = None if self.wind is None else WindTrack(times=self.wind.times, velocity=self.wind.velocity @ turn.T)
+        return replace(self, positions=self.positions @ turn.T, known=known, wind=own)
+
+
+def from_arrays(
+    *,
+    name: str,
+    positions: Floats,
+    rest: Floats,
+    rate: float,
+    faces: NDArray[np.int64] | None = None,
+    wind: WindTrack | None = None,
+    noise: float | None = None,
+    known: Known | None = None,
+) -> Observation:
+    """A recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker, 2) [m], z up.
+
+    Raises:
+        InputError: shapes that disagree, or a rate that is not positive.
+    """
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"a rate of {rate!r} frames a second", where=f"recording {name!r}", fix="give Hz")
+    positions = np.asarray(positions, dtype=np.float64)
+    return Observation(
+        name=name, markers=np.asarray(rest, dtype=np.float64), positions=positions,
+        times=np.arange(len(positions)) / rate, wind=wind, noise=noise, known=known or Known(),
+        faces=None if faces is None else np.asarray(faces, dtype=np.int64),
+    )  # fmt: skip

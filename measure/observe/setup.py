@@ -1,0 +1,80 @@
+"""What the user says of the cloth and its surroundings, beside the recordings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from measure.observe.cloth import VERTICES
+from sim.air import AirForce
+from sim.material import Material
+
+
+class Hold(StrEnum):
+    """Attachments with a name. u runs from the hoist to the fly, v from the bottom to the top."""
+
+    HOIST_CORNERS = "hoist-corners"
+    """The two ends of the hoist: smallest u, smallest and largest v."""
+    TOP_CORNERS = "top-corners"
+    """The two ends of the top edge: largest v, smallest and largest u."""
+    HOIST = "hoist"
+    """All of the hoist."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setup:
+    """What is given of an experiment. None leaves a value to the recordings' own description.
+
+    Attributes:
+        material: nominal.
+        outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
+        pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
+        stiffness: of each attachment on each axis [N/m]; infinite for rigid.
+        gravity: magnitude [m/s²]; it acts along −z.
+        air: the base model's force.
+        vertices: of the model mesh, about.
+
+    Raises:
+        InputError: values that make no sense.
+    """
+
+    material: Material | None = None
+    outline: NDArray[np.float64] | None = None
+    pins: Hold | tuple[tuple[float, float], ...] | None = None
+    stiffness: float | None = None
+    gravity: float | None = None
+    air: AirForce | None = None
+    vertices: int = VERTICES
+
+    def __post_init__(self) -> None:
+        if self.outline is not None and (np.ndim(self.outline) != 2 or np.shape(self.outline)[1:] != (2,)):
+            raise self._wrong(f"an outline of shape {np.shape(self.outline)}", "give (corner, 2) in metres")
+        if self.outline is not None and (len(self.outline) < 3 or not np.isfinite(self.outline).all()):
+            raise self._wrong("an outline of fewer than three finite corners", "list its corners in order")
+        if isinstance(self.pins, tuple) and not (self.pins and np.isfinite(self.pins).all()):
+            raise self._wrong(f"pins {self.pins!r}", "give a name, or finite (u, v) in metres")
+        if self.stiffness is not None and not self.stiffness > 0:
+            raise self._wrong(f"a stiffness of {self.stiffness!r}", "give N/m, or infinity for rigid pins")
+        if self.gravity is not None and not (math.isfinite(self.gravity) and self.gravity >= 0):
+            raise self._wrong(f"a gravity of {self.gravity!r}", "give m/s², downward")
+        if self.vertices < 16:
+            raise self._wrong(f"a model mesh of {self.vertices} vertices", "ask for at least 16")
+
+    def _wrong(self, what: str, fix: str) -> InputError:
+        return InputError(what, where="setup", fix=fix)
+
+
+def sheet(width: float, height: float) -> NDArray[np.float64]:
+    """The outline of a rectangle from (0, 0) to (width, height) [m].
+
+    Raises:
+        InputError: a size that is not positive.
+    """
+    if not (0 < width < math.inf and 0 < height < math.inf):
+        raise InputError(f"a cloth of {width} m × {height} m", where="setup", fix="give positive sizes in metres")
+    return np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
