@@ -1,0 +1,192 @@
+"""The folder of a challenge.
+
+challenge.json            title, versions, and of every set the hashes of its data and of its sealed key
+sets/set-001/set.json     what a user would know: cloth, pins, rate, noise, wind beside each recording
+sets/set-001/*.npy        markers.npy (marker, 2) [m]; a.npy, b.npy, … (frame, marker, 3) [m] float32
+sealed/set-001.json       key and salt; seed.json
+verdicts/set-001.json     as filed, with set-001.sha256
+opened.json               once the keys were opened: hashes of the verdicts that were filed before
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import ConflictError, CorruptError, InputError, NotFoundError, UnknownNameError
+from flagdata.provenance import canonical, digest, file_hash
+from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
+from sim import handles as held
+from sim.material import named
+from sim.mesh import grid
+
+Floats = NDArray[np.float64]
+_EPOCH = 1_600_000_000  # of every file of a set: when it was written would tell what was simulated with it
+MODEL_COLUMNS, MODEL_ROWS = 15, 10
+"""Cells of the participant's mesh: 176 vertices."""
+
+
+@dataclass(frozen=True)
+class ChallengeFolder:
+    """Paths of a challenge, and reading what is public of it.
+
+    Attributes:
+        path: of the folder.
+    """
+
+    path: Path
+
+    def data(self, name: str) -> Path:
+        """Folder of a set."""
+        return self.path / "sets" / name
+
+    def sealed(self, name: str) -> Path:
+        """File with a set's key."""
+        return self.path / "sealed" / f"{name}.json"
+
+    def verdict(self, name: str) -> Path:
+        """File of a set's verdict."""
+        return self.path / "verdicts" / f"{name}.json"
+
+    def verdict_hash(self, name: str) -> Path:
+        """File with its hash."""
+        return self.path / "verdicts" / f"{name}.sha256"
+
+    @property
+    def public(self) -> Path:
+        return self.path / "challenge.json"
+
+    @property
+    def opened(self) -> Path:
+        return self.path / "opened.json"
+
+    def manifest(self) -> dict[str, Any]:
+        """What was published.
+
+        Raises:
+            NotFoundError: no challenge there.
+        """
+        if not self.public.is_file():
+            raise NotFoundError(
+                "no challenge.json",
+                where=str(self.path),
+                fix="check the path, or make one: `flagdata challenge make`",
+            )
+        return json.loads(self.public.read_text(encoding="utf-8"))
+
+    def names(self) -> list[str]:
+        """Of the sets, sorted."""
+        return sorted(self.manifest()["sets"])
+
+    def chosen(self, only: tuple[str, ...]) -> list[str]:
+        """All sets, or those of these names.
+
+        Raises:
+            UnknownNameError: one is not there.
+        """
+        names = self.names()
+        for name in only:
+            if name not in names:
+                raise UnknownNameError.of("set", name, names, where=str(self.path))
+        return [name for name in names if not only or name in only]
+
+    def checked(self, name: str) -> None:
+        """Make sure that a set's data are those that were published.
+
+        Raises:
+            CorruptError: they are not.
+        """
+        if data_hash(self.data(name)) != self.manifest()["sets"][name]["data"]:
+            raise CorruptError(
+                "the data are not those that were published", where=str(self.data(name)),
+                fix="restore the folder as it was made",
+            )  # fmt: skip
+
+    def experiment(self, name: str) -> Experiment:
+        """A set as what it is to be judged by.
+
+        Raises:
+            CorruptError: its data were changed.
+        """
+        self.checked(name)
+        return read_set(self.data(name))
+
+
+def data_hash(folder: Path) -> str:
+    """Over the names and the bytes of the files of a set."""
+    return digest(canonical({path.name: file_hash(path) for path in sorted(folder.iterdir())}))
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> str:
+    """Write canonical JSON so that a reader sees all of it or nothing; its SHA-256."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = canonical(content) + "\n"
+    partial = path.with_suffix(path.suffix + ".part")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+    return digest(text)
+
+
+def fresh(path: Path) -> ChallengeFolder:
+    """An empty folder for a new challenge.
+
+    Raises:
+        ConflictError: something is there.
+    """
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise ConflictError("the folder is not empty", where=str(path), fix="name one that is not there yet")
+    path.mkdir(parents=True, exist_ok=True)
+    return ChallengeFolder(path)
+
+
+def write_set(
+    folder: Path, *, about: Mapping[str, Any], markers: Floats, positions: Mapping[str, NDArray[np.float32]]
+) -> str:
+    """Write a set's files, all with one time of change; the hash over them."""
+    folder.mkdir(parents=True)
+    write_json(folder / "set.json", about)
+    np.save(folder / "markers.npy", markers)
+    for name, track in positions.items():
+        np.save(folder / f"{name}.npy", track)
+    for path in (*folder.iterdir(), folder):
+        os.utime(path, (_EPOCH, _EPOCH))
+    return data_hash(folder)
+
+
+def read_set(folder: Path) -> Experiment:
+    """A set's recordings with what is known beside them.
+
+    Raises:
+        NotFoundError: no set there.
+        InputError: files that do not fit.
+    """
+    if not (folder / "set.json").is_file():
+        raise NotFoundError("no set.json", where=str(folder), fix="name the folder of a set")
+    try:
+        about = json.loads((folder / "set.json").read_text(encoding="utf-8"))
+        flag = about["flag"]
+        mesh = grid(width=flag["width"], height=flag["height"], columns=MODEL_COLUMNS, rows=MODEL_ROWS)
+        markers = np.load(folder / "markers.npy")
+        specimen = Specimen(
+            mesh=mesh, material=named(flag["material"]), held=held.corners(mesh.rest), anchors=np.array(flag["pins"]),
+            stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]),
+        )  # fmt: skip
+        recordings = tuple(
+            Trajectory(
+                name=entry["name"], markers=markers,
+                positions=np.load(folder / f"{entry['name']}.npy").astype(np.float64),
+                rate=about["rate"], noise=about["noise"],
+                wind=WindTrack(times=np.array(entry["wind"]["times"]), velocity=np.array(entry["wind"]["velocity"])),
+            )
+            for entry in about["recordings"]
+        )  # fmt: skip
+    except (KeyError, ValueError, OSError) as error:
+        raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
+    return Experiment(specimen=specimen, recordings=recordings)

@@ -1,0 +1,119 @@
+"""Makes a challenge: draws the keys, simulates, writes what a user would have, and publishes hashes of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.provenance import code_version
+from flagdata.rng import stream
+from measure.challenge import folder as files
+from measure.challenge.design import draw
+from measure.challenge.flight import Flight, batches, fly
+from measure.challenge.folder import ChallengeFolder
+from measure.challenge.key import Key, seal
+from measure.challenge.meshes import layout, seen
+from measure.challenge.recipe import ChallengeRecipe
+from sim.handles import ARCSIM_STIFFNESS
+from sim.scene import GRAVITY
+
+_NAMES = "abcdefghijklmnopqrstuvwxyz"
+_AROUND = 2.0  # m: how far from the origin a pole stands
+
+
+def make(
+    path: Path,
+    recipe: ChallengeRecipe,
+    *,
+    seed: int,
+    count: int,
+    workers: int = 1,
+    progress: Callable[[int], object] | None = None,
+) -> ChallengeFolder:
+    """A challenge in a new folder; the same recipe and seed give the same bytes on one machine.
+
+    Args:
+        count: of sets.
+        workers: batches that are simulated at a time, each in a process of its own.
+        progress: called with the number of sets that were written.
+
+    Raises:
+        ConflictError: the folder is not empty.
+        FlagdataError: a flag diverged.
+    """
+    target = files.fresh(path)
+    keys = draw(recipe, seed=seed, count=count)
+    entries: dict[str, Any] = {}
+
+    def write(flights: dict[str, Flight]) -> None:
+        by_name = {key.name: key for key in keys}
+        for name, flight in flights.items():
+            entries[name] = _write(target, recipe, seed, replace(by_name[name], impact=flight.impact), flight)
+        if progress is not None:
+            progress(len(flights))
+
+    groups = batches(keys, recipe.count)
+    if workers == 1:
+        for group in groups:
+            write(fly(recipe, seed, group))
+    else:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
+            for done in as_completed([pool.submit(fly, recipe, seed, group) for group in groups]):
+                write(done.result())
+    files.write_json(target.path / "sealed" / "seed.json", {"seed": seed, "title": recipe.title, "sets": count})
+    files.write_json(
+        target.public,
+        {
+            "schema": "flagdata.challenge/1", "title": recipe.title, "code_version": code_version(),
+            "sets": {name: entries[name] for name in sorted(entries)},
+        },
+    )  # fmt: skip
+    return target
+
+
+def single_threaded() -> None:
+    """Of a worker: one thread, since there are as many workers as cores."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key, flight: Flight) -> dict[str, str]:
+    markers = layout(recipe, stream(seed, key.name, "markers"))
+    weights = seen(recipe.numerics[key.numerics], markers, width=recipe.width, height=recipe.height)
+    place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), 2.0)
+    names = _NAMES[: recipe.count]
+    positions: dict[str, NDArray[np.float32]] = {}
+    for index, (name, track) in enumerate(zip(names, flight.positions, strict=True)):
+        tracked = np.einsum("mv,fvx->fmx", weights, track.astype(np.float64)) + place
+        noise = stream(seed, key.name, "noise", index).normal(0.0, 1.0, tracked.shape)
+        positions[name] = (tracked + key.noise * noise).astype(np.float32)
+    pins = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, recipe.height]]) + place
+    about = {
+        "schema": "flagdata.challenge-set/1",
+        "flag": {
+            "material": key.material, "width": recipe.width, "height": recipe.height, "pins": pins.tolist(),
+            "pin_stiffness": ARCSIM_STIFFNESS, "gravity": list(GRAVITY),
+        },
+        "rate": key.rate,
+        "noise": key.noise,
+        "recordings": [
+            {"name": name, "wind": _log(recipe, wind)} for name, wind in zip(names, flight.winds, strict=True)
+        ],
+    }  # fmt: skip
+    data = files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
+    salt = stream(seed, key.name, "salt").bytes(32).hex()
+    files.write_json(target.sealed(key.name), {"key": key.as_dict(), "salt": salt})
+    return {"data": data, "commitment": seal(key, salt)}
+
+
+def _log(recipe: ChallengeRecipe, wind: NDArray[np.float64]) -> dict[str, Any]:
+    times = np.arange(len(wind)) / recipe.log_rate
+    return {"times": times.tolist(), "velocity": wind.tolist()}

@@ -1,0 +1,260 @@
+"""What a challenge consists of, as TOML (`catalogs/challenges`). Parsed here and nowhere else; unknown keys refused.
+
+All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "log" }`.
+
+    title
+    [composition]     null, one, pair, outside: shares of the sets
+    [flag]            width, height, materials: names; density, bending: ranges of factors on the nominal material
+    [recordings]      count, duration, settle, apart [m/s]; rates, noises: dealt out evenly; speed: a range
+    [log]             share: of the sets whose wind varies; rate; intensity: a range; length: integral scale
+    [markers]         columns, rows; jitter: as a share of the spacing
+    [numerics.NAME]   columns, rows, diagonals, integrator, step, thickness: of contact, none where it is 0; damping
+    [effects.NAME]    parameter, range, negative: share of the sets with the other sign; an effect of the library
+    [outside.NAME]    the same, of `measure.challenge.outside`
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.resources import files
+from math import lcm
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import InputError, NotFoundError, UnknownNameError
+from flagdata.registry import Registry
+from sim import material
+from sim.run.tables import Range, Table
+
+
+class Kind(StrEnum):
+    """What is undeclared in a set."""
+
+    NULL = "null"
+    ONE = "one"
+    PAIR = "pair"
+    OUTSIDE = "outside"
+
+
+class Diagonals(StrEnum):
+    """How the cells of a mesh are cut in two."""
+
+    ALTERNATE = "alternate"
+    FORWARD = "forward"
+
+
+class Method(StrEnum):
+    """Of integration."""
+
+    SYMPLECTIC = "symplectic"
+    IMPLICIT = "implicit"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numerics:
+    """What the generator computes with.
+
+    Attributes:
+        columns, rows: cells of the mesh.
+        diagonals: of them.
+        integrator: with steps of `step` [s], or as long as is stable where that is 0.
+        thickness: of contact [m]; 0 for none.
+        damping: of the cloths it takes [s].
+    """
+
+    columns: int
+    rows: int
+    diagonals: Diagonals
+    integrator: Method
+    step: float
+    thickness: float
+    damping: Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strengths:
+    """Of one effect.
+
+    Attributes:
+        parameter: which strength is drawn; everything else stays at its usual value.
+        range: of its magnitude.
+        negative: share of the sets in which it is negative.
+    """
+
+    parameter: str
+    range: Range
+    negative: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChallengeRecipe:
+    """A challenge before its keys are drawn; attributes as in the module's description."""
+
+    title: str
+    composition: dict[Kind, float]
+    width: float
+    height: float
+    materials: tuple[str, ...]
+    density: Range
+    bending: Range
+    count: int
+    duration: float
+    settle: float
+    rates: tuple[int, ...]
+    noises: tuple[float, ...]
+    speed: Range
+    apart: float
+    varying: float
+    log_rate: int
+    intensity: Range
+    length: float
+    marker_columns: int
+    marker_rows: int
+    jitter: float
+    numerics: dict[str, Numerics]
+    effects: dict[str, Strengths]
+    outside: dict[str, Strengths]
+
+    def __post_init__(self) -> None:
+        if not self.materials or not self.rates or not self.noises or not self.numerics:
+            raise InputError(
+                "materials, rates, noises or numerics are missing", where=self.title, fix="give at least one of each"
+            )
+        if (self.count - 1) * self.apart > self.speed.high - self.speed.low:
+            raise InputError(
+                f"{self.count} speeds {self.apart:g} m/s apart do not fit between {self.speed.low:g} and "
+                f"{self.speed.high:g} m/s",
+                where=self.title, fix="widen the range, or bring them nearer",
+            )  # fmt: skip
+        needed = {Kind.ONE: (self.effects, 1), Kind.PAIR: (self.effects, 2), Kind.OUTSIDE: (self.outside, 1)}
+        for kind, (table, least) in needed.items():
+            if self.composition[kind] > 0 and len(table) < least:
+                raise InputError(f"too few effects for sets of kind {kind.value}", where=self.title, fix="add some")
+        if not sum(self.composition.values()) > 0:
+            raise InputError("every share is zero", where=self.title, fix="give a share above 0")
+
+    @property
+    def ticks(self) -> int:
+        """A second: every frame of every rate and every sample of the log is on one [Hz]."""
+        return lcm(self.log_rate, *self.rates)
+
+
+def names() -> list[str]:
+    """Recipes of the catalog, sorted."""
+    folder = files("catalogs") / "challenges"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load(source: str) -> ChallengeRecipe:
+    """The recipe of that name in the catalog, or of a `.toml` file.
+
+    Raises:
+        NotFoundError: no such file.
+        UnknownNameError, InputError: see `parse`.
+    """
+    path = Path(source)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
+        return parse(path.read_text(encoding="utf-8"), where=source)
+    if source not in names():
+        raise UnknownNameError.of("challenge", source, names())
+    text = (files("catalogs") / "challenges" / f"{source}.toml").read_text(encoding="utf-8")
+    return parse(text, where=f"challenge {source}")
+
+
+def parse(text: str, *, where: str) -> ChallengeRecipe:
+    """A recipe from its text.
+
+    Raises:
+        UnknownNameError: a key, material, effect or parameter that is not known.
+        InputError: a value that does not fit.
+    """
+    from measure.challenge.outside import OUTSIDE
+    from sim.effects import EFFECTS
+
+    try:
+        top = Table(tomllib.loads(text), where=where)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    shares, flag, run = top.table("composition"), top.table("flag"), top.table("recordings")
+    log, markers, numerics = top.table("log"), top.table("markers"), top.table("numerics")
+    materials = flag.texts("materials")
+    for name in materials:
+        if name not in material.names():
+            raise UnknownNameError.of("material", name, material.names(), where=flag.where)
+    recipe = ChallengeRecipe(
+        title=top.text("title", where) or where,
+        composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},
+        width=flag.number("width", 1.5, above=0), height=flag.number("height", 1.0, above=0),
+        materials=materials,
+        density=_range(flag, "density", 1.0), bending=_range(flag, "bending", 1.0),
+        count=run.whole("count", 3, least=1), duration=run.number("duration", 10.0, above=0),
+        settle=run.number("settle", 4.0, above=0),
+        rates=tuple(_whole(run, "rates", rate) for rate in run.numbers("rates")), noises=run.numbers("noises"),
+        speed=_range(run, "speed", 5.0), apart=run.number("apart", 0.0, least=0),
+        varying=log.number("share", 0.0, least=0), log_rate=log.whole("rate", 10, least=1),
+        intensity=_range(log, "intensity", 0.1), length=log.number("length", 40.0, above=0),
+        marker_columns=markers.whole("columns", 17, least=4), marker_rows=markers.whole("rows", 11, least=4),
+        jitter=markers.number("jitter", 0.0, least=0),
+        numerics={name: _numerics(numerics.table(name)) for name in numerics.names()},
+        effects=_strengths(top.table("effects"), EFFECTS), outside=_strengths(top.table("outside"), OUTSIDE),
+    )  # fmt: skip
+    for table in (top, shares, flag, run, log, markers, numerics):
+        table.done()
+    return recipe
+
+
+def _range(table: Table, key: str, default: float) -> Range:
+    value = table.quantity(key, default, above=0)
+    return value if isinstance(value, Range) else Range(low=value, high=value)
+
+
+def _whole(table: Table, key: str, value: float) -> int:
+    if value < 1 or value != int(value):
+        raise InputError(f"{key} has {value!r}", where=table.where, fix="give whole numbers of at least 1")
+    return int(value)
+
+
+def _numerics(table: Table) -> Numerics:
+    found = Numerics(
+        columns=table.whole("columns", 20, least=3), rows=table.whole("rows", 14, least=3),
+        diagonals=table.choice("diagonals", Diagonals.ALTERNATE),
+        integrator=table.choice("integrator", Method.SYMPLECTIC),
+        step=table.number("step", 0.0, least=0), thickness=table.number("thickness", 0.0, least=0),
+        damping=_range(table, "damping", 1e-3),
+    )  # fmt: skip
+    table.done()
+    if found.integrator is Method.IMPLICIT and not found.step:
+        raise InputError("the implicit integrator without a step", where=table.where, fix="give step in seconds")
+    if found.integrator is Method.SYMPLECTIC and found.step:
+        raise InputError(
+            "a step for the symplectic integrator", where=table.where, fix="leave it out: the stable one is taken"
+        )
+    return found
+
+
+def _strengths(table: Table, known: Registry) -> dict[str, Strengths]:
+    found: dict[str, Strengths] = {}
+    for name in table.names():
+        inner = table.table(name)
+        strengths: tuple[str, ...] = known[name].strengths()
+        parameter = inner.text("parameter", strengths[0]) or strengths[0]
+        if parameter not in strengths:
+            raise UnknownNameError.of("strength", parameter, strengths, where=inner.where)
+        found[name] = Strengths(
+            parameter=parameter, range=_range(inner, "range", 1.0),
+            negative=inner.number("negative", 0.0, least=0),
+        )  # fmt: skip
+        inner.done()
+    return found
+
+
+def effect_type(name: str) -> Any:
+    """The class of an effect, of the library or outside it."""
+    from measure.challenge.outside import OUTSIDE
+    from sim.effects import EFFECTS
+
+    return EFFECTS[name] if name in EFFECTS else OUTSIDE[name]
