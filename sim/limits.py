@@ -3,8 +3,11 @@
 After every step each face is mapped back to the nearest deformation whose principal stretches lie within the limits:
 F* = F V diag(σ*/σ) Vᵀ with FᵀF = V diag(σ²) Vᵀ, its centroid kept. A vertex moves by the mean of what its faces ask
 for, weighted by their areas, which keeps the momentum; its velocity changes by the move over the step, as in ArcSim
-(Narain, Samii, O'Brien 2012; Wang, O'Brien, Ramamoorthi 2010). One such sweep a step does not reach the limits exactly:
-under a steady pull the excess is what one step of it adds, which falls with the square of the step.
+(Narain, Samii, O'Brien 2012; Wang, O'Brien, Ramamoorthi 2010). What the handles hold stays where it is, as there: else
+the cloth would drag its handles along. One such sweep a step does not reach the limits exactly: under a steady pull the
+excess is what one step of it adds, which falls with the square of the step. Long steps take many sweeps, which from the
+ninth on are accelerated by Chebyshev's recurrence (Wang 2015, ACM Trans. Graph. 34:246): 50 of them do as much as
+several hundred without it.
 """
 
 from __future__ import annotations
@@ -17,6 +20,12 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from sim.cloth import Cloth, gather_sum
+
+PLAIN_SWEEPS = 8
+"""Sweeps before the acceleration sets in."""
+SPECTRAL_RADIUS = 0.995
+"""Of the sweeps, as the acceleration takes it. Tried on a flag of 30 columns with limits of 5 %: 0.97, 0.99 and 0.995
+leave the largest stretch of 50 sweeps at 1.14, 1.11 and 1.09, plain sweeps at 1.32."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,8 +95,21 @@ def correction(cloth: Cloth, limits: StrainLimits, position: Tensor) -> Tensor:
 def limited(
     cloth: Cloth, limits: StrainLimits, position: Tensor, velocity: Tensor, step: float, free: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Positions and velocities after a step [s]; `free` (vertex, 1, 1) is 0 for what is held rigidly, else 1."""
-    for _ in range(limits.sweeps):
-        move = free * correction(cloth, limits, position)
-        position, velocity = position + move, velocity + move / step
+    """Positions and velocities after a step [s]; `free` (vertex, 1, 1) is 0 for what the handles hold, else 1."""
+    before = position
+    for weight in chebyshev_weights(limits.sweeps):
+        after = position + free * correction(cloth, limits, position)
+        if weight > 1:
+            after = before + weight * (after - before)
+        velocity = velocity + (after - position) / step
+        before, position = position, after
     return position, velocity
+
+
+def chebyshev_weights(sweeps: int) -> list[float]:
+    """ω of each sweep: 1, then 2/(2 − ρ²), then 4/(4 − ρ² ω) of the one before."""
+    weights = [1.0] * min(sweeps, PLAIN_SWEEPS)
+    square = SPECTRAL_RADIUS**2
+    while len(weights) < sweeps:
+        weights.append(2 / (2 - square) if len(weights) == PLAIN_SWEEPS else 4 / (4 - square * weights[-1]))
+    return weights

@@ -173,11 +173,16 @@ class System:
             free[self.held] = 0
         return free
 
+    @cached_property
+    def loose(self) -> Tensor:
+        """(vertex, 1, 1): 0 for what the handles hold, rigidly or by springs, 1 for all others."""
+        return torch.ones_like(self.cloth.mass[:, :1]).unsqueeze(-1).index_fill(0, self.held, 0.0)
+
     def limited(self, position: Tensor, velocity: Tensor, step: float) -> tuple[Tensor, Tensor]:
         """Positions and velocities after a step [s], brought within the strain limits."""
         if self.limits is None:
             return position, velocity
-        return limited(self.cloth, self.limits, position, velocity, step, self.free)
+        return limited(self.cloth, self.limits, position, velocity, step, self.loose)
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
         """The force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch) [N]."""

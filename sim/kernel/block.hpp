@@ -67,6 +67,7 @@ struct Problem {
   contact::Settings<T> contact;
   double lowest, highest;  // strain limits
   int64_t sweeps;          // corrections a step; 0: no limits
+  const T* sweep_weights;  // (sweeps) of Chebyshev's recurrence, 1 for a plain sweep
   const T* arms;           // (faces, 3, 2)
   const T* vertex_areas;   // (vertices)
   // One block's share of each of the following is contiguous, lanes innermost.
@@ -147,6 +148,7 @@ class Block {
   T step_ = 0;            // of the time, where steps follow one another
   std::vector<T> built_;  // positions at each lane's last search
   std::vector<T> normals_;
+  std::vector<T> before_;  // positions one sweep of the limits ago
 
  public:
   Block(const Problem<T>& problem, int64_t block, int64_t count)
@@ -412,8 +414,9 @@ class Block {
     if (p.contact.thickness > 0) contacts(x, v, f);
   }
 
-  // One sweep of the strain limits; `moves` is scratch.
-  void limit(T* x, T* v, T step, T* moves) const {
+  // One sweep of the strain limits, with Chebyshev's weight where that is above 1; `moves` is scratch, `before` the
+  // positions one sweep ago where that is weighted.
+  void limit(T* x, T* v, T step, T* moves, T weight, T* before) const {
     const V low = splat(T(p.lowest)), high = splat(T(p.highest)), tiny = splat(std::numeric_limits<T>::min());
     std::memset(moves, 0, sizeof(T) * p.vertices * 3 * L);
     for (int64_t e = 0; e < p.faces; ++e) {
@@ -440,15 +443,28 @@ class Block {
       for (int k = 0; k < 3; ++k)
         add3(moves + at[k], combine(du, splat(share * arm[2 * k]), dv, splat(share * arm[2 * k + 1])));
     }
-    const T* inverse = p.inverse_mass + b * p.vertices * L;
+    for (int64_t h = 0; h < p.held; ++h) std::memset(moves + 3 * L * int64_t(p.held_vertex[h]), 0, sizeof(T) * 3 * L);
     for (int64_t i = 0; i < p.vertices; ++i) {
-      const T weight = inverse[i * L] == 0 ? T(0) : 1 / p.vertex_areas[i];
+      const T inverse_area = 1 / p.vertex_areas[i];
       for (int64_t k = 3 * L * i; k < 3 * L * (i + 1); k += L) {
-        const V move = load(moves + k) * weight;
+        V move = load(moves + k) * inverse_area;
+        if (before) {
+          const V at = load(x + k), last = load(before + k);
+          if (weight > 1) move = last + weight * (at + move - last) - at;
+          store(before + k, at);
+        }
         store(x + k, load(x + k) + move);
         store(v + k, load(v + k) + move / step);
       }
     }
+  }
+
+  // All sweeps of a step.
+  void limit(T* x, T* v, T step, T* moves) {
+    const bool accelerated = p.sweeps > 0 && p.sweep_weights[p.sweeps - 1] > 1;
+    if (accelerated) before_.resize(size_t(p.vertices * 3 * L));
+    for (int64_t sweep = 0; sweep < p.sweeps; ++sweep)
+      limit(x, v, step, moves, p.sweep_weights[sweep], accelerated ? before_.data() : nullptr);
   }
 
   // Leapfrog: half a kick, drift and kick in turn, half a kick.
@@ -467,8 +483,7 @@ class Block {
           store(x + c, load(x + c) + drift * speed);
         }
       }
-      if (s < steps)
-        for (int64_t sweep = 0; sweep < p.sweeps; ++sweep) limit(x, v, T(h), f);
+      if (s < steps) limit(x, v, T(h), f);
     }
   }
 };

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from sim.contact import Contact, layers
 from sim.kernel.build import library
+from sim.limits import chebyshev_weights
 from sim.system import Drive, System
 from sim.tables import Evaluation
 
@@ -54,6 +55,7 @@ class _Problem(ctypes.Structure):
         ("lowest", ctypes.c_double),
         ("highest", ctypes.c_double),
         ("sweeps", ctypes.c_int64),
+        ("sweep_weights", ctypes.c_void_p),
         ("arms", ctypes.c_void_p),
         ("vertex_areas", ctypes.c_void_p),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
@@ -155,6 +157,8 @@ class Kernel:
         if system.limits is not None:
             problem.lowest, problem.highest = system.limits.low, system.limits.high
             problem.sweeps = system.limits.sweeps
+            tensors["sweep_weights"] = torch.tensor(chebyshev_weights(system.limits.sweeps), dtype=cloth.dtype)
+            problem.sweep_weights = tensors["sweep_weights"].data_ptr()
         return cls(
             code=code, batch=cloth.batch, dtype=cloth.dtype, lanes=lanes, blocks=blocks, problem=problem,
             tensors=tensors, tied=torch.cat([t.anchors for t in ties]) if ties else None,

@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from sim.handles import Handles
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Backend, Symplectic, advance
-from sim.limits import StrainLimits, correction, stretches
+from sim.limits import StrainLimits, correction, limited, stretches
 from sim.material import named
 from sim.mesh import grid
 from sim.state import State
@@ -71,9 +71,49 @@ def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, lim
     assert longest[limits] < 1.07
 
 
+def test_accelerated_sweeps_keep_the_momentum_and_come_closer(make_system, distorted) -> None:
+    # By the distance from the limits that is left, root mean square over the faces: 30 plain sweeps against 30 of which
+    # 22 are accelerated.
+    system, state = make_system(distorted, [named("camel-ponte-roma")])
+    start = state.position * torch.tensor([1.0, 1.3, 1.2], dtype=torch.float64)[:, None]
+    bounds = StrainLimits(sweeps=30)
+    free = torch.ones_like(start[:, :1])
+    plain = start
+    for _ in range(bounds.sweeps):
+        plain = plain + correction(system.cloth, bounds, plain)
+    after, velocity = limited(system.cloth, bounds, start, torch.zeros_like(start), 0.01, free)
+
+    def left(position: torch.Tensor) -> float:
+        large, _ = stretches(system.cloth, position)
+        return float(((large - bounds.high).clamp(min=0) ** 2).mean().sqrt())
+
+    assert left(after) < 0.3 * left(plain)
+    torch.testing.assert_close(velocity, (after - start) / 0.01, rtol=0, atol=1e-10)
+    mass = system.cloth.mass.unsqueeze(1)
+    assert float((mass * velocity).sum(0).abs().max()) < 1e-13
+
+
+@pytest.mark.parametrize("backend", [Backend.TORCH, Backend.KERNEL])
+@pytest.mark.parametrize("stiffness", [math.inf, 1e3])
+def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, make_system, distorted) -> None:
+    # The start is beyond the limits, and forces have no time: membranes that pull a gram with 10 N move it by 5 nm.
+    handles = Handles(vertices=(0, 4), stiffness=stiffness)
+    system, state = make_system(distorted, [named("camel-ponte-roma")], handles=handles)
+    start = State(position=state.position * 1.2, velocity=torch.zeros_like(state.position))
+    if math.isfinite(stiffness):
+        system = replace(system, anchors=start.position[system.held])
+    system = replace(system, limits=StrainLimits(sweeps=20))
+    moved = (advance(system, start, 1e-6, steps=1, backend=backend).position - start.position)[..., 0].norm(dim=1)
+    assert float(moved[[0, 4]].max()) < 1e-8
+    others = [i for i in range(len(moved)) if i not in (0, 4)]
+    assert float(moved[others].min()) > 1e-3
+
+
+@pytest.mark.parametrize("stiffness", [math.inf, 1e3])
+@pytest.mark.parametrize("sweeps", [2, 12])
 @pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-9), (torch.float32, 1e-4)])
-def test_kernel_and_torch_limit_alike(dtype, tolerance, make_system, distorted) -> None:
-    handles = Handles(vertices=(0, 4), stiffness=math.inf)
+def test_kernel_and_torch_limit_alike(dtype, tolerance, sweeps, stiffness, make_system, distorted) -> None:
+    handles = Handles(vertices=(0, 4), stiffness=stiffness)
     system, state = make_system(
         distorted,
         [named("camel-ponte-roma"), named("gray-interlock")],
@@ -81,7 +121,7 @@ def test_kernel_and_torch_limit_alike(dtype, tolerance, make_system, distorted) 
         wind=(5.0, 0.0, 0.0),
         dtype=dtype,
     )
-    system = replace(system, limits=StrainLimits(sweeps=2))
+    system = replace(system, limits=StrainLimits(sweeps=sweeps))
     start = State(position=state.position * 1.1, velocity=torch.cos(9 * state.position.roll(1, 1)))
     results = [advance(system, start, 2e-3, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)]
     torch.testing.assert_close(results[1].position, results[0].position, rtol=0, atol=tolerance)
