@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from markupsafe import Markup, escape
 
 from measure.report.quantity import number
 
-_CHARACTER = 6.2  # width of a digit at the charts' 11-unit type, with some air
+_CHARACTER = 6.6  # width of a digit at the charts' 11-unit type
+_LINE = 18.0  # height of a line, with some air
 _MOST_POINTS = 900  # of a line; more than a screen shows
 
 
@@ -38,8 +39,8 @@ class Scale(ABC):
         """What is linear along the axis."""
 
     @abstractmethod
-    def ticks(self) -> list[tuple[float, str]]:
-        """Values and their labels, so few that the labels do not touch."""
+    def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
+        """Values and their labels, so few that none needs more than its `room` along the axis."""
 
     @abstractmethod
     def shows(self, value: float) -> bool:
@@ -67,15 +68,15 @@ class Linear(Scale):
     def shows(self, value: float) -> bool:
         return self.low <= value <= self.high
 
-    def ticks(self) -> list[tuple[float, str]]:
-        length = abs(self.stop - self.start)
+    def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
         for wanted in range(8, 1, -1):
             step = _round_step((self.high - self.low) / wanted)
             places = max(0, -math.floor(math.log10(step) + 1e-9))
             first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
             values = [round(n * step, places) + 0.0 for n in range(first, last + 1)]
             labels = [_plain(v, places) for v in values]
-            if len(values) * _CHARACTER * (max(map(len, labels), default=0) + 2) <= length * (1 + 1 / wanted):
+            spacing = abs(self(step) - self(0.0))
+            if max(map(room, labels), default=0.0) <= spacing:
                 return list(zip(values, labels, strict=True))
         return []
 
@@ -97,13 +98,19 @@ class Logarithmic(Scale):
     def shows(self, value: float) -> bool:
         return value > 0 and self.low <= value <= self.high
 
-    def ticks(self) -> list[tuple[float, str]]:
-        length = abs(self.stop - self.start)
+    def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
         first, last = math.ceil(math.log10(self.low)), math.floor(math.log10(self.high))
         if last - first < 1:
-            return [(v, number(v, digits=2)) for v in _within_decade(self.low, self.high)]
-        stride = max(1, math.ceil((last - first + 1) * 8 * _CHARACTER / max(length, 1)))
-        return [(10.0**n, _decade(n)) for n in range(first, last + 1, stride)]
+            return self._apart([(v, number(v, digits=2)) for v in _within_decade(self.low, self.high)], room)
+        return self._apart([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
+
+    def _apart(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
+        """Of the ticks, as many from the first on as do not touch."""
+        kept: list[tuple[float, str]] = []
+        for value, label in ticks:
+            if not kept or abs(self(value) - self(kept[-1][0])) >= (room(label) + room(kept[-1][1])) / 2:
+                kept.append((value, label))
+        return kept
 
 
 @dataclass(kw_only=True)
@@ -170,11 +177,11 @@ class Chart:
     def _frame(self) -> list[str]:
         left, right, bottom, top = self.x.start, self.x.stop, self.y.start, self.y.stop
         parts = []
-        for value, label in self.y.ticks():
+        for value, label in self.y.ticks(below):
             at = self.y(value)
             parts.append(f'<path class="grid" d="M{left:.1f} {at:.1f}H{right:.1f}"/>')
             parts.append(f'<text x="{left - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{escape(label)}</text>')
-        for value, label in self.x.ticks():
+        for value, label in self.x.ticks(beside):
             at = self.x(value)
             parts.append(f'<path class="tick" d="M{at:.1f} {bottom:.1f}v4"/>')
             parts.append(f'<text x="{at:.1f}" y="{bottom + 17:.1f}" text-anchor="middle">{escape(label)}</text>')
@@ -222,6 +229,16 @@ def path_through(xs: Sequence[float], ys: Sequence[float]) -> str:
         parts.append(f"{pen}{x:.1f} {y:.1f}")
         pen = "L"
     return "".join(parts)
+
+
+def beside(label: str) -> float:
+    """Room that a label needs among others on the same line."""
+    return _CHARACTER * (len(label) + 2)
+
+
+def below(label: str) -> float:
+    """Room that a label needs among others above each other."""
+    return _LINE if label else 0.0
 
 
 def _round_step(least: float) -> float:

@@ -17,12 +17,13 @@ from scipy.spatial import Delaunay
 
 from measure.loop.verdict import Residual
 from measure.pages.render import data_url
-from measure.report.chart import Chart, Linear, drawing
+from measure.report.chart import Chart, Linear, beside, drawing
 from measure.report.quantity import Display, display
 
 _WIDTH = 300.0
 _LEFT, _TOP, _BOTTOM = 46.0, 26.0, 40.0
 _PIXELS = 150  # across a map; the browser smooths
+_LEVELS = 255  # colours of a picture; one index more stands for none
 _SLIVER = 1e-3  # triangles smaller than this part of the median are rounding along straight edges
 
 
@@ -37,12 +38,16 @@ class Shade:
     def shown(self) -> Display:
         return display((self.low, self.high), "m")
 
-    def colour(self, values: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """RGBA (..., 4) uint8; transparent where there is no value."""
+    def picture(self, values: NDArray[np.float64]) -> str:
+        """URL of a PNG of values (row, column) [m], the first row on top; transparent where there is no value."""
         part = (values - self.low) / (self.high - self.low)
-        shaded = colormaps[self.colours](np.where(np.isfinite(part), part, 0.0))
-        shaded[..., 3] = np.isfinite(values)
-        return (255 * shaded).round().astype(np.uint8)
+        indices = np.where(np.isfinite(part), part * (_LEVELS - 1), _LEVELS).round().astype(np.uint8)
+        image = Image.fromarray(indices, "P")
+        palette = (255 * colormaps[self.colours](np.linspace(0, 1, _LEVELS))[:, :3]).round().astype(np.uint8)
+        image.putpalette(palette.tobytes())
+        buffer = io.BytesIO()
+        image.save(buffer, "PNG", optimize=True, transparency=_LEVELS)
+        return data_url(buffer.getvalue(), "image/png")
 
 
 def size_shade(residuals: Sequence[Residual]) -> Shade:
@@ -57,11 +62,11 @@ def mean_shade(residuals: Sequence[Residual]) -> Shade:
     return Shade(low=-reach, high=reach, colours="RdBu_r")
 
 
-def size_maps(residual: Residual, shade: Shade) -> list[tuple[str, Markup]]:
-    """(heading, chart) of the root mean square error over the cloth: of the base model, then with the effect."""
+def size_maps(residual: Residual, shade: Shade, after_label: str) -> list[tuple[str, Markup]]:
+    """(heading, chart) of the root mean square error over the cloth: of the base model, then of `after_label`."""
     parts = [("base model", residual.in_space)]
     if residual.in_space_after:
-        parts.append(("with the effect", residual.in_space_after))
+        parts.append((after_label, residual.in_space_after))
     return _maps(residual, parts, shade, "root mean square error")
 
 
@@ -75,9 +80,9 @@ def colour_bar(shade: Shade, meaning: str) -> Markup:
     """What the colours mean."""
     shown = shade.shown()
     scale = Linear(shade.low * shown.factor, shade.high * shown.factor, 12, 288)
-    image = _png(shade.colour(np.linspace(shade.low, shade.high, 128)[None, :]))
+    image = shade.picture(np.linspace(shade.low, shade.high, 128)[None, :])
     parts = [f'<image href="{image}" x="12" y="0" width="276" height="10" preserveAspectRatio="none"/>']
-    for value, label in scale.ticks():
+    for value, label in scale.ticks(beside):
         parts.append(f'<path class="tick" d="M{scale(value):.1f} 10v4"/>')
         parts.append(f'<text x="{scale(value):.1f}" y="26" text-anchor="middle">{escape(label)}</text>')
     parts.append(f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{shown.unit}]</text>')
@@ -132,7 +137,7 @@ def _map(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade
     if np.count_nonzero(known) >= 4 and not on_a_line(markers[known]):
         rows = max(2, round(_PIXELS * tall / across))
         grid = np.meshgrid(np.linspace(left, right, _PIXELS), np.linspace(top, bottom, rows))
-        image = _png(shade.colour(LinearNDInterpolator(markers[known], values[known])(*grid)))
+        image = shade.picture(LinearNDInterpolator(markers[known], values[known])(*grid))
         chart.marks.append(
             f'<image href="{image}" x="{_LEFT:g}" y="{_TOP:g}" width="{across:.1f}" height="{tall:.1f}" '
             'preserveAspectRatio="none"/>'
@@ -166,9 +171,3 @@ def _profile(markers: NDArray[np.float64], values: NDArray[np.float64], shade: S
 
 def _largest(values: Sequence[float]) -> float:
     return max((abs(v) for v in values if math.isfinite(v)), default=0.0) or 1e-3
-
-
-def _png(rgba: NDArray[np.uint8]) -> str:
-    buffer = io.BytesIO()
-    Image.fromarray(rgba, "RGBA").quantize(128, method=Image.Quantize.FASTOCTREE).save(buffer, "PNG", optimize=True)
-    return data_url(buffer.getvalue(), "image/png")

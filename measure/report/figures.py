@@ -104,7 +104,7 @@ def null_distribution(test: NullTest) -> Markup:
         chart.bar(left, right, count, "null")
     if critical is not None:
         chart.upright(critical, "critical")
-        _named(chart, critical, 14, f"significant from {number(critical)} (level {number(test.level)})")
+        _named(chart, critical, 14, f"significant from {number(critical)} (level {test.level:g})")
     chart.upright(test.statistic, "observed")
     _named(chart, test.statistic, 30, f"observed {number(test.statistic)}")
     chart.note(_LEFT, 48, "nulls in a bin", "start")

@@ -6,7 +6,7 @@
   const control = (name) => player.querySelector(`[data-control="${name}"]`);
   const [play, choice, frame, turn, factor, speed] =
     ["play", "recording", "frame", "turn", "factor", "speed"].map(control);
-  const { elevation, half, gap, filled, missing, reach: steps } = recordings.view;
+  const { elevation, half, gap, head, filled, missing, reach: steps } = recordings.view;
   const stage = player.querySelector(".stage");
   const still = window.matchMedia("(prefers-reduced-motion: reduce)");
   let shown, playing = false, began = 0;
@@ -60,8 +60,9 @@
     const meshes = stage.querySelectorAll("path.mesh");
     shown.errors.forEach((_, number) => {
       const x = half * (2 * number + 1) + gap * number;
-      meshes[2 * number].setAttribute("d", wires(-1, 0, x, half + 22));
-      meshes[2 * number + 1].setAttribute("d", wires(number, Number(factor.value), x, half + 22));
+      const y = shown.rise * half / shown.radius + head;
+      meshes[2 * number].setAttribute("d", wires(-1, 0, x, y));
+      meshes[2 * number + 1].setAttribute("d", wires(number, Number(factor.value), x, y));
     });
     frame.setAttribute("aria-valuetext", `${(Number(frame.value) / shown.rate).toFixed(2)} s`);
   }

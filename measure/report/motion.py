@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from measure.loop.verdict import Residual
@@ -30,8 +30,12 @@ FACTORS = (1, 2, 5, 10, 20, 50, 100)
 ELEVATION = math.pi / 9
 _HALF = 150.0  # of a panel
 _GAP = 10.0
+_HEAD = 22.0  # above the panels, for their names
 _FILLED = 0.86  # of a panel, by the observed cloth; the rest is for errors
-VIEW = {"elevation": ELEVATION, "half": _HALF, "gap": _GAP, "filled": _FILLED, "missing": MISSING, "reach": _REACH}
+VIEW = {
+    "elevation": ELEVATION, "half": _HALF, "gap": _GAP, "head": _HEAD, "filled": _FILLED, "missing": MISSING,
+    "reach": _REACH,
+}  # fmt: skip
 """What the player has to know of the projection and of the packing."""
 
 
@@ -66,6 +70,16 @@ class Motion:
     azimuth: float
     factor: int
 
+    @property
+    def radius(self) -> float:
+        """Of the circle about the upright through the mean that holds the observed cloth [m]: half a panel's width."""
+        return _finite_reach(np.linalg.norm(self.observed[..., :2], axis=-1))
+
+    @property
+    def rise(self) -> float:
+        """How far the observed cloth reaches up or down in any view of the player's elevation [m]."""
+        return _finite_reach(self.observed[..., 2]) * math.cos(ELEVATION) + self.radius * math.sin(ELEVATION)
+
     def as_dict(self) -> dict[str, Any]:
         """JSON values for the player."""
         size = _finite_reach(self.observed)
@@ -79,7 +93,8 @@ class Motion:
             "edges": self.edges.ravel().tolist(),
             "size": size,
             "reach": reach,
-            "radius": _radius(self.observed),
+            "radius": self.radius,
+            "rise": self.rise,
             "azimuth": self.azimuth,
             "factor": self.factor,
             "observed": _packed(self.observed, size),
@@ -117,27 +132,28 @@ def motion(residual: Residual) -> Motion | None:
     )
 
 
-def still(shown: Motion) -> Markup:
+def still(shown: Motion, after_label: str) -> Markup:
     """The first frame as the player draws it: one panel a model, the observed cloth under the prediction.
 
     The view is from the side, turned and raised a little; `motion.js` uses the same projection.
     """
     panels = [("base model", "before", shown.before)]
     if shown.after is not None:
-        panels.append(("with the effect", "after", shown.after))
-    scale = _HALF * _FILLED / _radius(shown.observed)
+        panels.append((after_label, "after", shown.after))
+    scale = _HALF * _FILLED / shown.radius
+    tall = shown.rise * scale / _FILLED
     parts = []
     for number, (heading, kind, predicted) in enumerate(panels):
         enlarged = shown.observed[0] + shown.factor * (predicted[0] - shown.observed[0])
-        centre = (_HALF * (2 * number + 1) + _GAP * number, _HALF + 22)
+        centre = (_HALF * (2 * number + 1) + _GAP * number, tall + _HEAD)
         parts.append(
-            f'<text class="label" x="{centre[0] - _HALF + 8:g}" y="14">{heading}</text>'
+            f'<text class="label" x="{centre[0] - _HALF + 8:g}" y="14">{escape(heading)}</text>'
             f'<path class="mesh observed" d="{_wires(shown.observed[0], shown, scale, centre)}"/>'
             f'<path class="mesh {kind}" d="{_wires(enlarged, shown, scale, centre)}"/>'
         )
     width = 2 * _HALF * len(panels) + _GAP * (len(panels) - 1)
     return drawing(
-        width, 2 * _HALF + 26, "Observed cloth and predictions", f"a frame of {shown.recording}", "".join(parts)
+        width, 2 * tall + _HEAD + 4, "Observed cloth and predictions", f"a frame of {shown.recording}", "".join(parts)
     )
 
 
@@ -162,10 +178,6 @@ def _azimuth(observed: NDArray[np.float64]) -> float:
     flat = flat[np.isfinite(flat).all(axis=1)]
     x, y = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0] if len(flat) > 1 else (1.0, 0.0)
     return (math.atan2(y, x) + math.pi / 12 + math.pi / 2) % math.pi - math.pi / 2
-
-
-def _radius(observed: NDArray[np.float64]) -> float:
-    return _finite_reach(np.linalg.norm(observed, axis=-1))
 
 
 def _edges(uv: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -68,8 +68,8 @@ def page(verdict: Verdict) -> str:
         "strength_row": rows.strength_row,
         "null": figures.null_distribution(verdict.test),
         "against_wind": figures.against_wind(verdict.residuals),
-        **_residuals(verdict.residuals),
-        **_motions(motions),
+        **_residuals(verdict.residuals, sentences.after_label(verdict)),
+        **_motions(motions, sentences.after_label(verdict)),
         "provenance": list(_flattened(verdict.provenance)),
     }
     return render("measure.report", "page.html.j2", values, filters=_FILTERS)
@@ -81,13 +81,13 @@ def _lengths(verdict: Verdict) -> quantity.Display:
     return quantity.display([e.value for e in shown], "m")
 
 
-def _residuals(residuals: tuple[Residual, ...]) -> dict[str, Any]:
+def _residuals(residuals: tuple[Residual, ...], after_label: str) -> dict[str, Any]:
     size, mean = cloth.size_shade(residuals), cloth.mean_shade(residuals)
     return {
         "residuals": [
             ResidualView(
                 residual=r,
-                sizes=cloth.size_maps(r, size),
+                sizes=cloth.size_maps(r, size, after_label),
                 means=cloth.mean_maps(r, mean),
                 time=figures.in_time(r),
                 spectrum=figures.in_frequency(r),
@@ -99,10 +99,10 @@ def _residuals(residuals: tuple[Residual, ...]) -> dict[str, Any]:
     }
 
 
-def _motions(motions: list[motion.Motion]) -> dict[str, Any]:
+def _motions(motions: list[motion.Motion], after_label: str) -> dict[str, Any]:
     """The player's data, unseen recordings first."""
     ordered = sorted(motions, key=lambda m: not m.held_out)
-    stills = [motion.still(m) for m in ordered]
+    stills = [motion.still(m, after_label) for m in ordered]
     data = {
         "view": motion.VIEW,
         "list": [{**m.as_dict(), "still": str(still)} for m, still in zip(ordered, stills, strict=True)],
@@ -132,11 +132,16 @@ def _data(value: float | None, text: str) -> Markup:
 
 
 def _estimate(estimate: Estimate | None, shown: quantity.Display | None = None) -> Markup:
-    return _data(estimate.value if estimate else None, quantity.estimate_text(estimate, shown=shown))
+    """The value over its interval."""
+    value, ends = quantity.estimate_parts(estimate, shown=shown)
+    return _data(estimate.value if estimate else None, value) + Markup('<span class="ends">{}</span>').format(ends)
 
 
 def _full(estimate: Estimate) -> Markup:
-    return _data(estimate.value, quantity.with_level(estimate))
+    """The value, its interval and the interval's level."""
+    value, ends = quantity.estimate_parts(estimate)
+    told = f"{ends} {quantity.level_text(estimate.level)}" if ends else ""
+    return _data(estimate.value, value) + Markup('<span class="ends">{}</span>').format(told)
 
 
 def _number(value: float | None, digits: int = 3) -> Markup:

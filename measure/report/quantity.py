@@ -76,15 +76,20 @@ def probability(value: float | None) -> str:
 
 def estimate_text(estimate: Estimate | None, *, shown: Display | None = None) -> str:
     """`6.2 m/s [5.7, 6.8]`, without the level, which a table's caption or `with_level` states."""
+    return " ".join(estimate_parts(estimate, shown=shown)).rstrip()
+
+
+def estimate_parts(estimate: Estimate | None, *, shown: Display | None = None) -> tuple[str, str]:
+    """`6.2 m/s` and `[5.7, 6.8]`; the second is empty where there is no interval."""
     if estimate is None or not known(estimate):
-        return NONE
+        return NONE, ""
     inside = shown or display((estimate.value, estimate.low, estimate.high), estimate.unit)
     value, low, high = (inside.factor * v for v in (estimate.value, estimate.low, estimate.high))
     half = (high - low) / 2
     if math.isnan(half):
-        return f"{number(value)}{inside.suffix}"
+        return f"{number(value)}{inside.suffix}", ""
     if not 0 < half < math.inf:
-        return f"{number(value)}{inside.suffix} [{number(low)}, {number(high)}]"
+        return f"{number(value)}{inside.suffix}", f"[{number(low)}, {number(high)}]"
     place = decimals(half)
     largest = max(abs(value), abs(low), abs(high))
     power = ""
@@ -94,7 +99,7 @@ def estimate_text(estimate: Estimate | None, *, shown: Display | None = None) ->
         place += exponent
         power = f" × {_power(exponent)}"
     ends = f"[{_fixed(low, place)}{power}, {_fixed(high, place)}{power}]"
-    return f"{_fixed(value, place)}{power}{inside.suffix} {ends}"
+    return f"{_fixed(value, place)}{power}{inside.suffix}", ends
 
 
 def with_level(estimate: Estimate) -> str:
@@ -104,7 +109,7 @@ def with_level(estimate: Estimate) -> str:
 
 def level_text(level: float) -> str:
     """`90 %`."""
-    return f"{number(100 * level)} %"
+    return f"{100 * level:g} %"
 
 
 def with_error(value: float, error: float) -> str:

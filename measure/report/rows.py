@@ -69,9 +69,10 @@ def strength_row(candidate: Candidate) -> Markup:
     scale = Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
     height = _STEP * len(candidate.by_recording) + 6
     low, high = (scale(min(max(v, scale.low), scale.high)) for v in (candidate.strength.low, candidate.strength.high))
-    parts = [_zero(scale, height)]
+    parts = []
     if math.isfinite(low) and math.isfinite(high):
         parts.append(f'<rect class="band" x="{low:.1f}" y="0" width="{max(high - low, 1):.1f}" height="{height:g}"/>')
+    parts.append(_zero(scale, height))
     for place, estimate in enumerate(candidate.by_recording):
         if known(estimate):
             parts.append(_whisker(estimate, scale, 9.5 + _STEP * place, "single"))
@@ -91,7 +92,7 @@ def _whisker(estimate: Estimate, scale: Linear, y: float, kind: str) -> str:
     )
     return (
         f'<path class="line {kind}" d="M{low:.1f} {y:.1f}H{high:.1f}"/>'
-        f'<circle class="dot {kind}" cx="{value:.1f}" cy="{y:.1f}" r="4"/>'
+        f'<circle class="dot {kind}" cx="{value:.1f}" cy="{y:.1f}" r="3"/>'
     )
 
 

@@ -49,7 +49,7 @@ def test_sentence(test: NullTest) -> str:
     spread = p_interval(test)
     interval = f" [{probability(spread.low)}, {probability(spread.high)}] {level_text(_LEVEL)}" if spread else ""
     return (
-        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {number(test.level, digits=2)}. "
+        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}. "
         f"{as_large(test)} of {len(null)} nulls reach the observed statistic {number(test.statistic)}."
     )
 
@@ -61,7 +61,7 @@ def test_remark(test: NullTest) -> str:
     if least > test.level:
         return (
             f"With {count} nulls no p-value below {probability(least)} is possible: it could not have rejected at "
-            f"level {number(test.level, digits=2)}."
+            f"level {test.level:g}."
         )
     if test.p_value > test.level:
         return "An effect too weak for these recordings to show may still be there."

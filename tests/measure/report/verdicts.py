@@ -121,14 +121,14 @@ def verdict(conclusion: Conclusion) -> Verdict:
         conclusion=conclusion,
         named=named,
         words={
-            Conclusion.SUFFICIENT: "With its parameters calibrated, the base model predicts all three recordings as well "
-            "as it predicts data simulated from itself.",
-            Conclusion.EFFECT: "The air pushes sideways where the base model has only drag: with lift of coefficient 0.62 "
-            "the model predicts an unseen wind speed as well as it predicts itself.",
+            Conclusion.SUFFICIENT: "With its parameters calibrated, the base model predicts all three recordings as "
+            "well as it predicts data simulated from itself.",
+            Conclusion.EFFECT: "The air pushes sideways where the base model has only drag: with lift of coefficient "
+            "0.62 the model predicts an unseen wind speed as well as it predicts itself.",
             Conclusion.ONE_OF: "Something that grows across the hoist is missing. Lift and shear predict unseen data "
             "equally well, within one standard error.",
-            Conclusion.PARTLY: "Lift removes most of the error, but what is left is still larger than in simulated nulls.",
-            Conclusion.OUTSIDE: "No effect of the library reduces the error on unseen data by more than the wrong-effect "
+            Conclusion.PARTLY: "Lift removes most of the error, but what is left is still larger than in nulls.",
+            Conclusion.OUTSIDE: "No effect of the library reduces the error on unseen data by more than the "
             "control does.",
         }[conclusion],
         test=NullTest(
@@ -174,9 +174,7 @@ def verdict(conclusion: Conclusion) -> Verdict:
         proposal="The corrective field is tangential and grows as the square of the distance from the pole: f = k u² t."
         if conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
         else "",
-        findings=(
-            ("few-frames", "Recording tunnel 4.0 m/s has 250 frames; 3 markers were filled over gaps of 2 frames."),
-        ),
+        findings=(("few-frames", "tunnel 4.0 m/s has 250 frames; 3 markers were filled over gaps of 2 frames."),),
         provenance={"seed": 17, "code": "0.1.0+abc1234", "parents": ["3f2a", "91bc"], "recipe": {"hash": "77aa"}},
         seconds=213.4,
     )
