@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
 from flagdata.rng import stream
@@ -18,6 +19,7 @@ from measure.cases.stretch import Stretch, stretch
 from measure.cases.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
 from measure.cases.waves import Estimate, Waves, waves
 
+_DRAWN = 16
 _EVERY = 8
 """Of the columns, which `waves` is given: 1.1 mm, far below a wave's length."""
 
@@ -34,6 +36,7 @@ class Clip:
         tip: (5 %, 50 %, 95 %) of the last column seen.
         waves: in metres where the scale is known (whole sheets), in columns elsewhere.
         stretch: of whole sheets.
+        lines: (line, column) heights over one cycle, at the columns of `waves`: to be drawn; NaN where not seen.
         still: scatter of the height beside the clamp, over time [px]: an upper bound of the error that neighbouring
             columns share; None where it is not in view.
     """
@@ -46,6 +49,7 @@ class Clip:
     tip: tuple[float, float, float]
     waves: Waves
     stretch: Stretch | None
+    lines: NDArray[np.float64]
     still: float | None
 
 
@@ -117,10 +121,15 @@ def measure_clip(track: EdgeTrack, spec: ClipSpec, case: Case) -> Clip:
     seen = track.seen == Seen.LINE
     last = np.where(seen.any(axis=1), seen.shape[1] - 1 - seen[:, ::-1].argmax(axis=1), np.nan)
     tip = np.nanpercentile(last, [5, 50, 95])
+    found = waves(track.time, (columns - (clamp or 0)) * scale, heights * scale)
+    start = len(track.time) // 2
+    one_cycle = start + np.arange(_DRAWN) / _DRAWN * track.rate / found.frequency.value
+    drawn = heights[np.minimum(one_cycle.round().astype(int), len(heights) - 1)] * scale
+    shown = np.isin((columns - (clamp or 0)) * scale, found.columns)
     return Clip(
         spec=spec, frames=len(track.time), shares={what: track.share(what) for what in Seen},
         scatter=float(np.nanmedian(scatter(track))), clamp=clamp, tip=(float(tip[0]), float(tip[1]), float(tip[2])),
-        waves=waves(track.time, (columns - (clamp or 0)) * scale, heights * scale),
+        waves=found, lines=drawn[:, shown],
         stretch=stretch(track, stream(case.seed, "stretch", spec.name)) if spec.whole else None, still=still,
     )  # fmt: skip
 

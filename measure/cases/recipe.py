@@ -56,7 +56,8 @@ class Case:
         fit_lengths, held_out_lengths: [m].
         reactive_share: declared M / (ρ L).
         shear_factor: declared speed at the sheet over the tunnel's.
-        shares, speeds: the grid on which the strip is simulated: M / (ρ L), and [m/s] at the sheet.
+        shares, lifts, speeds: at which the strip is simulated: M / (ρ L), slopes of the lift coefficient, and [m/s] at
+            the sheet; `pair_shares` with each of `pair_lifts` likewise.
     """
 
     name: str
@@ -76,6 +77,9 @@ class Case:
     reactive_share: float
     shear_factor: float
     shares: tuple[float, ...]
+    lifts: tuple[float, ...]
+    pair_shares: tuple[float, ...]
+    pair_lifts: tuple[float, ...]
     speeds: tuple[float, ...]
     run: StripRun
 
@@ -150,6 +154,9 @@ def parse_case(text: str, *, where: str) -> Case:
         reactive_share=declared.number("reactive-share", nan, least=0),
         shear_factor=declared.number("shear-factor", nan, above=0),
         shares=simulation.numbers("shares"),
+        lifts=simulation.numbers("lifts"),
+        pair_shares=simulation.numbers("pair-shares"),
+        pair_lifts=simulation.numbers("pair-lifts"),
         speeds=simulation.numbers("speeds"),
         run=StripRun(
             columns=simulation.whole("columns", 24, least=4),
