@@ -36,6 +36,7 @@ class Candidate:
         effect: its name in the library, or "corrective-field" for the smooth field that stands for what is not in it.
         parameter: of the effect.
         strength: as fitted, with the effect's own unit.
+        null: the strength at which the effect is not there.
         z: of the strength against the null distribution.
         p_value: of |z| for this candidate alone.
         p_family: of the largest |z| of all candidates.
@@ -59,6 +60,7 @@ class Candidate:
     leftover: float
     by_recording: tuple[Estimate, ...] = ()
     why_not: str = ""
+    null: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
