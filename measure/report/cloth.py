@@ -42,11 +42,11 @@ class Shade:
         """URL of a PNG of values (row, column) [m], the first row on top; transparent where there is no value."""
         part = (values - self.low) / (self.high - self.low)
         indices = np.where(np.isfinite(part), part * (_LEVELS - 1), _LEVELS).round().astype(np.uint8)
-        image = Image.fromarray(indices, "P")
+        image = Image.frombytes("P", (indices.shape[1], indices.shape[0]), indices.tobytes())
         palette = (255 * colormaps[self.colours](np.linspace(0, 1, _LEVELS))[:, :3]).round().astype(np.uint8)
-        image.putpalette(palette.tobytes())
+        image.putpalette(palette.tobytes() + bytes(3))
         buffer = io.BytesIO()
-        image.save(buffer, "PNG", optimize=True, transparency=_LEVELS)
+        image.save(buffer, "PNG", transparency=_LEVELS)
         return data_url(buffer.getvalue(), "image/png")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,6 +68,7 @@ def page(verdict: Verdict) -> str:
         "gain_row": lambda c: rows.gain_row(c, gains, "after" if c.effect in verdict.named else "single"),
         "strength_row": rows.strength_row,
         "null": figures.null_distribution(verdict.test),
+        "windless": [r.recording for r in verdict.residuals if not math.isfinite(r.speed)],
         "against_wind": figures.against_wind(verdict.residuals),
         **_residuals(verdict.residuals, sentences.after_label(verdict)),
         **_motions(motions, sentences.after_label(verdict)),
@@ -144,8 +146,8 @@ def _full(estimate: Estimate) -> Markup:
     return _data(estimate.value, value) + Markup('<span class="ends">{}</span>').format(told)
 
 
-def _number(value: float | None, digits: int = 3) -> Markup:
-    return _data(value, quantity.number(value, digits=digits))
+def _number(value: float | None) -> Markup:
+    return _data(value, quantity.number(value))
 
 
 def _count(value: int) -> Markup:
@@ -154,6 +156,14 @@ def _count(value: int) -> Markup:
 
 def _probability(value: float | None) -> Markup:
     return _data(value, quantity.probability(value))
+
+
+def _in_errors(value: float | None) -> Markup:
+    return _data(value, quantity.in_errors(value))
+
+
+def _share(value: float | None) -> Markup:
+    return _data(value, quantity.share(value))
 
 
 def _with_error(value: float, error: float) -> Markup:
@@ -166,6 +176,8 @@ _FILTERS = {
     "number": _number,
     "count": _count,
     "probability": _probability,
+    "in_errors": _in_errors,
+    "share": _share,
     "with_error": _with_error,
     "known": quantity.known,
 }

@@ -107,6 +107,18 @@ def with_level(estimate: Estimate) -> str:
     return f"{estimate_text(estimate)} {level_text(estimate.level)}" if known(estimate) else NONE
 
 
+def in_errors(value: float | None) -> str:
+    """A number of standard errors: one decimal, none from 10 on."""
+    if value is None or math.isnan(value):
+        return NONE
+    return _fixed(value, 0 if abs(value) >= 9.95 else 1)
+
+
+def share(value: float | None) -> str:
+    """A fraction, two decimals."""
+    return NONE if value is None or math.isnan(value) else _fixed(value, 2)
+
+
 def level_text(level: float) -> str:
     """`90 %`."""
     return f"{100 * level:g} %"

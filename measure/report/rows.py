@@ -25,18 +25,18 @@ def errors_scale(comparisons: Sequence[Comparison]) -> Linear:
 
 def errors_row(comparison: Comparison, scale: Linear) -> Markup:
     """The errors of one comparison: before, after and control with their intervals, floor shaded, oracle ticked."""
-    parts, at = [], 9.0
+    shown = [(comparison.before, "before"), (comparison.after, "after"), (comparison.control, "control")]
+    there = [(e, kind) for e, kind in shown if e is not None and known(e)]
+    height = 15 * len(there) + 3
+    parts = []
     if known(comparison.floor):
         edge = scale(min(max(comparison.floor.value, scale.low), scale.high))
-        parts.append(f'<rect class="floor" x="{scale(0):.1f}" y="0" width="{edge - scale(0):.1f}" height="48"/>')
+        parts.append(f'<rect class="floor" x="{scale(0):.1f}" y="0" width="{edge - scale(0):.1f}" height="{height}"/>')
     if comparison.oracle is not None and scale.shows(comparison.oracle.value):
-        parts.append(f'<path class="line oracle" d="M{scale(comparison.oracle.value):.1f} 0V48"/>')
-    for estimate, kind in ((comparison.before, "before"), (comparison.after, "after"), (comparison.control, "control")):
-        if estimate is not None and known(estimate):
-            parts.append(_whisker(estimate, scale, at, kind))
-            at += 15
+        parts.append(f'<path class="line oracle" d="M{scale(comparison.oracle.value):.1f} 0V{height}"/>')
+    parts += [_whisker(estimate, scale, 9.0 + 15 * place, kind) for place, (estimate, kind) in enumerate(there)]
     told = f"before {estimate_text(comparison.before)}, after {estimate_text(comparison.after)}"
-    return drawing(_WIDTH, 48, f"Errors, {comparison.what}", told, "".join(parts))
+    return drawing(_WIDTH, height, f"Errors, {comparison.what}", told, "".join(parts))
 
 
 def gain_scale(candidates: Sequence[Candidate]) -> Linear:
@@ -55,7 +55,7 @@ def gain_row(candidate: Candidate, scale: Linear, kind: str) -> Markup:
         high=candidate.gain + candidate.gain_error,
         unit="1",
     )
-    inside = _zero(scale, 18) + _whisker(estimate, scale, 9, kind)
+    inside = _null(scale, 0.0, 18) + _whisker(estimate, scale, 9, kind)
     told = with_error(candidate.gain, candidate.gain_error)
     return drawing(_WIDTH, 18, f"Held-out gain of {candidate.effect}", told, inside)
 
@@ -66,13 +66,13 @@ def strength_row(candidate: Candidate) -> Markup:
     if not single or not known(candidate.strength):
         return Markup("")
     ends = _finite(v for e in (candidate.strength, *single) for v in (e.value, e.low, e.high))
-    scale = Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
+    scale = Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[candidate.null])
     height = _STEP * len(candidate.by_recording) + 6
     low, high = (scale(min(max(v, scale.low), scale.high)) for v in (candidate.strength.low, candidate.strength.high))
     parts = []
     if math.isfinite(low) and math.isfinite(high):
         parts.append(f'<rect class="band" x="{low:.1f}" y="0" width="{max(high - low, 1):.1f}" height="{height:g}"/>')
-    parts.append(_zero(scale, height))
+    parts.append(_null(scale, candidate.null, height))
     for place, estimate in enumerate(candidate.by_recording):
         if known(estimate):
             parts.append(_whisker(estimate, scale, 9.5 + _STEP * place, "single"))
@@ -80,8 +80,8 @@ def strength_row(candidate: Candidate) -> Markup:
     return drawing(_WIDTH, height, f"{candidate.effect} on each recording alone", told, "".join(parts))
 
 
-def _zero(scale: Linear, height: float) -> str:
-    return f'<path class="line zero" d="M{scale(0):.1f} 0V{height:g}"/>'
+def _null(scale: Linear, value: float, height: float) -> str:
+    return f'<path class="line zero" d="M{scale(value):.1f} 0V{height:g}"/>'
 
 
 def _whisker(estimate: Estimate, scale: Linear, y: float, kind: str) -> str:
