@@ -96,8 +96,9 @@ def _sections(result: dict[str, Any], pictures: dict[str, Path]) -> list[Section
         Section(
             title="Damping", pictures=[pictures["damping"]],
             text="Without damping the sheet heats up with vibrations of its faces: "
-            f"{result['damping']['diverged'][0]} of {result['damping']['replicates']} runs diverged, which "
-            "`flagdata simulate` reports and does not store. More damping takes motion away, declared or by backward "
+            f"{result['damping']['diverged'][0]} of {result['damping']['replicates']} runs diverged and "
+            f"{result['damping']['crumpled'][0]} crumpled, which `flagdata simulate` reports and does not store. More "
+            "damping takes motion away, declared or by backward "
             "Euler's step.",
         ),
         Section(

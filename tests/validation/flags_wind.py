@@ -49,6 +49,7 @@ def summary(ensemble: Ensemble) -> dict[str, Any]:
         "seconds": (len(ensemble.settled) - 1) / RATE,
         "compression": _plain(moments(ensemble.compression)[0]),
         "diverged": ensemble.diverged.sum(axis=1).tolist(),
+        "crumpled": (~ensemble.diverged & (ensemble.compression > CRUMPLED)).sum(axis=1).tolist(),
         "lasted": ensemble.lasted.mean(axis=1).tolist(),
     }
     for name in _QUANTITIES:
