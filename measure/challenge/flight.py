@@ -1,4 +1,4 @@
-"""Simulates the recordings of sets that share a mesh and the same undeclared effects, as one batch."""
+"""Simulates the recordings of sets that share their numerics, as one batch: effects are at null where they do not act."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WIDEST = 15
 """Recordings in a batch: the compiled kernel's lanes."""
 INSTANTS = 6
 HORIZON = 0.1
-_OUTER = 2e-3  # s; of the forces beside the base model, halved where they change faster
+_OUTER = 4e-3  # s; of the forces beside the base model, halved where they change faster
 _SHORTEST_OUTER = 1e-4
 _START_NOISE = 2e-3  # m
 _GUST_RATE = 10.0  # Hz
@@ -79,10 +79,10 @@ class Flight:
 
 
 def batches(keys: Sequence[Key], recordings: int) -> list[tuple[Key, ...]]:
-    """Sets that are simulated together: one mesh, the same effects, as many recordings as fit."""
-    groups: dict[tuple[str, ...], list[Key]] = {}
-    for key in keys:
-        groups.setdefault((key.numerics, *(acting.effect for acting in key.effects)), []).append(key)
+    """Sets that are simulated together: one mesh, as many recordings as fit, and few different effects."""
+    groups: dict[str, list[Key]] = {}
+    for key in sorted(keys, key=lambda key: [acting.effect for acting in key.effects]):
+        groups.setdefault(key.numerics, []).append(key)
     each = max(1, WIDEST // recordings)
     return [tuple(group[i : i + each]) for group in groups.values() for i in range(0, len(group), each)]
 
@@ -96,7 +96,8 @@ def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Fl
     numerics = recipe.numerics[keys[0].numerics]
     winds = {key.name: _winds(recipe, seed, key) for key in keys}
     base, start = _base(recipe, seed, numerics, keys, winds)
-    effects = [_effect(recipe, seed, keys, place) for place in range(len(keys[0].effects))]
+    names = dict.fromkeys(acting.effect for key in keys for acting in key.effects)
+    effects = [_effect(recipe, seed, keys, name) for name in names]
     with torch.no_grad():
         system, state = apply(effects, base, start)
         stepper = _Stepper.of(numerics)
@@ -176,11 +177,14 @@ def _start(rest: Floats, key: Key, rng: np.random.Generator, handles: Handles) -
     return flat + noise
 
 
-def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key], place: int) -> Effect:
-    """The effect at that place of every key, with a value for each recording."""
-    first = keys[0].effects[place]
-    values = torch.tensor([key.effects[place].value for key in keys for _ in range(recipe.count)], dtype=torch.float64)
-    effect: Effect = effect_type(first.effect)(**{first.parameter: values})
+def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key], name: str) -> Effect:
+    """An effect with its value for each recording, null in sets in which it does not act."""
+    kind = effect_type(name)
+    acting = [next((a for a in key.effects if a.effect == name), None) for key in keys]
+    parameter = next(a.parameter for a in acting if a is not None)
+    null = kind.parameters()[parameter].null
+    each = [null if a is None else a.value for a in acting for _ in range(recipe.count)]
+    effect: Effect = kind(**{parameter: torch.tensor(each, dtype=torch.float64)})
     if not isinstance(effect, Gusts):
         return effect
     duration = recipe.settle + recipe.duration + 2 * HORIZON + 1 / _GUST_RATE

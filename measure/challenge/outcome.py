@@ -1,0 +1,135 @@
+"""A verdict beside the key: what was said, what was true, and whether they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import fmean, median
+from typing import Any
+
+from measure.challenge.classes import class_of
+from measure.challenge.filing import Filing
+from measure.challenge.key import Acting, Key
+from measure.challenge.recipe import Kind
+from measure.loop.verdict import Conclusion
+
+FIELD = "corrective-field"
+"""Name of the candidate that stands for what is not in the library: it names no effect."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """Of one set.
+
+    Attributes:
+        key: what was true.
+        conclusion: None where the data were refused.
+        named: effects, the best ranked first.
+        ranking: candidates as in the verdict.
+        comparisons: as in the verdict.
+        seconds: it took.
+    """
+
+    key: Key
+    conclusion: Conclusion | None
+    named: tuple[str, ...]
+    ranking: tuple[Mapping[str, Any], ...]
+    comparisons: tuple[Mapping[str, Any], ...]
+    seconds: float
+
+    @classmethod
+    def of(cls, key: Key, filing: Filing) -> Outcome:
+        """From what was sealed and what was filed."""
+        if filing.verdict is None:
+            return cls(key=key, conclusion=None, named=(), ranking=(), comparisons=(), seconds=filing.seconds)
+        verdict = filing.verdict
+        rank = [candidate["effect"] for candidate in verdict["ranking"]]
+        named = [name for name in verdict["named"] if name != FIELD]
+        named.sort(key=lambda name: rank.index(name) if name in rank else len(rank))
+        return cls(
+            key=key, conclusion=Conclusion(verdict["conclusion"]), named=tuple(named),
+            ranking=tuple(verdict["ranking"]), comparisons=tuple(verdict["comparisons"]), seconds=filing.seconds,
+        )  # fmt: skip
+
+    @property
+    def refused(self) -> bool:
+        return self.conclusion is None
+
+    @property
+    def detected(self) -> bool:
+        """Whether the base model was rejected."""
+        return self.conclusion not in (None, Conclusion.SUFFICIENT)
+
+    @property
+    def true(self) -> tuple[str, ...]:
+        """Effects of the library that acted."""
+        return () if self.key.kind is Kind.OUTSIDE else tuple(acting.effect for acting in self.key.effects)
+
+    @property
+    def true_classes(self) -> frozenset[str]:
+        return frozenset(class_of(effect) for effect in self.true)
+
+    @property
+    def first(self) -> str | None:
+        """The effect named, the best ranked where there are several."""
+        return self.named[0] if self.named else None
+
+    @property
+    def first_right(self) -> bool:
+        """Whether that one acted."""
+        return self.first in self.true
+
+    @property
+    def class_right(self) -> bool:
+        """Whether one of its class acted."""
+        return self.first is not None and class_of(self.first) in self.true_classes
+
+    @property
+    def among_named(self) -> bool:
+        """Whether every effect that acted is among those named."""
+        return bool(self.true) and set(self.true) <= set(self.named)
+
+    @property
+    def found_classes(self) -> int:
+        """How many of the classes that acted were named."""
+        return len(self.true_classes & {class_of(name) for name in self.named})
+
+    @property
+    def outside_said(self) -> bool:
+        """Whether the library was said not to suffice."""
+        return self.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
+
+    @property
+    def claims(self) -> tuple[bool, ...]:
+        """Of each claim that an effect acts, whether one of its class does. "One of" is a single claim."""
+        if self.conclusion is Conclusion.ONE_OF:
+            return (any(class_of(name) in self.true_classes for name in self.named),) if self.named else ()
+        return tuple(class_of(name) in self.true_classes for name in self.named)
+
+    @property
+    def reduction(self) -> float | None:
+        """E_red: the median over the comparisons on unseen data."""
+        shares = [entry["share"] for entry in self.comparisons if entry["share"] is not None]
+        return median(shares) if shares and self.named else None
+
+    @property
+    def control_gap(self) -> float | None:
+        """By how much the wrong-effect control is worse than the effect, in half-widths of the interval of the paired
+        reduction; means over the comparisons. None where one effect was not named or there is no control."""
+        if len(self.named) < 1 or self.conclusion is Conclusion.ONE_OF:
+            return None
+        entries = [entry for entry in self.comparisons if entry["control"] is not None]
+        gaps = [entry["control"]["value"] - entry["after"]["value"] for entry in entries]
+        widths = [(entry["reduction"]["high"] - entry["reduction"]["low"]) / 2 for entry in entries]
+        return fmean(gaps) / fmean(widths) if entries and fmean(widths) > 0 else None
+
+    def strength(self, acting: Acting) -> Mapping[str, Any] | None:
+        """The estimate of an effect's strength, where it was weighed with that parameter."""
+        return next(
+            (
+                candidate["strength"]
+                for candidate in self.ranking
+                if candidate["effect"] == acting.effect and candidate["parameter"] == acting.parameter
+            ),
+            None,
+        )

@@ -1,0 +1,117 @@
+"""Has a fitter judge the sets of a challenge, and files what it says."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from importlib.abc import MetaPathFinder
+from multiprocessing import get_context
+from types import ModuleType
+from typing import TYPE_CHECKING, Protocol
+
+from flagdata.errors import FlagdataError
+from flagdata.rng import child_seed
+from measure.challenge.filing import Filing, file, filed, verdict_json
+from measure.challenge.folder import ChallengeFolder
+from measure.loop.verdict import Verdict
+from measure.observe.trajectory import Experiment
+
+if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
+
+IN_THIS_PROCESS = 0
+_APART = ("measure.challenge.outside", "measure.challenge.design", "measure.challenge.flight", "measure.challenge.key")
+
+
+class Fitter(Protocol):
+    """Judges an experiment. With workers it is sent to other processes, so it must be picklable."""
+
+    def __call__(self, experiment: Experiment, seed: int, /) -> Verdict:
+        """The verdict; the same for the same seed.
+
+        Raises:
+            FlagdataError: the data do not do: this is filed as a refusal.
+        """
+        ...
+
+
+def run(
+    folder: ChallengeFolder,
+    fitter: Fitter,
+    *,
+    seed: int,
+    only: Sequence[str] = (),
+    workers: int = 1,
+    progress: Callable[[Filing], object] | None = None,
+) -> list[Filing]:
+    """File a verdict on every set that has none yet, and return those.
+
+    Args:
+        seed: each set gets its own from it.
+        only: names of sets; none for all.
+        workers: processes of one thread each, in which what makes challenges cannot be imported; or IN_THIS_PROCESS.
+        progress: called with each verdict once it is filed.
+
+    Raises:
+        UnknownNameError: a set that is not there.
+        CorruptError: data that are not those that were published.
+    """
+    waiting = [name for name in folder.chosen(tuple(only)) if not filed(folder, name)]
+    done: list[Filing] = []
+
+    def keep(filing: Filing) -> None:
+        file(folder, filing)
+        done.append(filing)
+        if progress is not None:
+            progress(filing)
+
+    if workers == IN_THIS_PROCESS:
+        for name in waiting:
+            keep(_judge(folder, fitter, name, child_seed(seed, name)))
+        return done
+    failures: list[Future[Filing]] = []
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_prepare) as pool:
+        for future in as_completed(
+            [pool.submit(_judge, folder, fitter, name, child_seed(seed, name)) for name in waiting]
+        ):
+            if future.exception() is None:
+                keep(future.result())
+            else:
+                failures.append(future)
+    for future in failures:
+        future.result()  # raises the first; all that could be filed is
+    return done
+
+
+def _judge(folder: ChallengeFolder, fitter: Fitter, name: str, seed: int) -> Filing:
+    experiment = folder.experiment(name)
+    data = folder.manifest()["sets"][name]["data"]
+    began = time.monotonic()
+    try:
+        verdict = fitter(experiment, seed)
+    except FlagdataError as error:
+        seconds = time.monotonic() - began
+        return Filing(name=name, data=data, seed=seed, verdict=None, refusal=error.as_dict(), seconds=seconds)
+    seconds = time.monotonic() - began
+    return Filing(name=name, data=data, seed=seed, verdict=verdict_json(verdict), refusal=None, seconds=seconds)
+
+
+class Barrier(MetaPathFinder):
+    """Refuses to import what makes challenges."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if any(fullname == name or fullname.startswith(name + ".") for name in _APART):
+            raise ImportError(f"{fullname} is not for fitters")
+        return None
+
+
+def _prepare() -> None:
+    """Of a worker: one thread, and nothing of the generator within reach."""
+    import torch
+
+    torch.set_num_threads(1)
+    sys.meta_path.insert(0, Barrier())
