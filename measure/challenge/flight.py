@@ -1,4 +1,4 @@
-"""Simulates the recordings of sets that share their numerics, as one batch: effects are at null where they do not act."""
+"""Simulates recordings of sets that share their numerics, as one batch: effects are at null where they do not act."""
 
 from __future__ import annotations
 
