@@ -12,7 +12,6 @@ neighbours, which a sheet with bending stiffness follows over a few pixels.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -21,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding
+from flagdata.findings import Severity
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.timebase import NANOSECONDS
 
@@ -79,14 +78,12 @@ class EdgeTrack:
         height: (frame, column) rows from the top, fractional [px]; NaN where `seen` is not LINE.
         width: (frame, column) of the dark run along the column [px]; NaN likewise.
         seen: (frame, column) `Seen`.
-        findings: of the decoder.
     """
 
     time: NDArray[np.float64]
     height: NDArray[np.float64]
     width: NDArray[np.float64]
     seen: NDArray[np.uint8]
-    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         frames = (len(self.time), self.height.shape[-1])
@@ -194,17 +191,14 @@ def scatter(track: EdgeTrack) -> NDArray[np.float64]:
     return error
 
 
-def track_edge(
-    path: Path, *, true_rate: float, options: EdgeOptions | None = None, advance: Callable[[int], None] = lambda _: None
-) -> EdgeTrack:
+def track_edge(path: Path, *, true_rate: float, options: EdgeOptions | None = None) -> EdgeTrack:
     """The line in all frames of a clip, in its own pixels.
 
     Args:
         true_rate: at which the camera ran [Hz], whatever its container says.
-        advance: called with the number of frames done.
 
     Raises:
-        InputError: the clip has fewer than two frames.
+        InputError: the clip is damaged, or has fewer than two frames.
         FlagdataError: as `open_camera`.
     """
     options = options or EdgeOptions()
@@ -217,14 +211,15 @@ def track_edge(
             image = frame.image[top : top + stream.info.height, left : left + stream.info.width]
             found.append(line_in(image, options))
             times.append(frame.time / NANOSECONDS)
-            advance(1)
-        findings = stream.findings
+        damage = [finding for finding in stream.findings if finding.severity is Severity.ERROR]
+    if damage:
+        raise InputError(damage[0].what, where=str(path), fix=damage[0].fix or "give an undamaged copy of the clip")
     if len(times) < 2:
         raise InputError("a clip of fewer than two frames", where=str(path), fix="give a moving picture")
     time = np.array(times)
     return EdgeTrack(
         time=time - time[0], height=np.stack([each[0] for each in found]), width=np.stack([each[1] for each in found]),
-        seen=np.stack([each[2] for each in found]), findings=findings,
+        seen=np.stack([each[2] for each in found]),
     )  # fmt: skip
 
 

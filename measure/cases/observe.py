@@ -6,14 +6,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
+from flagdata.provenance import file_hash
 from flagdata.rng import stream
+from measure.cases import edge
 from measure.cases.edge import EdgeTrack, Seen, scatter, track_edge
 from measure.cases.evidence import Condition, Kind
+from measure.cases.kept import kept
 from measure.cases.recipe import Case, ClipSpec, Group
 from measure.cases.stretch import Stretch, stretch
 from measure.cases.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
@@ -134,8 +138,14 @@ def measure_clip(track: EdgeTrack, spec: ClipSpec, case: Case) -> Clip:
     )  # fmt: skip
 
 
-def observe(case: Case, data: Path, *, advance: Callable[[int], None] = lambda _: None) -> Observations:
+def observe(
+    case: Case, data: Path, *, keep: Path | None = None, advance: Callable[[int], None] = lambda _: None
+) -> Observations:
     """Track and measure all clips of a case and read its tables.
+
+    Args:
+        keep: folder of tracks; None keeps none.
+        advance: called with the number of clips done.
 
     Raises:
         NotFoundError: a file of the case is not there.
@@ -147,8 +157,18 @@ def observe(case: Case, data: Path, *, advance: Callable[[int], None] = lambda _
         path = data / case.folder / f"{spec.name}{case.suffix}"
         if not path.is_file():
             raise NotFoundError("no such clip", where=str(path), fix="give the folder that holds video/ and flutter/")
-        clips.append(measure_clip(track_edge(path, true_rate=case.true_rate, advance=advance), spec, case))
+        clips.append(measure_clip(_tracked(path, case, keep), spec, case))
+        advance(1)
     return Observations(clips=tuple(clips), thresholds=thresholds)
+
+
+def _tracked(path: Path, case: Case, keep: Path | None) -> EdgeTrack:
+    def make() -> dict[str, NDArray[Any]]:
+        track = track_edge(path, true_rate=case.true_rate)
+        return {"time": track.time, "height": track.height, "width": track.width, "seen": track.seen}
+
+    arrays = kept(keep, {"clip": file_hash(path), "true_rate": case.true_rate}, (edge,), make)
+    return EdgeTrack(time=arrays["time"], height=arrays["height"], width=arrays["width"], seen=arrays["seen"])
 
 
 def read_thresholds(case: Case, data: Path) -> Thresholds:

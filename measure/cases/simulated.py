@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
+from measure.cases import limit_cycle
+from measure.cases import waves as waves_module
 from measure.cases.candidates import Load, effects
 from measure.cases.evidence import Condition, Kind, LinearTable
-from measure.cases.limit_cycle import StripMotion, StripRun, as_columns, simulate
-from measure.cases.sheet import Sheet
+from measure.cases.kept import kept
+from measure.cases.limit_cycle import StripMotion, as_columns, simulate
+from measure.cases.recipe import Case
 from measure.cases.waves import waves
 
 _COLUMNS = 110
 _STILL = 0.01  # lengths: a tip that moves less does not flutter
+_BATCH = 60
+_FIELDS = ("frequency", "wave", "amplitude", "tip", "periodic")
 _PERIODIC = 0.9  # share of the variance that a periodic model explains
 
 
@@ -60,20 +68,45 @@ def observed(motion: StripMotion, member: int) -> Flutter:
 
 
 def flutters(
-    loads: Sequence[Load],
-    speeds: Sequence[float],
-    *,
-    bare: Sheet,
-    density: float,
-    run: StripRun,
-    advance: Callable[[int], None] = lambda _: None,
+    loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep: Path | None, advance: Callable[[int], None]
 ) -> list[Flutter]:
-    """One member a pair of load and speed at the sheet [m/s], in one batch."""
-    motion = simulate(
-        length=bare.length, mass=bare.mass, rigidity=bare.rigidity, density=density, speeds=speeds,
-        effects=effects(loads, length=bare.length, density=density), run=run, advance=advance,
-    )  # fmt: skip
-    return [observed(motion, member) for member in range(len(loads))]
+    """One member a pair of load and speed at the sheet [m/s], in batches.
+
+    Args:
+        keep: folder of intermediate results; None keeps none.
+        advance: called with the number of members done.
+    """
+    return [
+        one
+        for start in range(0, len(loads), _BATCH)
+        for one in _batch(loads[start : start + _BATCH], speeds[start : start + _BATCH], case, keep, advance)
+    ]
+
+
+def _batch(
+    loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None, advance: Callable[[int], None]
+) -> list[Flutter]:
+    def make() -> dict[str, NDArray[Any]]:
+        motion = simulate(
+            length=case.sheet.length, mass=case.sheet.mass, rigidity=case.sheet.rigidity, density=case.density,
+            speeds=speeds, effects=effects(loads, length=case.sheet.length, density=case.density), run=case.run,
+        )  # fmt: skip
+        found = [observed(motion, member) for member in range(len(loads))]
+        return {name: np.array([getattr(one, name) for one in found]) for name in _FIELDS}
+
+    inputs = {
+        "loads": [asdict(load) for load in loads], "speeds": list(speeds), "sheet": asdict(case.sheet),
+        "density": case.density, "run": asdict(case.run),
+    }  # fmt: skip
+    arrays = kept(keep, inputs, (limit_cycle, waves_module, sys.modules[__name__]), make)
+    advance(len(loads))
+    return [
+        Flutter(
+            frequency=float(arrays["frequency"][i]), wave=float(arrays["wave"][i]),
+            amplitude=float(arrays["amplitude"][i]), tip=float(arrays["tip"][i]), periodic=bool(arrays["periodic"][i]),
+        )
+        for i in range(len(loads))
+    ]  # fmt: skip
 
 
 class SimulatedTable:

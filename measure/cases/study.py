@@ -14,6 +14,8 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +103,12 @@ class Study:
     floor: Mapping[Kind, float]
 
 
+class _Simulated(Protocol):
+    """`flutters` for a case; another one of the same sheet may be given."""
+
+    def __call__(self, loads: Sequence[Load], speeds: Sequence[float], of: Case = ..., /) -> list[Flutter]: ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Evidence:
     """The conditions of each group."""
@@ -141,8 +149,19 @@ class _Evidence:
         )  # fmt: skip
 
 
-def study(case: Case, seen: Observations, *, advance: Callable[[int], None] = lambda _: None) -> Study:
-    """Everything of the module's head, about what was seen."""
+def study(
+    case: Case, seen: Observations, *, keep: Path | None = None, advance: Callable[[int], None] = lambda _: None
+) -> Study:
+    """Everything of the module's head, about what was seen.
+
+    Args:
+        keep: folder of intermediate results; None keeps none.
+        advance: called with the number of strips simulated; `strips` says how many there will be.
+    """
+
+    def simulated(loads: Sequence[Load], speeds: Sequence[float], of: Case = case, /) -> list[Flutter]:
+        return flutters(loads, speeds, case=of, keep=keep, advance=advance)
+
     evidence = _Evidence(case=case, seen=seen)
     lengths = (*case.fit_lengths, *case.held_out_lengths)
 
@@ -158,23 +177,30 @@ def study(case: Case, seen: Observations, *, advance: Callable[[int], None] = la
             crossed += [
                 evidence.outcome(candidate, Shear.FREE, table, fitted_to=(k,), judged_by=_FITTED) for k in _FITTED
             ]
-    tables = simulated_tables(case, linear_table, advance)
+    tables = _simulated_tables(case, linear_table, simulated)
     in_time = [
         evidence.outcome(candidate, shear, tables[candidate], fitted_to=_FITTED, judged_by=(*_FITTED, *_JUDGED))
         for candidate, shear in itertools.product(IN_TIME, Shear)
     ]
     best = min(in_time, key=lambda outcome: outcome.score)
     return Study(
-        declared=_declared(case, evidence, linear_table, advance), controls=_controls(case, advance),
+        declared=_declared(case, evidence, linear_table, simulated), controls=_controls(case, simulated),
         linear=tuple(linear), crossed=tuple(crossed), in_time=tuple(in_time), tables=tables,
-        floor=_floor(case, best, advance),
+        shapes=_shapes(case, in_time), floor=_floor(case, best, simulated),
     )  # fmt: skip
 
 
-def simulated_tables(
-    case: Case, linear_table: Callable[[Sequence[Load]], LinearTable], advance: Callable[[int], None]
+def strips(case: Case) -> int:
+    """How many strips a study simulates."""
+    candidates = len(case.shares) + len(case.lifts) + len(case.pair_shares) * len(case.pair_lifts) + len(CONTROLS)
+    clips = len(case.of(Group.FIT)) + len(case.of(Group.HELD_OUT))
+    return candidates * len(case.speeds) + 4 * clips + 2 * len(case.of(Group.HELD_OUT))
+
+
+def _simulated_tables(
+    case: Case, linear_table: Callable[[Sequence[Load]], LinearTable], simulated: _Simulated
 ) -> dict[Candidate, SimulatedTable]:
-    """The candidates of `IN_TIME` over the recipe's strengths and speeds, in one batch."""
+    """The candidates of `IN_TIME` over the recipe's strengths and speeds."""
     loads = {
         Candidate.REACTIVE: [Load(reactive=m) for m in case.shares],
         Candidate.LIFT: [Load(lift=c) for c in case.lifts],
@@ -182,69 +208,50 @@ def simulated_tables(
             Load(reactive=m, lift=c) for m, c in itertools.product(case.pair_shares, case.pair_lifts)
         ],
     }
-    every = [load for part in loads.values() for load in part]
-    pairs = list(itertools.product(every, case.speeds))
-    found = flutters(
-        [load for load, _ in pairs], [speed for _, speed in pairs], bare=case.sheet, density=case.density, run=case.run,
-        advance=advance,
-    )  # fmt: skip
-    rows = dict(zip(every, _rows(found, len(case.speeds)), strict=True))
     return {
-        candidate: SimulatedTable(part, case.speeds, [rows[load] for load in part], linear_table(part))
+        candidate: SimulatedTable(part, case.speeds, _over(part, case.speeds, simulated), linear_table(part))
         for candidate, part in loads.items()
     }
 
 
-def _rows(found: Sequence[Flutter], width: int) -> list[list[Flutter]]:
-    return [list(found[start : start + width]) for start in range(0, len(found), width)]
+def _over(loads: Sequence[Load], speeds: Sequence[float], simulated: _Simulated) -> list[list[Flutter]]:
+    """(load, speed) of every pair."""
+    pairs = list(itertools.product(loads, speeds))
+    found = simulated([load for load, _ in pairs], [speed for _, speed in pairs])
+    return [found[start : start + len(speeds)] for start in range(0, len(found), len(speeds))]
 
 
 def _declared(
-    case: Case,
-    evidence: _Evidence,
-    linear_table: Callable[[Sequence[Load]], LinearTable],
-    advance: Callable[[int], None],
+    case: Case, evidence: _Evidence, linear_table: Callable[[Sequence[Load]], LinearTable], simulated: _Simulated
 ) -> tuple[Cell, ...]:
     """Base and declared loading, at the logged speed and at the declared share of it."""
     loads = (Load(), Load(reactive=case.reactive_share))
     table = linear_table(loads)
-    kinds = {
-        kind: (*evidence.of(Group.FIT, (kind,)), *evidence.of(Group.HELD_OUT, (kind,))) for kind in _FITTED
-    }  # fmt: skip
+    kinds = {kind: (*evidence.of(Group.FIT, (kind,)), *evidence.of(Group.HELD_OUT, (kind,))) for kind in _FITTED}
     speeds = sorted(condition.at for condition in kinds[Kind.FREQUENCY])
-    cells = list(itertools.product(range(len(loads)), (1.0, case.shear_factor)))
-    members = [(loads[load], factor * speed) for load, factor in cells for speed in speeds]
-    found = flutters(
-        [load for load, _ in members], [speed for _, speed in members], bare=case.sheet, density=case.density,
-        run=case.run, advance=advance,
-    )  # fmt: skip
-    rows = _rows(found, len(speeds))
+    factors = (1.0, case.shear_factor)
+    rows = _over(loads, [factor * speed for factor in factors for speed in speeds], simulated)
     return tuple(
         Cell(
-            load=loads[load], factor=factor,
-            errors={kind: errors(table, load, factor, part) for kind, part in kinds.items()},
-            tips={speed: one.tip for speed, one in zip(speeds, row, strict=True)},
+            load=load, factor=factor,
+            errors={kind: errors(table, index, factor, part) for kind, part in kinds.items()},
+            tips={speed: rows[index][half * len(speeds) + at].tip for at, speed in enumerate(speeds)},
         )
-        for (load, factor), row in zip(cells, rows, strict=True)
+        for index, load in enumerate(loads)
+        for half, factor in enumerate(factors)
     )  # fmt: skip
 
 
-def _controls(case: Case, advance: Callable[[int], None]) -> dict[Candidate, tuple[Load, float]]:
-    """Each control's strongest load, and the widest travel of its tip over the length at any speed of the grid."""
+def _controls(case: Case, simulated: _Simulated) -> dict[Candidate, tuple[Load, float]]:
     loads = {candidate: tried(candidate)[-1] for candidate in CONTROLS}
-    pairs = list(itertools.product(loads.values(), case.speeds))
-    found = flutters(
-        [load for load, _ in pairs], [speed for _, speed in pairs], bare=case.sheet, density=case.density, run=case.run,
-        advance=advance,
-    )  # fmt: skip
-    rows = _rows(found, len(case.speeds))
+    rows = _over(list(loads.values()), case.speeds, simulated)
     return {
         candidate: (load, max(one.tip for one in row))
         for (candidate, load), row in zip(loads.items(), rows, strict=True)
     }
 
 
-def _shapes(case: Case, in_time: Sequence[Outcome], advance: Callable[[int], None]) -> dict[Candidate, StripMotion]:
+def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMotion]:
     """What the models in time with a free factor do at the speed of a whole clip that is held out."""
     models = [outcome for outcome in in_time if outcome.shear is Shear.FREE]
     speed = next(clip.speed for clip in case.of(Group.HELD_OUT) if clip.whole)
@@ -252,7 +259,6 @@ def _shapes(case: Case, in_time: Sequence[Outcome], advance: Callable[[int], Non
         length=case.sheet.length, mass=case.sheet.mass, rigidity=case.sheet.rigidity, density=case.density,
         speeds=[model.factor * speed for model in models],
         effects=effects([model.load for model in models], length=case.sheet.length, density=case.density), run=case.run,
-        advance=advance,
     )  # fmt: skip
     return {
         model.candidate: replace(motion, along=motion.along[..., [i]], across=motion.across[..., [i]])
@@ -260,16 +266,14 @@ def _shapes(case: Case, in_time: Sequence[Outcome], advance: Callable[[int], Non
     }
 
 
-def _floor(case: Case, best: Outcome, advance: Callable[[int], None]) -> dict[Kind, float]:
+def _floor(case: Case, best: Outcome, simulated: _Simulated) -> dict[Kind, float]:
     """Largest |log| by which half the cells and twice the in-plane stiffness move the best model, by kind."""
-    speeds = [best.factor * clip.speed for clip in case.clips if clip.group is Group.HELD_OUT]
-    finer = replace(case.run, columns=2 * case.run.columns, stretching=2 * case.run.stretching)
-    coarse, fine = (
-        flutters([best.load] * len(speeds), speeds, bare=case.sheet, density=case.density, run=run, advance=advance)
-        for run in (case.run, finer)
-    )
+    speeds = [best.factor * clip.speed for clip in case.of(Group.HELD_OUT)]
+    finer = replace(case, run=replace(case.run, columns=2 * case.run.columns, stretching=2 * case.run.stretching))
+    loads = [best.load] * len(speeds)
+    pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, finer), strict=True))
     names = {Kind.FREQUENCY: "frequency", Kind.WAVE: "wave", Kind.AMPLITUDE: "amplitude"}
     return {
-        kind: float(max(abs(math.log(getattr(a, n) / getattr(b, n))) for a, b in zip(coarse, fine, strict=True)))
-        for kind, n in names.items()
+        kind: float(max(abs(math.log(getattr(a, name) / getattr(b, name))) for a, b in pairs))
+        for kind, name in names.items()
     }

@@ -1,0 +1,46 @@
+"""Intermediate results on disk, named by a hash of all that went in: a study that was interrupted goes on from there.
+
+What went in includes the source of the modules that computed it: a changed method never meets old results.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.provenance import file_hash, recipe_hash
+
+
+def kept(
+    folder: Path | None,
+    inputs: Mapping[str, Any],
+    method: Sequence[ModuleType],
+    make: Callable[[], Mapping[str, NDArray[Any]]],
+) -> Mapping[str, NDArray[Any]]:
+    """The arrays that `make` returns, computed once for the same inputs and method.
+
+    Args:
+        folder: where they are kept; None keeps nothing.
+        inputs: everything that shapes the arrays, as JSON values.
+        method: the modules whose source shapes them.
+    """
+    if folder is None:
+        return make()
+    source = {module.__name__: file_hash(Path(module.__file__ or "")) for module in method}
+    target = folder / f"{recipe_hash({'inputs': dict(inputs), 'source': source})[:20]}.npz"
+    if target.is_file():
+        with np.load(target) as stored:
+            return {name: stored[name] for name in stored.files}
+    arrays = make()
+    folder.mkdir(parents=True, exist_ok=True)
+    unfinished = target.with_suffix(f".{os.getpid()}.partial")
+    with unfinished.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)
+    unfinished.replace(target)
+    return arrays
