@@ -1,26 +1,30 @@
-"""Where a pixel's samples lie: within the pixel, within the exposure, and on the sun's disc. No chance in it."""
+"""Where a pixel's samples lie: within the pixel, within the exposure, and on the sun's disc: always the same."""
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.rng import stream
 from sim.render.parameters import RenderParameters
 
 SUNS = 2
 """Points of the sun that each sample sees."""
+_ORDERS = 256
+_FEW = 64
 
 
 @dataclass(frozen=True, kw_only=True)
 class Samples:
     """The samples of every pixel.
 
-    Each coordinate takes one value in each of as many equal parts as there are samples (a Latin hypercube), in the
-    order of the ranks of an additive recurrence, which keeps coordinates apart from each other (M. Roberts 2018, "The
-    unreasonable effectiveness of quasirandom sequences").
+    Each coordinate takes one value in each of as many equal parts as there are samples. Places in the pixel keep far
+    from each other; instants and points of the sun are dealt out so that they hardly correlate with the places or with
+    each other, since a place that goes with an instant would look like motion.
 
     Attributes:
         jitter: (sample, 2) place in the pixel, in [0, 1) from its upper left corner.
@@ -38,26 +42,54 @@ class Samples:
     @classmethod
     def of(cls, parameters: RenderParameters, *, to_sun: tuple[float, float, float]) -> Samples:
         """The samples for ζ, with the middle of the sun in direction `to_sun`."""
-        count = parameters.raster_samples
-        jitter, time = _strata(count, 2), _strata(count, 3)[:, 2]
-        around = _strata(count * SUNS, 2)
+        count, radius = parameters.raster_samples, parameters.sun_angular_radius
+        jitter = _apart(count)
+        time = _dealt((np.arange(count) + 0.5)[:, None] / count, jitter, "time")
+        sun = _cone(_hammersley(count * SUNS), to_sun, radius)
+        sun = _dealt(sun.reshape(count, SUNS * 3), np.concatenate([jitter, time], axis=1), "sun")
         return cls(
-            jitter=jitter,
-            time=(time - 0.5) * parameters.exposure_time,
-            to_sun=_cone(around, to_sun, parameters.sun_angular_radius).reshape(count, SUNS, 3),
-            sun_weight=parameters.sun_strength
-            * 2 / ((1 + math.cos(parameters.sun_angular_radius)) * count * SUNS),
+            jitter=jitter, time=(time[:, 0] - 0.5) * parameters.exposure_time, to_sun=sun.reshape(count, SUNS, 3),
+            sun_weight=parameters.sun_strength * 2 / ((1 + math.cos(radius)) * count * SUNS),
         )  # fmt: skip
 
 
-def _strata(count: int, dimensions: int) -> NDArray[np.float64]:
-    """(count, dimensions) points in (0, 1), each coordinate once in the middle of each of `count` equal parts."""
-    ratio = 2.0
-    for _ in range(64):  # the root of x^(d+1) = x + 1
-        ratio = (1 + ratio) ** (1 / (dimensions + 1))
-    steps = ratio ** -np.arange(1.0, dimensions + 1)
-    points = (0.5 + np.arange(count)[:, None] * steps) % 1.0
-    return (points.argsort(axis=0).argsort(axis=0) + 0.5) / count
+def _hammersley(count: int) -> NDArray[np.float64]:
+    """(count, 2) points in (0, 1)², each coordinate once in the middle of each of `count` equal parts."""
+    index, mirrored = np.arange(count), np.zeros(count)
+    for bit in range(count.bit_length()):
+        mirrored += (index >> bit & 1) * 0.5 ** (bit + 1)
+    return (np.stack([index, mirrored.argsort().argsort()], axis=1) + 0.5) / count
+
+
+@functools.cache
+def _apart(count: int) -> NDArray[np.float64]:
+    """(count, 2) points as of `_hammersley`; few ones in that one of some orders that keeps them farthest apart, taken
+    as a pattern that repeats, and on no diagonal."""
+    points = _hammersley(count)
+    if not 3 <= count <= _FEW:
+        return points
+    rng, best, found = stream(0, "render", "samples", "places"), -math.inf, points
+    for _ in range(_ORDERS):
+        tried = np.stack([points[:, 0], (rng.permutation(count) + 0.5) / count], axis=1)
+        gap = np.abs(tried[:, None] - tried)
+        gap = np.hypot(*np.moveaxis(np.minimum(gap, 1 - gap), 2, 0)) + 2 * np.eye(count)
+        score = round(float(gap.min() * math.sqrt(count)) - abs(float(np.corrcoef(tried.T)[0, 1])), 9)
+        if score > best:
+            best, found = score, tried
+    return found
+
+
+def _dealt(values: NDArray[np.float64], given: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """The rows of `values` in that one of some orders in which their columns correlate least with those of `given`."""
+    count, rng = len(values), stream(0, "render", "samples", name)
+    if count < 3:
+        return values
+    orders = [rng.permutation(count) for _ in range(_ORDERS)]
+    spread = [np.linalg.norm(part - part.mean(axis=0), axis=0) for part in (values, given)]
+    scale = np.maximum(spread[0][:, None] * spread[1], 1e-9)
+    offset = given - given.mean(axis=0)
+    worst = [np.abs(values[order].T @ offset / scale).max() for order in orders]
+    return values[orders[int(np.argmin(np.round(worst, 9)))]]
 
 
 def _cone(points: NDArray[np.float64], middle: tuple[float, float, float], radius: float) -> NDArray[np.float64]:

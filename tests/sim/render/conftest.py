@@ -1,0 +1,41 @@
+"""Lights and cameras under which bytes can be worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sim.render import RenderParameters
+from sim.render.raster import Raster
+from tests.sim.render.pieces import BLACK, WHITE, Given, plain
+
+
+@pytest.fixture
+def look() -> Callable[..., RenderParameters]:
+    """White cloth before black, under the sky alone, so exposed that cloth is just white; no pole.
+
+    The camera stands 5 m off, level with the origin's 0 m, and sees 1 m there as 60 px.
+    """
+
+    def make(**changes: object) -> RenderParameters:
+        given: dict[str, object] = {
+            "background": "black", "texture": "white", "sun_strength": 0.0, "sky_strength": 1.0, "pole_radius": 0.0,
+            "camera_height": 0.0, "mesh_height": 0.0, "camera_radius": 5.0, "view_angle": 2 * math.atan(0.5),
+        } | changes  # fmt: skip
+        return RenderParameters(**given)  # type: ignore[arg-type]
+
+    return make
+
+
+@pytest.fixture
+def camera_of() -> Callable[..., Raster]:
+    """A renderer with black and white, and more pictures by name."""
+
+    def make(**pictures: NDArray[np.uint8]) -> Raster:
+        return Raster(assets=Given(pictures={"black": plain(BLACK), "white": plain(WHITE), **pictures}))
+
+    return make
