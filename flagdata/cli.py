@@ -32,6 +32,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake."),
     "gc": ("flagdata.commands.upkeep:gc", "Delete what nothing refers to."),
     "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
+    "challenge": ("measure.challenge.command:challenge", "Grade closing the loop on sealed data sets."),
     "demo": ("measure.demo.command:demo", "Make a small field recording and take it through everything."),
 }
 

@@ -97,6 +97,21 @@ class ChallengeFolder:
                 raise UnknownNameError.of("set", name, names, where=str(self.path))
         return [name for name in names if not only or name in only]
 
+    def seal(self, name: str) -> dict[str, Any]:
+        """What is sealed of a set: key and salt.
+
+        Raises:
+            NotFoundError: it is not there.
+            CorruptError: it is no JSON.
+        """
+        path = self.sealed(name)
+        if not path.is_file():
+            raise NotFoundError("no sealed key", where=str(path), fix="bring it from where the challenge was made")
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise CorruptError(f"not a sealed key: {error}", where=str(path), fix="restore the file") from error
+
     def checked(self, name: str) -> None:
         """Make sure that a set's data are those that were published.
 

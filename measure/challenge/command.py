@@ -1,0 +1,112 @@
+"""`flagdata challenge make | run | score`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.console import document, json_option, progress, say
+
+if TYPE_CHECKING:
+    from measure.challenge.filing import Filing
+
+_FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+_ONLY = click.option("--only", multiple=True, metavar="SET", help="Only this set; may be given again.")
+
+
+@click.group()
+def challenge() -> None:
+    """Grade closing the loop on recordings whose undeclared effect is sealed.
+
+    Keys are opened by `score` alone, and only of sets whose verdict is filed. Until then `challenge.json` holds a hash
+    of each.
+
+    \b
+      flagdata challenge make out/challenge --seed 7 --sets 60 --workers 2
+      flagdata challenge run out/challenge --workers 2
+      flagdata challenge score out/challenge --out docs/results
+    """
+
+
+@challenge.command()
+@_FOLDER
+@click.option("--recipe", default="standard", show_default=True, help="Of the catalog by name, or a .toml file.")
+@click.option("--seed", type=click.IntRange(min=0), required=True, help="Of all that is drawn; keep it to yourself.")
+@click.option("--sets", "count", type=click.IntRange(min=1), default=60, show_default=True, help="How many.")
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes that simulate.")
+@json_option
+def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
+    """Draw keys, simulate, and write sealed data sets into a new folder."""
+    from measure.challenge.make import make as make_challenge
+    from measure.challenge.recipe import load
+
+    loaded = load(recipe)
+    with progress(count, label=loaded.title, unit="set") as advance:
+        made = make_challenge(folder, loaded, seed=seed, count=count, workers=workers, progress=advance)
+    if as_json:
+        document("challenge-made", {"folder": str(made.path), "sets": made.manifest()["sets"]})
+    else:
+        click.echo(str(made.path))
+
+
+@challenge.command()
+@_FOLDER
+@_ONLY
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the fitter.")
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Sets at a time.")
+@click.option("--bank", type=click.Path(path_type=Path), help="Folder of simulated nulls that the sets share.")
+@json_option
+def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
+    """Judge the sets that have no verdict yet, and file what is said with its hash."""
+    from measure.challenge.filing import filed
+    from measure.challenge.fitter import ClosingTheLoop
+    from measure.challenge.folder import ChallengeFolder
+    from measure.challenge.run import run as run_challenge
+
+    target = ChallengeFolder(folder)
+    waiting = [name for name in target.chosen(only) if not filed(target, name)]
+    with progress(len(waiting), label="judging", unit="set") as advance:
+
+        def report(filing: Filing) -> None:
+            advance(1)
+            # What it says stays in the file: who watches a run should not learn to read it.
+            say(f"{filing.name} filed after {filing.seconds:.0f} s{' (refused)' if filing.verdict is None else ''}")
+
+        filings = run_challenge(
+            target, ClosingTheLoop(bank=bank), seed=seed, only=only, workers=workers, progress=report
+        )
+    if as_json:
+        rows = [{"set": f.name, "seconds": f.seconds, "refusal": f.refusal} for f in filings]
+        document("challenge-run", {"folder": str(folder), "filed": rows})
+    else:
+        for filing in sorted(filings, key=lambda f: f.name):
+            click.echo(str(target.verdict(filing.name)))
+
+
+@challenge.command()
+@_FOLDER
+@_ONLY
+@click.option("--out", type=click.Path(path_type=Path), help="Also write the sheet here: .json, .md and .png.")
+@json_option
+@click.pass_context
+def score(context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+    """Open the keys and grade; ends with 3 where a gate is not met.
+
+    From then on no verdict can be filed on these sets.
+    """
+    from measure.challenge import sheet as sheets
+    from measure.challenge.folder import ChallengeFolder
+    from measure.challenge.score import score as score_challenge
+
+    sheet = score_challenge(ChallengeFolder(folder), only=only)
+    if out is not None:
+        for path in sheets.write(sheet, out):
+            say(f"wrote {path}")
+    if as_json:
+        document("score", sheets.as_dict(sheet))
+    else:
+        click.echo(sheets.markdown(sheet), nl=False)
+    if not all(gate.met for gate in sheet.gates):
+        context.exit(3)

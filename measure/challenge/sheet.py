@@ -1,0 +1,218 @@
+"""The score sheet as JSON, Markdown and a picture."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flagdata.provenance import code_version
+from measure.challenge.classes import class_of
+from measure.challenge.folder import write_json
+from measure.challenge.rates import Power
+from measure.challenge.recipe import Kind
+from measure.challenge.score import ENOUGH, Sheet
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from measure.challenge.outcome import Outcome
+
+_MILLI = 1e3
+
+
+def as_dict(sheet: Sheet) -> dict[str, Any]:
+    """Everything of the sheet as JSON values."""
+    coefficients, gaps = sheet.coefficients, [o.control_gap for o in sheet.outcomes if o.control_gap is not None]
+    return {
+        "schema": "flagdata.score/1",
+        "title": sheet.title,
+        "code_version": code_version(),
+        "sets": {kind.value: len(sheet.of_kind(kind)) for kind in Kind},
+        "strong": len(sheet.strong),
+        "gates": [gate.as_dict() for gate in sheet.gates],
+        "shares": {name: share.as_dict() for name, share in sheet.shares.items()},
+        "reduction": _spread(sheet.reductions, lowest=0.1),
+        "coefficient": {
+            "relative_error": _spread([abs(e) for e in coefficients.errors], lowest=0.9),
+            "bias": float(np.median(coefficients.errors)) if coefficients.errors else None,
+            "levels": list(coefficients.levels),
+        },
+        "control_gap": _spread(gaps, lowest=0.1),
+        "power": {
+            "by_class": _curve(sheet.power),
+            "by_noise": _curve(sheet.by_noise),
+            "by_rate": _curve(sheet.by_rate),
+        },
+        "seconds": _spread([o.seconds for o in sheet.outcomes], lowest=0.9),
+        "confusion": confusion(sheet),
+        "outcomes": [_row(outcome) for outcome in sheet.outcomes],
+    }
+
+
+def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
+    """What was true → what was said → how often."""
+    table: dict[str, Counter[str]] = {}
+    for outcome in sheet.outcomes:
+        table.setdefault(_truth(outcome), Counter())[_said(outcome)] += 1
+    return {true: dict(sorted(said.items())) for true, said in sorted(table.items())}
+
+
+def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
+    """The sheet for people."""
+    count = len(sheet.outcomes)
+    parts = [f"# Score: {sheet.title}", "", f"{count} sets: " + ", ".join(
+        f"{len(sheet.of_kind(kind))} {kind.value}" for kind in Kind) + f". Code {code_version()}.", ""]  # fmt: skip
+    parts += ["| gate | value | wanted | met |", "|---|---|---|---|"]
+    for gate in sheet.gates:
+        sign = "≤" if gate.at_most else "≥"
+        met = "yes" if gate.met else "no"
+        parts.append(f"| {gate.name} | {_number(gate.value)} | {sign} {gate.wanted:g} | {met} |")
+    parts += ["", "| share | of | value | Clopper–Pearson 90 % |", "|---|---|---|---|"]
+    for name, share in sheet.shares.items():
+        bounds = f"[{share.low:.2f}, {share.high:.2f}]"
+        parts.append(f"| {name} | {share.hits}/{share.count} | {_number(share.value)} | {bounds} |")
+    levels = ", ".join(f"{100 * level:g} %" for level in sheet.coefficients.levels)
+    if levels:
+        parts += ["", f"The true strengths are to lie in intervals stated at {levels}."]
+    parts += ["", f"E_red: {_words(sheet.reductions, 0.1, 'worst decile')}."]
+    errors = [abs(error) for error in sheet.coefficients.errors]
+    parts += [f"Relative error of the strength: {_words(errors, 0.9, 'worst decile')}."]
+    parts += [f"Time for a set: {_words([o.seconds for o in sheet.outcomes], 0.9, 'slowest decile')} s.", ""]
+    parts.append(
+        "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects are those of "
+        f"{ENOUGH:g} times that, {len(sheet.strong)} sets."
+    )
+    parts += ["", "| group | half detected at | sets |", "|---|---|---|"]
+    parts += _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
+    acted = [o for o in sheet.outcomes if o.key.impact > 0]
+    parts += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
+    parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
+    if picture is not None:
+        parts += ["", f"![Power curves]({picture})"]
+    parts += ["", "| true | said | sets |", "|---|---|---|"]
+    parts += [f"| {true} | {said} | {n} |" for true, row in confusion(sheet).items() for said, n in row.items()]
+    parts += ["", "| set | true | impact, mm | noise, mm | rate | numerics | said | E_red | control gap | s |",
+              "|---|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
+    for o in sheet.outcomes:
+        cells = (
+            o.key.name, _truth(o, strengths=True), f"{_MILLI * o.key.impact:.2g}", f"{_MILLI * o.key.noise:g}",
+            str(o.key.rate), o.key.numerics, _said(o), _number(o.reduction), _number(o.control_gap), f"{o.seconds:.0f}",
+        )  # fmt: skip
+        parts.append("| " + " | ".join(cells) + " |")
+    return "\n".join(parts) + "\n"
+
+
+def write(sheet: Sheet, folder: Path) -> tuple[Path, ...]:
+    """challenge-score.json, .md and .png into a folder; their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    document, page, picture = (folder / f"challenge-score.{ending}" for ending in ("json", "md", "png"))
+    write_json(document, as_dict(sheet))
+    plot(sheet, picture)
+    page.write_text(markdown(sheet, picture=picture.name), encoding="utf-8")
+    return document, page, picture
+
+
+def plot(sheet: Sheet, path: Path) -> None:
+    """Power curves by class, noise and frame rate; cases above (detected) and below (not)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    panels = figure.subplots(1, 3, sharey=True)
+    one = [o for o in sheet.of_kind(Kind.ONE) if o.key.impact > 0]
+    acted = [o for o in sheet.outcomes if o.key.impact > 0]
+    _panel(panels[0], "one effect, by class", sheet.power, [(_class_name(o), o) for o in one])
+    _panel(
+        panels[1], "any effect, by marker noise [mm]", sheet.by_noise, [(f"{_MILLI * o.key.noise:g}", o) for o in acted]
+    )
+    _panel(panels[2], "any effect, by frames a second", sheet.by_rate, [(str(o.key.rate), o) for o in acted])
+    panels[0].set_ylabel("chance of detection")
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[str, Outcome]]) -> None:
+    from matplotlib import colormaps
+
+    axes.set_title(title, fontsize=10)
+    axes.set_xlabel("impact: displacement within 0.1 s [mm]")
+    axes.set_ylim(-0.12, 1.12)
+    if power is None:
+        return
+    impacts = np.array([o.key.impact for _, o in cases])
+    grid = np.geomspace(impacts.min() / 2, impacts.max() * 2, 200)
+    colours = colormaps["tab20" if len(power.half) > 10 else "tab10"]
+    for index, name in enumerate(power.half):
+        colour = colours(index)
+        axes.semilogx(_MILLI * grid, power.at(grid, name), color=colour, label=name, lw=1.4)
+        for group, outcome in cases:
+            if group == name:
+                height = 1.05 + 0.004 * index if outcome.detected else -0.05 - 0.004 * index
+                axes.plot(_MILLI * outcome.key.impact, height, "o", color=colour, ms=4)
+    axes.semilogx(_MILLI * grid, power.at(grid), color="black", lw=2, label="a group not seen", ls="--")
+    axes.legend(fontsize=6, ncols=2, loc="center right")
+    axes.grid(alpha=0.3)
+
+
+def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[str]:
+    if power is None:
+        return []
+    return [
+        f"| {what}: {name} | {_MILLI * half:.2g} [{_MILLI * low:.2g}, {_MILLI * high:.2g}] mm | {counts[name]} |"
+        for name, (half, low, high) in power.half.items()
+    ]
+
+
+def _curve(power: Power | None) -> dict[str, Any] | None:
+    if power is None:
+        return None
+    bounds = {name: dict(zip(("half", "low", "high"), values, strict=True)) for name, values in power.half.items()}
+    return {"slope": power.slope, "unit": "m", "groups": bounds, "level": 0.9}
+
+
+def _spread(values: Sequence[float], *, lowest: float) -> dict[str, float | int | None]:
+    """Median and the decile that is the worse."""
+    if not values:
+        return {"median": None, "worst_decile": None, "count": 0}
+    return {
+        "median": float(np.median(values)),
+        "worst_decile": float(np.quantile(values, lowest)),
+        "count": len(values),
+    }
+
+
+def _words(values: Sequence[float], worst: float, name: str) -> str:
+    if not values:
+        return "no cases"
+    return f"median {np.median(values):.2g}, {name} {np.quantile(values, worst):.2g}, n = {len(values)}"
+
+
+def _row(o: Outcome) -> dict[str, Any]:
+    return {
+        "key": o.key.as_dict(), "conclusion": o.conclusion.value if o.conclusion is not None else "refused",
+        "named": list(o.named), "detected": o.detected, "top_1": o.first_right, "class_level": o.class_right,
+        "reduction": o.reduction, "control_gap": o.control_gap, "seconds": o.seconds,
+    }  # fmt: skip
+
+
+def _class_name(outcome: Outcome) -> str:
+    return class_of(outcome.key.effects[0].effect)
+
+
+def _truth(outcome: Outcome, *, strengths: bool = False) -> str:
+    if not outcome.key.effects:
+        return "nothing"
+    names = [f"{a.effect} {a.value:.2g} {a.unit}" if strengths else a.effect for a in outcome.key.effects]
+    return " + ".join(names) + (" (outside)" if outcome.key.kind is Kind.OUTSIDE else "")
+
+
+def _said(outcome: Outcome) -> str:
+    if outcome.conclusion is None:
+        return "refused"
+    return outcome.conclusion.value + (": " + ", ".join(outcome.named) if outcome.named else "")
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
