@@ -24,7 +24,8 @@ _WIDTH = 300.0
 _LEFT, _TOP, _BOTTOM = 46.0, 26.0, 40.0
 _PIXELS = 150  # across a map; the browser smooths
 _LEVELS = 255  # colours of a picture; one index more stands for none
-_SLIVER = 1e-3  # triangles smaller than this part of the median are rounding along straight edges
+_LEAN = 1e-3  # shear that makes all diagonals of a regular grid run the same way
+_SLIVER = 2e-2  # triangles smaller than this part of the median come of rounding, or of that shear, at straight edges
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +95,8 @@ def triangles(markers: NDArray[np.float64]) -> NDArray[np.int64]:
     """(triangle, 3) over markers (marker, 2) [m], without slivers; empty where they lie on a line."""
     if on_a_line(markers):
         return np.zeros((0, 3), dtype=np.int64)
-    found = Delaunay(markers).simplices.astype(np.int64)
+    leaning = markers @ np.array([[1.0, 0.0], [_LEAN, 1.0]])
+    found = Delaunay(leaning).simplices.astype(np.int64)
     a, b, c = (markers[found[:, i]] for i in range(3))
     area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     return found[area > _SLIVER * np.median(area)]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from scipy.stats import binomtest
 
-from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from measure.loop.verdict import Candidate, Conclusion, Estimate, NullTest, Verdict
 from measure.report.quantity import known, level_text, number, probability
 
 _LEVEL = 0.9
@@ -116,7 +116,6 @@ def rejected(verdict: Verdict) -> list[Candidate]:
     return [c for c in verdict.ranking if c.effect not in verdict.named]
 
 
-def common_level(comparisons: Sequence[Comparison]) -> str:
-    """The level of all intervals, where it is one."""
-    levels = {e.level for c in comparisons for e in (c.before, c.after, c.reduction, c.floor)}
-    return level_text(levels.pop()) if len(levels) == 1 else "mixed levels"
+def common_level(estimates: Iterable[Estimate]) -> str:
+    """The level of all intervals, or all that there are."""
+    return ", ".join(level_text(level) for level in sorted({e.level for e in estimates if known(e)}))

@@ -1,0 +1,116 @@
+"""The report as a JSON document, and back: the same content as the page, checked against the verdict's own types.
+
+JSON has no NaN and no infinities. A number that is missing is null; an interval's open end is "Infinity" or
+"-Infinity", as in the JSON mapping of Protocol Buffers.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from flagdata.errors import InputError
+from measure.loop.verdict import Verdict
+
+SCHEMA = "flagdata.verdict/1"
+_SCALARS = {bool: "true or false", int: "a whole number", str: "a text"}
+_INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
+
+
+def as_document(verdict: Verdict) -> dict[str, Any]:
+    """The verdict as JSON values, with its schema tag."""
+    return _plain(verdict.as_dict())
+
+
+def from_document(document: Mapping[str, Any]) -> Verdict:
+    """The verdict that a document holds.
+
+    Raises:
+        InputError: another schema, a field that is missing, unknown or of another type; it says which.
+    """
+    content = dict(document)
+    tag = content.pop("schema", None)
+    if tag != SCHEMA:
+        raise InputError(f"schema {tag!r}", where="schema", fix=f"give a document of schema {SCHEMA!r}")
+    return _read(content, Verdict, "verdict")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, StrEnum):
+        return value.value
+    if isinstance(value, float):
+        if math.isnan(value):
+            return None
+        return value if math.isfinite(value) else ("Infinity" if value > 0 else "-Infinity")
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+def _read(value: Any, kind: Any, where: str) -> Any:
+    """`value` as `kind`: one of the verdict's types, built from dataclasses, tuples, lists, numbers and texts."""
+    if get_origin(kind) in (Union, types.UnionType):
+        (present,) = (k for k in get_args(kind) if k is not types.NoneType)
+        return None if value is None else _read(value, present, where)
+    if dataclasses.is_dataclass(kind):
+        return _record(value, kind, where)
+    if get_origin(kind) in (tuple, list):
+        return _sequence(value, kind, where)
+    if get_origin(kind) is dict:
+        return dict(_expected(value, Mapping, "an object", where))
+    if kind is float:
+        return _number(value, where)
+    if kind in _SCALARS:
+        return _expected(value, kind, _SCALARS[kind], where)
+    text = _expected(value, str, "a text", where)
+    try:
+        return kind(text)
+    except ValueError as error:
+        known = ", ".join(repr(str(k)) for k in kind)
+        raise InputError(f"unknown value {text!r}", where=where, fix=f"give one of {known}") from error
+
+
+def _record(value: Any, kind: Any, where: str) -> Any:
+    content = _expected(value, Mapping, "an object", where)
+    hints = get_type_hints(kind)
+    needed = {
+        f.name
+        for f in dataclasses.fields(kind)
+        if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
+    }
+    for name, wrong in (("unknown", content.keys() - hints.keys()), ("missing", needed - content.keys())):
+        if wrong:
+            raise InputError(
+                f"{name} field {', '.join(sorted(wrong))}", where=where, fix=f"the fields are {', '.join(hints)}"
+            )
+    return kind(**{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()})
+
+
+def _sequence(value: Any, kind: Any, where: str) -> Any:
+    items = _expected(value, list, "a list", where)
+    inner = get_args(kind)
+    if get_origin(kind) is list:
+        return [_read(item, inner[0], f"{where}[{n}]") for n, item in enumerate(items)]
+    if inner[-1] is Ellipsis:
+        return tuple(_read(item, inner[0], f"{where}[{n}]") for n, item in enumerate(items))
+    if len(items) != len(inner):
+        raise InputError(f"{len(items)} entries", where=where, fix=f"give {len(inner)}")
+    return tuple(_read(item, k, f"{where}[{n}]") for n, (item, k) in enumerate(zip(items, inner, strict=True)))
+
+
+def _number(value: Any, where: str) -> float:
+    if value is None:
+        return math.nan
+    if isinstance(value, str) and value in _INFINITE:
+        return _INFINITE[value]
+    return float(_expected(value, int | float, "a number", where))
+
+
+def _expected(value: Any, kind: Any, wanted: str, where: str) -> Any:
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        raise InputError(f"{type(value).__name__} instead of {wanted}", where=where, fix=f"give {wanted}")
+    return value

@@ -1,0 +1,104 @@
+"""The report in words, for a terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+
+from measure.loop.verdict import Candidate, Comparison, Verdict
+from measure.report import sentences
+from measure.report.quantity import (
+    display,
+    estimate_text,
+    in_errors,
+    known,
+    level_text,
+    probability,
+    share,
+    with_error,
+    with_level,
+)
+
+_WIDTH = 100
+_RUNNERS_UP = 3
+_NO_BREAK = "\N{NO-BREAK SPACE}"
+
+
+def words(verdict: Verdict) -> str:
+    """The verdict, its test, the errors before and after, what else was weighed and what was assumed.
+
+    Lines of at most 100 characters, except where a name is longer; no final line break.
+    """
+    return "\n".join(line for part in _parts(verdict) for line in part)
+
+
+def _parts(verdict: Verdict) -> Iterator[list[str]]:
+    yield [sentences.heading(verdict)]
+    yield [*_wrapped(verdict.words), ""]
+    remark = sentences.test_remark(verdict.test)
+    yield _item("test", " ".join([sentences.test_sentence(verdict.test), remark]).strip())
+    for candidate in sentences.named_candidates(verdict):
+        yield _item(candidate.effect, _weighed(candidate))
+    for comparison in verdict.comparisons:
+        yield _item(comparison.what, _compared(comparison, sentences.after_label(verdict)))
+    for warning in sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict):
+        yield _item("beware", warning)
+    for parameter in verdict.parameters:
+        moved = ""
+        if known(parameter.after):
+            moved = f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} standard errors"
+        yield _item(parameter.name, f"{with_level(parameter.before)}{moved}")
+    others = sentences.rejected(verdict)
+    for candidate in others[:_RUNNERS_UP]:
+        yield _item(f"not {candidate.effect}", candidate.why_not or "no reason was recorded")
+    if len(others) > _RUNNERS_UP:
+        yield _item("", f"and {len(others) - _RUNNERS_UP} more were weighed; the page has them all")
+    for label, text in (("would separate", verdict.separating), ("proposal", verdict.proposal)):
+        if text:
+            yield _item(label, text)
+    for assumption in verdict.assumptions:
+        yield _item("assumed", assumption)
+    for kind, text in verdict.findings:
+        yield _item(kind, text)
+
+
+def _weighed(candidate: Candidate) -> str:
+    gain = with_error(candidate.gain, candidate.gain_error)
+    parts = [
+        f"{candidate.parameter} {with_level(candidate.strength)}",
+        f"z = {in_errors(candidate.z)}, p = {probability(candidate.p_family)} in the family",
+        f"held-out gain {gain} nat",
+        f"p = {probability(candidate.leftover)} for what it leaves",
+    ]
+    return _joined(parts)
+
+
+def _compared(comparison: Comparison, after_label: str) -> str:
+    shown = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
+    parts = [f"error {estimate_text(comparison.before, shown=shown)}"]
+    if known(comparison.after):
+        parts[0] += f" → {estimate_text(comparison.after, shown=shown)} {after_label}"
+        parts.append(f"reduction {estimate_text(comparison.reduction, shown=shown)}")
+        parts.append(f"E_red {share(comparison.share)}")
+    parts.append(f"floor {estimate_text(comparison.floor, shown=shown)}")
+    if known(comparison.oracle):
+        parts.append(f"oracle {estimate_text(comparison.oracle, shown=shown)}")
+    if known(comparison.control):
+        parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
+    parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
+    return _joined(parts)
+
+
+def _joined(parts: Sequence[str]) -> str:
+    """The parts in a row; lines break between them, not within."""
+    return "; ".join(part.replace(" ", _NO_BREAK) for part in parts)
+
+
+def _item(label: str, text: str) -> list[str]:
+    """`label: text`, its further lines set in."""
+    return _wrapped(f"  {label}: {text}" if label else f"  {text}", indent="    ")
+
+
+def _wrapped(text: str, *, indent: str = "") -> list[str]:
+    lines = textwrap.wrap(text, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    return [line.replace(_NO_BREAK, " ") for line in lines]
