@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from measure.observe import cloth, noise
+from measure.observe.checks import attachment, frames, shape, surroundings
+from measure.observe.gaps import fill_positions
 from measure.observe.interpolation import onto
 from measure.observe.observation import Known, Observation
 from measure.observe.pins import hold
@@ -42,8 +44,9 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     corners, found = _outline(observations, setup)
     low = corners.min(axis=0)
     mesh = cloth.model_mesh(corners - low, vertices=setup.vertices)
-    recordings = tuple(_trajectory(seen, low) for seen in observations)
-    known = [seen.known for seen in observations]
+    prepared = [_prepared(seen, corners) for seen in observations]
+    recordings = tuple(_trajectory(seen, low) for seen in prepared)
+    known = [seen.known for seen in prepared]
     mesh, held = hold(mesh, _pins(known, setup, low))
     specimen = Specimen(
         mesh=mesh, material=_material(known, setup), held=held, anchors=_anchors(recordings, mesh.rest[list(held)]),
@@ -55,7 +58,75 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         air=_agreed([k.air for k in known], setup.air, QuadraticNormal(), "wind force"),
     )  # fmt: skip
     experiment = Experiment(specimen=specimen, recordings=recordings)
-    return Observed(experiment=experiment, findings=(*found, *(f for seen in observations for f in seen.findings)))
+    found = (*found, *(f for seen in prepared for f in seen.findings), *_checked(experiment))
+    return Observed(experiment=experiment, findings=found)
+
+
+def _prepared(seen: Observation, corners: Floats) -> Observation:
+    """A recording with even frames and no gaps, its noise settled, its lengths those of the rest shape.
+
+    Whatever is not as it should be becomes NaN first, is told, and is then filled or left out together.
+
+    Raises:
+        InputError: it cannot be used.
+    """
+    where = f"recording {seen.name!r}"
+    seen = frames.even(seen)
+    edges = shape.Edges.between(seen.markers, where=where)
+    seen = frames.without_stuck_markers(seen)
+    sigma = _noise(seen)
+    told = shape.check_scale(seen, edges, sigma)
+    seen = frames.without_repeats(shape.without_strays(seen, edges, sigma), sigma)
+    filled = fill_positions(seen.positions, where=where)
+    begin = float(seen.times[filled.frames.start])
+    markers = seen.markers[filled.markers]
+    if len(markers) < shape.FEWEST:
+        raise InputError(
+            f"{len(markers)} of {len(seen.markers)} markers are left", where=where, fix="track them again, without gaps"
+        )
+    times = seen.times[filled.frames]
+    if len(times) < frames.FEWEST or times[-1] - times[0] < frames.SHORTEST * (1 - 1e-9):
+        raise InputError(
+            f"{len(times)} frames are left in which enough markers are tracked", where=where, fix="track more of them"
+        )
+    wind = seen.wind or seen.known.wind
+    seen = replace(
+        seen, markers=markers, positions=filled.positions, times=times - begin, faces=None,
+        wind=None if wind is None else wind.later(begin),
+        findings=(
+            *seen.findings, *told, *filled.findings, *shape.check_cover(markers, corners, where=where),
+            *frames.lost_frames(filled.positions, where=where),
+        ),
+    )  # fmt: skip
+    seen = replace(seen, noise=_noise(seen))
+    frames.check_motion(filled.positions, seen.noise or 0.0, float(np.ptp(corners, axis=0).max()), where=where)
+    return seen
+
+
+def _noise(seen: Observation) -> float:
+    if seen.noise is not None:
+        return seen.noise
+    return noise.estimate(seen.markers, seen.positions, where=f"recording {seen.name!r}")
+
+
+def _checked(experiment: Experiment) -> tuple[Finding, ...]:
+    """Of the cloth on its pins, in its wind.
+
+    Raises:
+        InputError: pins, wind, axes or rate that cannot be those of the recording.
+    """
+    specimen = experiment.specimen
+    found: list[Finding] = []
+    for recording in experiment.recordings:
+        surroundings.check_overlap(recording)
+        found += attachment.check_pins(recording, specimen)
+        found += attachment.beside_pins(recording, specimen)
+        surroundings.check_up(recording, specimen)
+        found += surroundings.check_direction(recording, specimen)
+        surroundings.check_accelerations(recording, specimen)
+        found += surroundings.check_strength(recording, specimen)
+    attachment.check_places(experiment.recordings, specimen)
+    return tuple(found)
 
 
 def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats, tuple[Finding, ...]]:
@@ -80,14 +151,12 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats,
 
 def _trajectory(seen: Observation, low: Floats) -> Trajectory:
     where = f"recording {seen.name!r}"
-    wind = seen.wind or seen.known.wind
-    if wind is None:
+    if seen.wind is None:
         raise InputError("no wind is known", where=where, fix="give its velocity, or an anemometer's log")
     rate = (len(seen.times) - 1) / float(seen.times[-1] - seen.times[0])
-    sigma = noise.estimate(seen.markers, seen.positions, where=where) if seen.noise is None else seen.noise
     return Trajectory(
-        name=seen.name, markers=seen.markers - low, positions=seen.positions, rate=rate, wind=wind, noise=sigma,
-        source=seen.source,
+        name=seen.name, markers=seen.markers - low, positions=seen.positions, rate=rate, wind=seen.wind,
+        noise=_noise(seen), source=seen.source,
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ _TIME_ORDERS = (2, 4, 6, 8, 10, 12)
 _DEGREES = (0, 1, 2, 3, 4)  # of the polynomial in (u, v); 0 stands for the marker itself
 _SPARE = 1.5  # neighbours for each coefficient of the polynomial
 _LEAST = 30  # values that a marker's mean square needs, or all there are
+_ENOUGH = 50_000  # positions are looked at, about; of more, every so many-th marker
 _SHARE = 0.1  # of the markers, those that move least
 
 
@@ -40,11 +41,12 @@ class Stencils:
     neighbours: NDArray[np.int64]
     weights: NDArray[np.float64]
 
-    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(frame, marker, 3) for values of that shape; NaN where one that is needed is."""
-        departure = np.zeros_like(values)
-        for column in range(self.neighbours.shape[1]):
-            departure += self.weights[:, column, None] * values[:, self.neighbours[:, column]]
+    def of(self, values: NDArray[np.float64], step: int = 1) -> NDArray[np.float64]:
+        """(frame, …, 3) departures of every `step`-th marker, from values (frame, marker, 3); NaN where one is NaN."""
+        weights, neighbours = self.weights[::step], self.neighbours[::step]
+        departure = np.zeros((len(values), len(neighbours), 3))
+        for column in range(neighbours.shape[1]):
+            departure += weights[:, column, None] * values[:, neighbours[:, column]]
         return departure
 
 
@@ -62,25 +64,22 @@ def estimate(markers: NDArray[np.float64], positions: NDArray[np.float64], *, wh
         InputError: too few frames or tracked markers for any estimate.
     """
     smallest = math.inf
+    step = max(1, round(positions.shape[0] * positions.shape[1] / _ENOUGH))
     for degree in _DEGREES:
         fits = stencils(markers, degree)
         if fits is None:
             break
-        departure = fits.of(positions)
+        departure, before = fits.of(positions, step), 0
         for order in _TIME_ORDERS:
-            if len(departure) <= order:
+            if len(departure) <= order - before:
                 break
-            smallest = min(smallest, _quietest(difference(departure, order), order))
+            departure, before = np.diff(departure, n=order - before, axis=0), order
+            smallest = min(smallest, _quietest(departure, order))
     if not math.isfinite(smallest):
         raise InputError(
             "too few values to estimate the noise from", where=where, fix="give the standard deviation of a coordinate"
         )
     return smallest
-
-
-def difference(values: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-    """(frame − order, …) the difference in time of that order, scaled so that unit white noise leaves unit noise."""
-    return np.diff(values, n=order, axis=0) / math.sqrt(math.comb(2 * order, order))
 
 
 def stencils(markers: NDArray[np.float64], degree: int) -> Stencils | None:
@@ -109,7 +108,8 @@ def stencils(markers: NDArray[np.float64], degree: int) -> Stencils | None:
 
 
 def _quietest(values: NDArray[np.float64], order: int) -> float:
-    """Standard deviation at the markers that move least; infinite where too few values are there."""
+    """Standard deviation at the markers that move least, from differences (frame, marker, 3) of an order in time;
+    infinite where too few values are there."""
     square = (values * values).sum(axis=2) / 3
     there = np.isfinite(square)
     frames = there.sum(axis=0)
@@ -120,5 +120,6 @@ def _quietest(values: NDArray[np.float64], order: int) -> float:
     # Differences of white noise are correlated, ρ_k = C(2d, d+k)/C(2d, d); Σ ρ_k² = C(4d, 2d)/C(2d, d)² of them count
     # as one.
     together = math.comb(4 * order, 2 * order) / math.comb(2 * order, order) ** 2
+    scale = math.comb(2 * order, order)  # variance of the difference of unit white noise
     free = max(1.0, 3 * float(np.median(frames[enough])) / together)
-    return math.sqrt(float(np.quantile(means, _SHARE)) / (float(chi2.ppf(_SHARE, free)) / free))
+    return math.sqrt(float(np.quantile(means, _SHARE)) / (scale * float(chi2.ppf(_SHARE, free)) / free))

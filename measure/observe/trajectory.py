@@ -62,6 +62,10 @@ class WindTrack:
         """Mean speed [m/s]."""
         return float(np.linalg.norm(self.velocity, axis=1).mean())
 
+    def later(self, seconds: float) -> WindTrack:
+        """The same wind, with its times since an instant that many seconds later."""
+        return WindTrack(times=self.times - seconds, velocity=self.velocity)
+
     def at(self, times: Floats) -> Floats:
         """(k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
         return np.stack([np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1)

@@ -1,0 +1,5 @@
+"""What can be wrong with a recording before any model is fitted: refused, or told, never left to look like physics.
+
+`frames` looks at time, `shape` at the cloth's lengths, `attachment` at the pins, `surroundings` at wind and gravity.
+Thresholds are set by what cloth does in the reference runs (still to 8 m/s wind); each is stated where it is used.
+"""

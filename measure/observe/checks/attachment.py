@@ -1,0 +1,118 @@
+"""The pins: whether what is said to be held stands still, and where it is instead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from measure.observe.interpolation import onto
+from measure.observe.trajectory import Floats, Specimen, Trajectory
+
+# A pin's root-mean-square motion over that of the median marker. Held by springs of 1 kN/m in 8 m/s: below 0.01.
+_LOOSE, _FREE = 0.05, 0.3
+_STILL = 1e-3  # of the cloth's size: what moves less is still, whatever the rest does
+_ELSEWHERE = 0.02  # of the cloth's size: pins of two recordings further apart are not in one place
+
+
+def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
+    """Refuse pins that move with the cloth, and tell those that move a little.
+
+    Raises:
+        InputError: a pin moves by more than three tenths of what the median marker does.
+    """
+    where = f"recording {recording.name!r}"
+    seats = specimen.mesh.rest[list(specimen.held)]
+    tracks = _tracks(recording, seats)
+    moved = _motion(tracks, recording.noise * np.linalg.norm(onto(recording.markers, seats), axis=1))
+    usual = float(np.median(_motion(recording.positions, recording.noise)))
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    worst = int(moved.argmax())
+    if moved[worst] <= max(_LOOSE * usual, _STILL * size, 3 * recording.noise):
+        return ()
+    u, v = seats[worst]
+    what = f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
+    still = _still_points(recording)
+    if moved[worst] > max(_FREE * usual, 3 * recording.noise):
+        raise InputError(
+            f"{what}, against {1e3 * usual:.3g} mm at the median marker: it is not held there", where=where,
+            fix=f"name the pins where it is held; it moves least at (u, v) = {still} m",
+        )  # fmt: skip
+    return (
+        Finding(
+            kind="pins-move", severity=Severity.WARNING, where=where, value=float(moved[worst]), count=len(moved),
+            what=f"{what}: is it held there? It moves least at (u, v) = {still} m",
+            fix="correct the pins, or look whether they have play",
+        ),
+    )  # fmt: skip
+
+
+def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
+    """Tell markers away from the pins that stand as still as these: the cloth may be held there too."""
+    moved = _motion(recording.positions, recording.noise)
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    still = moved <= max(_STILL * size, recording.noise)
+    seats = specimen.mesh.rest[list(specimen.held)]
+    away = np.linalg.norm(recording.markers[:, None] - seats, axis=2).min(axis=1)
+    others = np.flatnonzero(still & (away > 0.1 * size))
+    if not len(others) or still.mean() > 0.5:
+        return ()
+    u, v = recording.markers[others[int(away[others].argmax())]]
+    return (
+        Finding(
+            kind="still-away-from-pins", severity=Severity.WARNING, where=f"recording {recording.name!r}",
+            count=len(others),
+            what=f"{len(others)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, "
+            f"{v:.3g}) m",
+            fix="if the cloth is held there, name it with the pins",
+        ),
+    )  # fmt: skip
+
+
+def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:
+    """Refuse recordings whose pins are not in one place.
+
+    Raises:
+        InputError: the pins of a recording are elsewhere than those of the first.
+    """
+    seats = specimen.mesh.rest[list(specimen.held)]
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    first = _tracks(recordings[0], seats).mean(axis=0)
+    for other in recordings[1:]:
+        places = _tracks(other, seats).mean(axis=0)
+        away = np.linalg.norm(places - first, axis=1)
+        if away.max() > _ELSEWHERE * size:
+            x, y, z = (places - first).mean(axis=0)
+            raise InputError(
+                f"its pins are up to {away.max():.3g} m from those of {recordings[0].name!r}; on the average "
+                f"({x:.3g}, {y:.3g}, {z:.3g}) m",
+                where=f"recording {other.name!r}",
+                fix="bring the recordings to one frame of coordinates, the wind along with them",
+            )  # fmt: skip
+
+
+def centre_of_pins(recording: Trajectory, specimen: Specimen) -> Floats:
+    """(3,) their mean position [m]."""
+    return _tracks(recording, specimen.mesh.rest[list(specimen.held)]).mean(axis=(0, 1))
+
+
+def _tracks(recording: Trajectory, seats: Floats) -> Floats:
+    """(frame, seat, 3) [m]."""
+    return np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
+
+
+def _motion(positions: Floats, sigma: float | Floats) -> Floats:
+    """(point,) root-mean-square distance from its mean place, without the noise's part [m]."""
+    return np.sqrt(np.maximum(positions.var(axis=0).sum(axis=1) - 3 * sigma**2, 0.0))
+
+
+def _still_points(recording: Trajectory) -> str:
+    """The two markers that move least and are not neighbours, as text."""
+    moved = _motion(recording.positions, recording.noise)
+    size = float(np.ptp(recording.markers, axis=0).max())
+    first = int(moved.argmin())
+    away = np.hypot(*(recording.markers - recording.markers[first]).T)
+    second = int(np.where(away > 0.2 * size, moved, np.inf).argmin())
+    return " and ".join(f"({u:.3g}, {v:.3g})" for u, v in recording.markers[[first, second]])

@@ -1,0 +1,209 @@
+"""Frames: enough of them, evenly spaced, none repeated or lost, and something that moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from measure.observe.gaps import LONGEST
+from measure.observe.observation import Observation
+from measure.observe.trajectory import Floats
+
+SHORTEST = 2.0
+"""Seconds that a recording must last."""
+FEWEST = 40
+"""Frames that it must have."""
+_JITTER = 0.1  # of a frame: times that are further off an even grid are not of a constant rate
+_REPEATED = 0.02  # of the usual squared step: a frame that moved less repeats the one before
+_MANY = 0.2  # of the frames: repeats that are so many mean a lower rate
+_AROUND = 5  # frames on either side that tell the usual step
+_NEIGHBOURS = 4
+_MOVED_ON = 10.0  # times the smallest steps there are: the neighbours of a stuck marker move as much
+_PINNED = 0.5  # of the frames: a marker that stands still in so many is held
+_FAR = 0.05  # of the cloth's size: (0, 0, 0) is no position of a marker that never comes as near to it
+_JUMP = 1.7  # of the mean of the steps on either side: a frame is missing in between
+_STILL = 1e-3  # of the cloth's size, and three times the noise: what moves less on the average stands still
+
+
+def even(seen: Observation) -> Observation:
+    """The recording with its frames evenly spaced: where some are missing, NaN stands for them.
+
+    Raises:
+        InputError: too few frames, or times that are not of a constant rate.
+    """
+    where = f"recording {seen.name!r}"
+    count = len(seen.times)
+    span = float(seen.times[-1] - seen.times[0]) if count else 0.0
+    if count < FEWEST or span < SHORTEST * (1 - 1e-9):
+        raise InputError(
+            f"{count} frames over {span:.3g} s", where=where,
+            fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: less does not tell one effect from another",
+        )  # fmt: skip
+    step = float(np.median(np.diff(seen.times)))
+    index = np.rint((seen.times - seen.times[0]) / step).astype(np.int64)
+    if (np.diff(index) > 0).all():
+        step = float(np.polyfit(index, seen.times, 1)[0])  # the median of rounded times is a rounded step
+        index = np.rint((seen.times - seen.times[0]) / step).astype(np.int64)
+    off = np.abs(seen.times - seen.times[0] - index * step)
+    if off.max() > _JITTER * step or (np.diff(index) < 1).any():
+        frame = int(off.argmax())
+        raise InputError(
+            f"frames are not evenly spaced: one is {1e3 * off[frame]:.3g} ms off, at {1e3 * step:.4g} ms a frame",
+            where=f"{where}, frame {frame}",
+            fix="interpolate the positions to a constant rate, or track a video of constant frame rate",
+        )  # fmt: skip
+    times = np.arange(index[-1] + 1) * step
+    lost = len(times) - count
+    if not lost:
+        return replace(seen, times=times)
+    longest = int(np.diff(index).max()) - 1
+    first = int(index[np.argmax(np.diff(index) > 1)]) + 1
+    if longest > LONGEST:
+        raise InputError(
+            f"{longest} frames on end are missing", where=f"{where}, frame {first}",
+            fix="cut the recording there and give its parts as recordings of their own",
+        )  # fmt: skip
+    positions = np.full((len(times), *seen.positions.shape[1:]), np.nan)
+    positions[index] = seen.positions
+    found = Finding(
+        kind="frames-missing", severity=Severity.WARNING, where=f"{where}, frame {first}", count=lost,
+        what=f"{lost} frames are missing between others and are interpolated",
+    )  # fmt: skip
+    return replace(seen, times=times, positions=positions, findings=(*seen.findings, found))
+
+
+def without_repeats(seen: Observation, sigma: float) -> Observation:
+    """The recording with NaN for frames that only repeat the one before, as recorders fill in lost ones.
+
+    Args:
+        sigma: standard deviation of a coordinate's noise [m].
+
+    Raises:
+        InputError: a fifth of the frames or more are repeats.
+    """
+    where = f"recording {seen.name!r}"
+    steps = _steps(seen.positions)
+    square = steps - 6 * sigma**2
+    usual = _neighbourhood(square)
+    repeat = np.zeros(len(seen.positions), dtype=bool)
+    repeat[1:] = (steps == 0) | ((square < _REPEATED * usual) & (usual > 6 * sigma**2))
+    count = int(repeat.sum())
+    if not count:
+        return seen
+    if count >= _MANY * len(repeat):
+        rate = (len(repeat) - count) / (len(repeat) - 1) / float(seen.times[1] - seen.times[0])
+        raise InputError(
+            f"{count} of {len(repeat)} frames repeat the one before", where=f"{where}, frame {int(repeat.argmax())}",
+            fix=f"the cloth was tracked at about {rate:.4g} Hz: drop the repeats and give that rate",
+        )  # fmt: skip
+    positions = np.array(seen.positions)
+    positions[repeat] = np.nan
+    found = Finding(
+        kind="repeated-frames", severity=Severity.WARNING, where=f"{where}, frame {int(repeat.argmax())}", count=count,
+        what=f"{count} frames repeat the one before; they are interpolated",
+        fix="find out whether the camera or the tracker lost frames there",
+    )  # fmt: skip
+    return replace(seen, positions=positions, findings=(*seen.findings, found))
+
+
+def without_stuck_markers(seen: Observation) -> Observation:
+    """The recording with NaN where trackers write something else for a marker they lost.
+
+    That is its last position while its neighbours move on, or exactly (0, 0, 0) where it never is otherwise. A marker
+    that mostly stands still is a pin, and left alone.
+    """
+    step = np.abs(np.diff(seen.positions, axis=0)).max(axis=2)
+    near = KDTree(seen.markers).query(seen.markers, k=min(_NEIGHBOURS + 1, len(seen.markers)))[1]
+    around = np.median(step[:, np.asarray(near)[:, 1:]], axis=2)  # NaN where a neighbour was not tracked
+    units = step[step > 0]
+    resolution = float(np.quantile(units, 0.01)) if len(units) else 0.0
+    stuck = np.zeros(seen.positions.shape[:2], dtype=bool)
+    stuck[1:] = (step == 0) & (around > _MOVED_ON * resolution)
+    stuck &= stuck.mean(axis=0) < _PINNED
+    tracked = np.isfinite(seen.positions).all(axis=2)
+    zero = (seen.positions == 0).all(axis=2)
+    other = np.where((tracked & ~zero)[:, :, None], np.linalg.norm(seen.positions, axis=2, keepdims=True), np.inf)
+    stuck |= zero & (other[:, :, 0].min(axis=0) > _FAR * float(np.ptp(seen.markers, axis=0).max()))
+    count = int(stuck.sum())
+    if not count:
+        return seen
+    positions = np.array(seen.positions)
+    positions[stuck] = np.nan
+    frame, marker = np.argwhere(stuck)[0]
+    found = Finding(
+        kind="positions-stuck", severity=Severity.WARNING, count=count,
+        where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
+        what=f"{count} positions are exactly those of the frame before while the markers around move on, or are "
+        "(0, 0, 0): not tracked",
+    )  # fmt: skip
+    return replace(seen, positions=positions, findings=(*seen.findings, found))
+
+
+def check_motion(positions: Floats, sigma: float, size: float, *, where: str) -> None:
+    """Refuse a cloth that stands still.
+
+    Args:
+        positions: (frame, marker, 3) without gaps [m].
+        sigma: standard deviation of a coordinate's noise [m].
+        size: of the cloth [m].
+
+    Raises:
+        InputError: the median marker moves by less than its noise and a thousandth of the cloth.
+    """
+    motion = float(np.median(np.sqrt(positions.var(axis=0).sum(axis=1))))
+    least = max(3 * np.sqrt(3) * sigma, _STILL * size)
+    if motion < least:
+        raise InputError(
+            f"nothing moves: {1e3 * motion:.3g} mm on the average, with {1e3 * sigma:.3g} mm of noise", where=where,
+            fix="record the cloth in a wind; a still cloth says nothing of damping, inertia or gusts",
+        )  # fmt: skip
+
+
+def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
+    """Steps nearly twice as long as those on either side: a frame was lost there, and nothing says so.
+
+    Found only where the motion is well sampled: where the ratio of steps hardly varies otherwise.
+
+    Args:
+        positions: (frame, marker, 3) without gaps [m].
+    """
+    step = np.linalg.norm(np.diff(positions, axis=0), axis=2)
+    total = np.sqrt((step**2).mean(axis=1))
+    if len(total) < 2 * _AROUND or not (total > 0).all():
+        return ()
+    ratio = total[1:-1] / ((total[:-2] + total[2:]) / 2)
+    spread = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
+    jumps = np.flatnonzero(ratio > max(_JUMP, 1 + 8 * spread)) + 1
+    if not len(jumps):
+        return ()
+    return (
+        Finding(
+            kind="frames-lost", severity=Severity.WARNING, where=f"{where}, frame {int(jumps[0]) + 1}",
+            count=len(jumps),
+            what=f"{len(jumps)} steps are about twice as long as those before and after: frames seem to be missing",
+            fix="give the frames' times or numbers, so that the gap is known",
+        ),
+    )  # fmt: skip
+
+
+def _steps(positions: Floats) -> Floats:
+    """(frame − 1,) mean squared step of the tracked markers [m²]; NaN where none is tracked on both sides."""
+    square = (np.diff(positions, axis=0) ** 2).sum(axis=2)
+    there = np.isfinite(square)
+    count = there.sum(axis=1)
+    total = np.where(there, square, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _neighbourhood(values: Floats) -> Floats:
+    """(n,) median of the values around each, itself left out."""
+    usual = np.empty_like(values)
+    for k in range(len(values)):
+        around = np.concatenate([values[max(0, k - _AROUND) : k], values[k + 1 : k + 1 + _AROUND]])
+        there = around[np.isfinite(around)]
+        usual[k] = np.median(there) if len(there) else np.nan
+    return usual

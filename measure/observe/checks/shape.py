@@ -1,0 +1,186 @@
+"""The cloth's own lengths: cloth hardly stretches, so neighbouring markers are never further apart than at rest, and
+when the cloth is taut they are as far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, KDTree, QhullError
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from measure.observe import cloth
+from measure.observe.observation import Observation
+from measure.observe.trajectory import Floats
+
+FEWEST = 30
+"""Markers that a recording must have."""
+_TAUT = 0.9  # quantile over the frames of a length: as long as it gets, noise and fluttering apart
+# Median of these lengths over those at rest. In the reference runs, 0 to 8 m/s and 30 to 651 markers: 1.00 to 1.03.
+_SHORT, _LONG, _TOO_LONG = 0.95, 1.05, 1.08
+_UNEVEN = 0.08  # the same along u and along v differ by less than 0.05 there
+_TORN = 1.5  # a marker that is further than that from most of its neighbours is not where it is said to be
+_HOLE = 0.35  # of the cloth's size: a part that is further from any marker is not observed
+_UNITS = {
+    "mm for m": 1000.0, "cm for m": 100.0, "mm for cm": 10.0, "inches for m": 39.3701, "inches for cm": 2.54,
+    "feet for m": 3.28084,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edges:
+    """Neighbouring markers: (edge, 2) indices and (edge,) distances at rest [m]."""
+
+    ends: NDArray[np.int64]
+    rest: Floats
+
+    @classmethod
+    def between(cls, markers: Floats, *, where: str) -> Edges:
+        """Edges of the Delaunay triangulation of the flat cloth, those along its hollows left out.
+
+        Raises:
+            InputError: fewer than `FEWEST` markers, two in one place, or all on a line.
+        """
+        if len(markers) < FEWEST:
+            raise InputError(
+                f"{len(markers)} markers", where=where,
+                fix=f"track at least {FEWEST}, spread over the cloth: fewer do not show how it bends",
+            )  # fmt: skip
+        if not np.isfinite(markers).all():
+            raise InputError("a rest coordinate is not finite", where=where, fix="give u and v of every marker")
+        found = KDTree(markers).query(markers, k=2)
+        apart, other = np.asarray(found[0]), np.asarray(found[1])
+        size = float(np.ptp(markers, axis=0).max())
+        if apart[:, 1].min() <= 1e-6 * size:
+            first = int(apart[:, 1].argmin())
+            raise InputError(
+                "two markers in one place of the cloth", where=f"{where}, markers {first} and {int(other[first, 1])}",
+                fix="correct their u and v, or keep one of them",
+            )  # fmt: skip
+        try:
+            faces = Delaunay(markers).simplices
+        except QhullError:
+            raise InputError(
+                "all markers are on one line of the cloth", where=where, fix="track markers that span it"
+            ) from None
+        sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        pairs = np.unique(np.sort(sides, axis=1), axis=0)
+        rest = np.hypot(*(markers[pairs[:, 0]] - markers[pairs[:, 1]]).T)
+        short = rest < 2 * np.median(rest)
+        return cls(ends=pairs[short].astype(np.int64), rest=rest[short])
+
+    def lengths(self, positions: Floats) -> Floats:
+        """(frame, edge) [m]; NaN where an end was not tracked."""
+        return np.linalg.norm(positions[:, self.ends[:, 0]] - positions[:, self.ends[:, 1]], axis=2)
+
+
+def check_scale(seen: Observation, edges: Edges, sigma: float) -> tuple[Finding, ...]:
+    """Refuse positions that are not of this rest shape in metres.
+
+    Noise of σ a coordinate makes the mean square of a distance longer by 6 σ².
+
+    Raises:
+        InputError: lengths that are off by a factor, or differently along u and v; or nothing to measure them by.
+    """
+    where = f"recording {seen.name!r}"
+    taut, there = _taut(edges.lengths(seen.positions), sigma)
+    if not there.any():
+        raise InputError(
+            "no two neighbouring markers are tracked together", where=where, fix="check the columns of the positions"
+        )
+    ratio = taut[there] / edges.rest[there]
+    whole = float(np.median(ratio))
+    if not _SHORT <= whole <= _TOO_LONG:
+        raise InputError(
+            f"taut, neighbouring markers are {whole:.4g} times as far apart as at rest", where=where, fix=_advice(whole)
+        )
+    arms = np.abs(seen.markers[edges.ends[there, 0]] - seen.markers[edges.ends[there, 1]])
+    along = [ratio[arms[:, axis] > 2 * arms[:, 1 - axis]] for axis in (0, 1)]
+    if min(map(len, along)) >= 5:
+        u, v = (float(np.median(part)) for part in along)
+        if abs(u - v) > _UNEVEN:
+            raise InputError(
+                f"taut, the cloth is {u:.4g} times as long as at rest along u and {v:.4g} times along v", where=where,
+                fix="the rest shape does not fit: check its width and height, and that u and v are not exchanged",
+            )  # fmt: skip
+    if whole <= _LONG:
+        return ()
+    return (
+        Finding(
+            kind="cloth-longer-than-rest", severity=Severity.WARNING, where=where, value=whole,
+            what=f"taut, the cloth is {100 * (whole - 1):.1f} % longer than at rest, more than wind stretches it",
+            fix="measure its width and height again",
+        ),
+    )  # fmt: skip
+
+
+def without_strays(seen: Observation, edges: Edges, sigma: float) -> Observation:
+    """The recording with NaN where a marker is much further from most of its neighbours than the cloth allows: lost and
+    found elsewhere, or exchanged with another."""
+    reach = _TORN * edges.rest + 6 * sigma
+    far = edges.lengths(seen.positions) > reach  # false where NaN
+    torn = np.zeros(seen.positions.shape[:2])
+    degree = np.bincount(edges.ends.ravel(), minlength=len(seen.markers))
+    for end in (0, 1):
+        np.add.at(torn.T, edges.ends[:, end], far.T)
+    stray = torn > 0.5 * degree
+    # The neighbours of a stray have one bad edge each; strays that are neighbours of strays are found as well.
+    count = int(stray.sum())
+    if not count:
+        return seen
+    positions = np.array(seen.positions)
+    positions[stray] = np.nan
+    frame, marker = np.argwhere(stray)[0]
+    found = Finding(
+        kind="markers-astray", severity=Severity.WARNING, count=count,
+        where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
+        what=f"{count} positions are further from the markers around than cloth can stretch; they are left out",
+        fix="look at the track there: was the marker exchanged with another?",
+    )  # fmt: skip
+    return replace(seen, positions=positions, findings=(*seen.findings, found))
+
+
+def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Finding, ...]:
+    """Tell parts of the cloth that are far from any marker.
+
+    Args:
+        corners: (corner, 2) of its outline.
+    """
+    size = float(np.ptp(corners, axis=0).max())
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    u, v = np.meshgrid(*(np.linspace(low[axis], high[axis], 25) for axis in (0, 1)))
+    points = np.stack([u.ravel(), v.ravel()], axis=1)
+    points = np.concatenate([points[cloth.inside(corners, points)], corners])
+    away = np.asarray(KDTree(markers).query(points)[0])
+    if away.max() <= _HOLE * size:
+        return ()
+    hole = points[int(away.argmax())]
+    return (
+        Finding(
+            kind="cloth-not-covered", severity=Severity.WARNING,
+            where=f"{where}, (u, v) = ({hole[0]:.3g}, {hole[1]:.3g}) m",
+            value=float(away.max()),
+            what=f"the nearest marker is {away.max():.3g} m away: what the cloth does there is guessed",
+            fix="track markers there, or correct the outline",
+        ),
+    )  # fmt: skip
+
+
+def _taut(lengths: Floats, sigma: float) -> tuple[Floats, NDArray[np.bool_]]:
+    """(edge,) upper decile of each length over its frames without the noise's part, and where there is one."""
+    tracked = np.isfinite(lengths)
+    there = tracked.sum(axis=0) >= 10
+    taut = np.zeros(lengths.shape[1])
+    if there.any():
+        taut[there] = np.nanquantile(lengths[:, there], _TAUT, axis=0)
+    return np.sqrt(np.maximum(taut**2 - 6 * sigma**2, 0.0)), there
+
+
+def _advice(ratio: float) -> str:
+    for units, factor in _UNITS.items():
+        for value, said in ((factor, units), (1 / factor, " for ".join(reversed(units.split(" for "))))):
+            if abs(ratio / value - 1) < 0.06:
+                return f"the positions seem to be {said}: name their unit"
+    return "the rest shape does not fit: check width and height, the unit, and that both are of this cloth"

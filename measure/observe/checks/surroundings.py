@@ -1,0 +1,175 @@
+"""Wind, gravity and clock against what the cloth shows: it flies downwind, sags downward, and is not flung about."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from measure.observe.checks.attachment import centre_of_pins
+from measure.observe.trajectory import Floats, Specimen, Trajectory, WindTrack
+
+_FLIES = 0.15  # of the cloth's size: a mean offset from the pins that is less says nothing of the wind's direction
+_BLOWS = 1.0  # of the ratio ρU²/(m g): wind that is weaker does not set the direction
+_UPWIND, _ASIDE = math.radians(100), math.radians(45)
+_RISES, _SAGS = 0.02, 0.05  # of the cloth's size
+_COVERED = 0.98  # of the recording: a log must cover so much
+_WILD, _SLOW = 30.0, 0.01  # of g + ρU²/m: root-mean-square accelerations beyond are of another clock or unit
+_CALM, _FLAT, _STRONG, _LIMP = 0.02, 0.8, 50.0, 0.1
+"""ρU²/(m g), and the cloth's mean horizontal offset over what it is at most."""
+
+
+def check_overlap(recording: Trajectory) -> None:
+    """Refuse a log that does not cover the recording. A constant wind covers all.
+
+    Raises:
+        InputError: it covers less than 98 % of it.
+    """
+    times, wind = recording.times, recording.wind.times
+    if len(wind) == 1:
+        return
+    step = float(np.median(np.diff(wind)))
+    begin, end = float(wind[0]) - step, float(wind[-1]) + step
+    covered = min(end, float(times[-1])) - max(begin, 0.0)
+    if covered < _COVERED * float(times[-1]):
+        raise InputError(
+            f"the wind log spans {wind[0]:.4g} s to {wind[-1]:.4g} s after the first frame, the recording lasts "
+            f"{times[-1]:.4g} s",
+            where=f"recording {recording.name!r}", fix="give the instant of the first frame on the log's clock, or "
+            "another log",
+        )  # fmt: skip
+
+
+def check_up(recording: Trajectory, specimen: Specimen) -> None:
+    """Refuse a cloth that lies above its pins, or sags sideways: z is not up.
+
+    Raises:
+        InputError: so it does.
+    """
+    if not any(specimen.gravity):
+        return
+    where = f"recording {recording.name!r}"
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    offset = _centre(recording) - centre_of_pins(recording, specimen)
+    if offset[2] > _RISES * size:
+        raise InputError(
+            f"the cloth is {offset[2]:.3g} m above its pins on the average", where=where,
+            fix=f"z must point up: {_sagging(offset, size, recording.wind)}",
+        )  # fmt: skip
+    wind = recording.wind.at(recording.times).mean(axis=0)
+    across = np.array([-wind[1], wind[0], 0.0]) / max(float(np.hypot(wind[0], wind[1])), 1e-9)
+    sideways = float(offset @ across)
+    if _ratio(specimen, recording.wind) < _CALM:
+        sideways = float(np.hypot(offset[0], offset[1]))
+    if offset[2] > -_RISES * size and abs(sideways) > _SAGS * size:
+        raise InputError(
+            f"the cloth does not sag along −z but is {abs(sideways):.3g} m off sideways", where=where,
+            fix=f"z must point up, and the wind be in the same axes: {_sagging(offset, size, recording.wind)}",
+        )  # fmt: skip
+
+
+def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
+    """Refuse a cloth that flies upwind, and tell one that flies far aside.
+
+    Raises:
+        InputError: on the average it streams against the wind as it was given.
+    """
+    where = f"recording {recording.name!r}"
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    offset = (_centre(recording) - centre_of_pins(recording, specimen))[:2]
+    wind = recording.wind.at(recording.times).mean(axis=0)[:2]
+    far, speed = float(np.hypot(*offset)), float(np.hypot(*wind))
+    if far < _FLIES * size or _ratio(specimen, recording.wind) < _BLOWS or speed == 0:
+        return ()
+    angle = math.acos(float(np.clip(offset @ wind / (far * speed), -1, 1)))
+    heading, blown = (math.degrees(math.atan2(y, x)) for x, y in (offset, wind))
+    what = (
+        f"the cloth streams towards {heading:.0f}°, the wind as given blows towards {blown:.0f}° (from +x towards +y)"
+    )
+    if angle > _UPWIND:
+        raise InputError(
+            f"the cloth streams upwind: {what}", where=where,
+            fix="wind velocities say where the air goes to; turn a direction it comes from, and check the axes",
+        )  # fmt: skip
+    if angle <= _ASIDE:
+        return ()
+    return (
+        Finding(
+            kind="flies-aside", severity=Severity.WARNING, where=where, value=angle, what=what,
+            fix="check the direction of the wind in the recording's axes",
+        ),
+    )  # fmt: skip
+
+
+def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
+    """Tell a cloth that hangs in a strong wind or flies in none: wrong units, or another wind than that at the flag."""
+    ratio = _ratio(specimen, recording.wind)
+    pins = centre_of_pins(recording, specimen)
+    seats = specimen.mesh.rest[list(specimen.held)].mean(axis=0)
+    reach = float(np.hypot(*(specimen.mesh.rest - seats).T) @ specimen.mesh.vertex_areas) / float(
+        specimen.mesh.areas.sum()
+    )
+    out = float(np.hypot(*(_centre(recording) - pins)[:2])) / reach
+    calm, strong = ratio < _CALM and out > _FLAT, ratio > _STRONG and out < _LIMP
+    if not (calm or strong):
+        return ()
+    told = "flies nearly flat, though its wind" if calm else "hangs limp, though its wind"
+    return (
+        Finding(
+            kind="wind-does-not-fit", severity=Severity.WARNING, where=f"recording {recording.name!r}", value=ratio,
+            what=f"the cloth {told} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
+            fix="check the unit of the wind, and the clock of its log",
+        ),
+    )  # fmt: skip
+
+
+def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
+    """Refuse accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
+
+    Raises:
+        InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m.
+    """
+    positions, rate = recording.positions, recording.rate
+    second = np.diff(positions, n=2, axis=0)
+    square = float(np.median((second**2).sum(axis=2).mean(axis=0))) - 18 * recording.noise**2
+    typical = math.sqrt(max(square, 0.0)) * rate**2
+    weight = float(np.linalg.norm(specimen.gravity))
+    expected = weight + _pressure(specimen, recording.wind) / specimen.material.density
+    where = f"recording {recording.name!r}"
+    if typical > _WILD * expected:
+        raise InputError(
+            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}", where=where,
+            fix=f"is the rate of {rate:.4g} Hz too high, or the wind or the unit of the positions wrong?",
+        )  # fmt: skip
+    if 0 < typical < _SLOW * expected and _ratio(specimen, recording.wind) > _BLOWS:
+        raise InputError(
+            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}", where=where,
+            fix=f"is the rate of {rate:.4g} Hz that of slow motion? Give the rate at which the camera ran",
+        )  # fmt: skip
+
+
+def _centre(recording: Trajectory) -> Floats:
+    """(3,) mean position of the markers over all frames [m]."""
+    return recording.positions.mean(axis=(0, 1))
+
+
+def _pressure(specimen: Specimen, wind: WindTrack) -> float:
+    """ρU² [N/m²] of the base model's force."""
+    return specimen.air.plain.density * float((wind.velocity**2).sum(axis=1).mean())
+
+
+def _ratio(specimen: Specimen, wind: WindTrack) -> float:
+    """ρU²/(m g); infinite without gravity."""
+    weight = specimen.material.density * float(np.linalg.norm(specimen.gravity))
+    return _pressure(specimen, wind) / weight if weight else math.inf
+
+
+def _sagging(offset: Floats, size: float, wind: WindTrack) -> str:
+    """Advice: the axis against which the cloth is off its pins, the wind's left aside."""
+    blown = np.abs(wind.velocity.mean(axis=0))
+    candidates = np.abs(offset) / size - 2.0 * (blown > 0.5 * blown.max()) * (blown.max() > 0)
+    axis = int(candidates.argmax())
+    sign = "" if offset[axis] < 0 else "-"
+    return f"the cloth sags as if up were {sign}{'xyz'[axis]}"
