@@ -21,6 +21,7 @@ from measure.challenge.folder import ChallengeFolder
 from measure.challenge.key import Key, seal
 from measure.challenge.meshes import layout, seen
 from measure.challenge.recipe import ChallengeRecipe
+from measure.challenge.workers import single_threaded
 from sim.handles import ARCSIM_STIFFNESS
 from sim.scene import GRAVITY
 
@@ -76,13 +77,6 @@ def make(
         },
     )  # fmt: skip
     return target
-
-
-def single_threaded() -> None:
-    """Of a worker: one thread, since there are as many workers as cores."""
-    import torch
-
-    torch.set_num_threads(1)
 
 
 def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key, flight: Flight) -> dict[str, str]:

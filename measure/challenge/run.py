@@ -15,6 +15,7 @@ from flagdata.errors import FlagdataError
 from flagdata.rng import child_seed
 from measure.challenge.filing import Filing, file, filed, verdict_json
 from measure.challenge.folder import ChallengeFolder
+from measure.challenge.workers import single_threaded
 from measure.loop.verdict import Verdict
 from measure.observe.trajectory import Experiment
 
@@ -110,8 +111,6 @@ class Barrier(MetaPathFinder):
 
 
 def _prepare() -> None:
-    """Of a worker: one thread, and nothing of the generator within reach."""
-    import torch
-
-    torch.set_num_threads(1)
+    """Of a worker: nothing of the generator within reach."""
+    single_threaded()
     sys.meta_path.insert(0, Barrier())
