@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -185,11 +186,19 @@ def _areas(
     return (e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) / 2
 
 
-def grid(*, width: float, height: float, columns: int, rows: int) -> Mesh:
-    """A rectangle of `columns × rows` cells with alternating diagonals.
+class Diagonals(StrEnum):
+    """How the cells of a grid are cut in two."""
 
-    Vertex `i * (rows + 1) + j` is at u = width·i/columns, v = height·j/rows: the hoist (u = 0) comes first. Cells with
-    i + j even are cut from their first corner, the others the other way, so that no diagonal direction is preferred.
+    ALTERNATE = "alternate"
+    """Cells with i + j even from their first corner, the others the other way: no direction is preferred."""
+    FORWARD = "forward"
+    """All from their first corner."""
+
+
+def grid(*, width: float, height: float, columns: int, rows: int, diagonals: Diagonals = Diagonals.ALTERNATE) -> Mesh:
+    """A rectangle of `columns × rows` cells, each two triangles.
+
+    Vertex `i * (rows + 1) + j` is at u = width·i/columns, v = height·j/rows: the hoist (u = 0) comes first.
 
     Raises:
         InputError: a size that is not positive, or no cells.
@@ -203,7 +212,7 @@ def grid(*, width: float, height: float, columns: int, rows: int) -> Mesh:
     ci, cj = (index.ravel() for index in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))
     a = ci * (rows + 1) + cj
     b, c, d = a + rows + 1, a + rows + 2, a + 1
-    first = ((ci + cj) % 2 == 0)[:, None, None]
+    first = ((ci + cj) % 2 == 0)[:, None, None] | (diagonals is Diagonals.FORWARD)
     even = np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1)
     odd = np.stack([np.stack([a, b, d], axis=1), np.stack([b, c, d], axis=1)], axis=1)
     return Mesh(rest=rest, faces=np.where(first, even, odd).reshape(-1, 3))

@@ -1,0 +1,168 @@
+"""Banks of null recordings, built batch by batch into a folder: a build that was stopped goes on where it was.
+
+A bank about one posterior is a parametric bootstrap by brute force. A bank over priors serves every recording of such
+a design: an amortised null.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from io import BytesIO
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from flagdata.errors import CorruptError, NotFoundError
+from flagdata.lake.durable import put_if_absent
+from flagdata.rng import child_seed, stream
+from measure.loop.columns import THETA, Calibration, Column, fields, library
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Nulls
+from measure.loop.nulls import NullBatch
+from measure.loop.reference import NullBank
+from measure.loop.statistics import Statistics, statistics
+from measure.observe.trajectory import Floats, Specimen
+from sim.integrate.split import SplitEuler
+
+_BATCH = 16
+_DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
+Progress = Callable[[int], object]
+
+
+def columns() -> tuple[Column, ...]:
+    """What is weighed beside the calibrated parameters: the library's strengths, then the corrective field's modes."""
+    return (*library(), *fields())
+
+
+def names() -> tuple[str, ...]:
+    """Of all columns of the statistics, the calibrated parameters first."""
+    return (*(name for name, _, _ in THETA), *(column.name for column in columns()))
+
+
+def prior_batch(
+    specimen: Specimen,
+    *,
+    markers: Floats,
+    rate: float,
+    duration: float,
+    noise: float,
+    speeds: tuple[float, float],
+    seed: int,
+) -> NullBatch:
+    """A batch over the priors: density and bending log-uniform about the nominal ones, wind uniform between `speeds`.
+
+    Half of the batches have little damping and explicit steps, half the whole range.
+    """
+    rng = stream(seed, "null", "prior")
+    gentle = rng.random() < 0.5
+    damping = (_DAMPING[0], 1e-3 if gentle else _DAMPING[1])
+    calibrations = tuple(
+        Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, damping))
+        for _ in range(_BATCH)
+    )
+    return NullBatch(
+        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=calibrations,
+        speeds=tuple(float(u) for u in rng.uniform(*speeds, _BATCH)), seed=child_seed(seed, "null", "batch"),
+    )  # fmt: skip
+
+
+def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
+    return float(np.exp(rng.uniform(math.log(span[0]), math.log(span[1]))))
+
+
+def evaluate(batch: NullBatch, numerics: int) -> Nulls:
+    """Simulate a batch and take its statistics, from the nominal calibration."""
+    recordings = batch.simulate()
+    segments = Segments.of(recordings)
+    forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
+    nominal = Calibration()
+    found = statistics(forecaster, segments, [nominal] * len(segments), columns())
+    offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
+    return Nulls(
+        statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
+        numerics=np.full(len(found.recording), numerics),
+    )  # fmt: skip
+
+
+def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
+    """Evaluate the batches that the folder lacks, each into a file of its own.
+
+    Args:
+        progress: called with the number of batches done.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = [index for index in range(len(batches)) if not _file(folder, index).exists()]
+    if progress is not None:
+        progress(len(batches) - len(missing))
+    context = get_context("spawn")
+    with ProcessPoolExecutor(
+        max_workers=workers, mp_context=context, initializer=torch.set_num_threads, initargs=(1,)
+    ) as pool:
+        running = [pool.submit(_keep, folder, batches[index], index) for index in missing]
+        for done in as_completed(running):
+            done.result()
+            if progress is not None:
+                progress(1)
+
+
+def _keep(folder: Path, batch: NullBatch, index: int) -> None:
+    nulls = evaluate(batch, index)
+    own = nulls.statistics
+    buffer = BytesIO()
+    np.savez(
+        buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
+        marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets,
+    )  # fmt: skip
+    put_if_absent(_file(folder, index), buffer.getvalue())
+
+
+def _file(folder: Path, index: int) -> Path:
+    return folder / f"nulls-{index:04d}.npz"
+
+
+def load(folder: Path, *, words: str) -> NullBank:
+    """The bank of a folder.
+
+    Raises:
+        NotFoundError: no batches there.
+        CorruptError: a file that cannot be read, or of other columns.
+        InputError: too few batches.
+    """
+    paths = sorted(folder.glob("nulls-*.npz"))
+    if not paths:
+        raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
+    parts: list[Nulls] = []
+    count = 0
+    for path in paths:
+        try:
+            with np.load(path) as stored:
+                content: Mapping[str, np.ndarray] = {name: stored[name] for name in stored.files}
+        except (OSError, ValueError, EOFError) as error:
+            raise CorruptError(
+                f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
+            ) from error
+        if tuple(content["columns"]) != names():
+            raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
+        own = Statistics(
+            recording=content["recording"] + count, r=content["r"], response=content["response"],
+            error=content["error"], marker_error=content["marker_error"],
+        )  # fmt: skip
+        numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
+        parts.append(Nulls(statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics))
+        count = int(own.recording.max()) + 1
+    return NullBank(nulls=_joined(parts), columns=names(), words=words)
+
+
+def _joined(parts: Sequence[Nulls]) -> Nulls:
+    least = min(part.statistics.marker_error.shape[1] for part in parts)
+    own = [part.statistics for part in parts]
+    trimmed = [replace(statistics, marker_error=statistics.marker_error[:, :least]) for statistics in own]
+    return Nulls(
+        statistics=Statistics.joined(trimmed), speeds=np.concatenate([p.speeds for p in parts]),
+        offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
+    )  # fmt: skip

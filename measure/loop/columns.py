@@ -1,0 +1,207 @@
+"""What is varied about the model, one column each: calibrated parameters, effects of the library, smooth force fields.
+
+A column is a direction in the space of models with the size of a small step along it. `Column.system` gives the batch
+with that step; the change of the predictions, divided by the step, is the column's sensitivity.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from sim.cloth import Cloth
+from sim.effects import EFFECTS, apply
+from sim.effects.effect import ForceEffect
+from sim.effects.parameter import Parameter
+from sim.material import Material
+from sim.state import State
+from sim.system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """The base model's parameters, as factors on the nominal material; damping as it is [s]."""
+
+    density: float = 1.0
+    bending: float = 1.0
+    damping: float = 2.5e-3
+
+    def material(self, nominal: Material) -> Material:
+        """The material they make of the nominal one."""
+        scaled = nominal.scaled(density=self.density, bending=self.bending)
+        return replace(scaled, damping=self.damping)
+
+    def moved(self, steps: Sequence[float]) -> Calibration:
+        """After steps along `THETA`, in its units, kept within its bounds."""
+        density, bending, damping = steps
+        return Calibration(
+            density=float(np.clip(self.density * math.exp(density), *_DENSITY)),
+            bending=float(np.clip(self.bending * math.exp(bending), *_BENDING)),
+            damping=float(np.clip(self.damping + damping * _DAMPING_UNIT, *_DAMPING)),
+        )
+
+    def steps_from(self, other: Calibration) -> tuple[float, float, float]:
+        """Steps along `THETA` that lead here from another."""
+        return (
+            math.log(self.density / other.density),
+            math.log(self.bending / other.bending),
+            (self.damping - other.damping) / _DAMPING_UNIT,
+        )
+
+
+_DENSITY = (0.4, 2.5)
+_BENDING = (0.05, 20.0)
+_DAMPING = (0.0, 20e-3)
+_DAMPING_UNIT = 5e-3  # s
+
+THETA: tuple[tuple[str, str, float], ...] = (("density", "ln", 0.1), ("bending", "ln", 0.7), ("damping", "5 ms", 0.5))
+"""Name, unit and step of the calibrated parameters: natural logarithms of factors, and damping in units of 5 ms."""
+
+
+class Column(ABC):
+    """One direction.
+
+    Attributes:
+        name: "lift.coefficient", "field.x.10".
+        step: size of the step.
+        unit: of the coefficient.
+    """
+
+    name: str
+    step: float
+    unit: str
+
+    @abstractmethod
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        """The batch with this step taken, and its start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectColumn(Column):
+    """A strength of an effect of the library, from its null value.
+
+    Attributes:
+        effect: its name.
+        parameter: the strength.
+    """
+
+    effect: str
+    parameter: str
+    step: float
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"{self.effect}.{self.parameter}"
+
+    @cached_property
+    def described(self) -> Parameter:
+        return EFFECTS[self.effect].parameters()[self.parameter]
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.described.unit
+
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        return self.strengthened(self.step, system, state)
+
+    def strengthened(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
+        """The batch with the effect at a strength `coefficient` beyond its null value."""
+        effect = EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
+        return apply([effect], system, state)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmoothField(ForceEffect):
+    """A steady force per mass b cos(π i u/W) cos(π j v/H) along an axis: part of a low-rank corrective field.
+
+    Attributes:
+        acceleration: b [m/s²].
+        axis: 0, 1 or 2.
+        mode: (i, j).
+    """
+
+    acceleration: float
+    axis: int
+    mode: tuple[int, int]
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        rest = cloth.mesh.rest - cloth.mesh.rest.min(axis=0)
+        share = rest / rest.max(axis=0)
+        shape = np.cos(np.pi * self.mode[0] * share[:, 0]) * np.cos(np.pi * self.mode[1] * share[:, 1])
+        weight = self.acceleration * torch.as_tensor(shape, dtype=cloth.dtype, device=cloth.device)
+        force = torch.zeros_like(position)
+        force[:, self.axis] = weight[:, None] * cloth.mass
+        return force
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldColumn(Column):
+    """A mode of the corrective field, along the axes of the world."""
+
+    axis: int
+    mode: tuple[int, int]
+    step: float = 0.5
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"field.{'xyz'[self.axis]}.{self.mode[0]}{self.mode[1]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return "m/s²"
+
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        force = SmoothField(acceleration=self.step, axis=self.axis, mode=self.mode)
+        return force.apply(system, state)
+
+
+# Step of every strength that is weighed: some tenths of its expected range, where predictions are near linear.
+_STEPS: tuple[tuple[str, str, float], ...] = (
+    ("power-law-drag", "exponent", 0.2),
+    ("tangential-linear-drag", "coefficient", 0.05),
+    ("tangential-quadratic-drag", "coefficient", 0.02),
+    ("lift", "coefficient", 0.3),
+    ("added-mass", "mass", 0.05),
+    ("reactive-loading", "mass", 0.03),
+    ("air-density", "change", 0.1),
+    ("permeability", "permeability", 0.005),
+    ("hem-mass", "line_density", 0.005),
+    ("hem-stiffness", "ratio", 5.0),
+    ("vertical-wind", "inclination", 0.05),
+    ("shear", "exponent", 0.15),
+    ("pole-wake", "share", 0.4),
+    ("hysteresis", "couple", 1e-4),
+    ("rest-curvature", "curvature", 1.0),
+    ("full-hoist", "stiffness", 20.0),
+    ("tilted-pole", "lean", 0.02),
+    ("tilted-pole", "sway", 0.02),
+)
+_MODES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
+
+
+def library() -> tuple[EffectColumn, ...]:
+    """The strengths that are weighed.
+
+    Raises:
+        UsageError: an entry that the registry of effects does not have.
+    """
+    columns = tuple(EffectColumn(effect=effect, parameter=name, step=step) for effect, name, step in _STEPS)
+    for column in columns:
+        if column.parameter not in EFFECTS[column.effect].strengths():
+            raise UsageError(
+                f"{column.effect} has no strength {column.parameter!r}", where="columns", fix="correct the table"
+            )
+    return columns
+
+
+def fields() -> tuple[FieldColumn, ...]:
+    """The corrective field's modes."""
+    return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)

@@ -1,0 +1,250 @@
+"""Predictions one short horizon ahead, along a recording: the model is put where the cloth was seen, and runs.
+
+At every frame the model is moved onto the observed markers, and its velocity by what the prediction was off, per
+horizon T: x ← x + L e, v ← v + L e/T, with e the markers' prediction error and L its interpolation onto the vertices.
+This is the deadbeat observer of a point that moves evenly, with the simulator as its model of motion: what the model
+gets right costs no error, what it lacks returns in every e. The prediction-error method of system identification
+(Ljung, System Identification, 1999, chapter 7) then works on e and its sensitivities.
+
+Recordings are cut into segments that run side by side as members of a batch; a segment starts some frames early, so
+that its state has forgotten how it was started.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import InputError
+from measure.loop.columns import THETA, Calibration, Column
+from measure.observe.interpolation import onto
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from sim.handles import Handles
+from sim.integrate.split import SplitEuler
+from sim.scene import Scene, assemble
+from sim.state import State
+from sim.system import System
+
+Floats = NDArray[np.float64]
+
+HORIZON = 0.04
+"""About this long a prediction is [s]: 25 frames a second, the paper's rate."""
+_SEGMENT = 2.0  # s
+_WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Segment:
+    """A stretch of a recording.
+
+    Attributes:
+        recording: its index in the experiment.
+        start: of the first frame, since the recording's first [s].
+        positions: (frame, marker, 3), warm-up included [m].
+        wind: of the recording.
+        noise: of a coordinate [m].
+    """
+
+    recording: int
+    start: float
+    positions: Floats
+    wind: WindTrack
+    noise: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Segments:
+    """Segments of equal length of recordings with the same markers and rate.
+
+    Attributes:
+        items: the segments.
+        markers: (marker, 2) [m].
+        period: between the frames used [s].
+        warm: how many frames of each are warm-up.
+    """
+
+    items: tuple[Segment, ...]
+    markers: Floats
+    period: float
+    warm: int
+
+    @classmethod
+    def of(cls, recordings: Sequence[Trajectory]) -> Segments:
+        """Cut recordings; frames beyond a horizon of about 40 ms are used every so many, a remainder is left out.
+
+        Raises:
+            InputError: recordings of different markers or rates, untracked points, or shorter than a segment.
+        """
+        first = recordings[0]
+        stride = max(1, round(first.rate * HORIZON))
+        period = stride / first.rate
+        warm = round(_WARM_UP / period)
+        length = round(_SEGMENT / period)
+        items: list[Segment] = []
+        for index, recording in enumerate(recordings):
+            if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
+                raise InputError(
+                    "its markers or its rate differ from the first recording's",
+                    where=f"recording {recording.name!r}", fix="close the loop on such recordings one by one",
+                )  # fmt: skip
+            if np.isnan(recording.positions).any():
+                raise InputError(
+                    "a marker was lost in some frames", where=f"recording {recording.name!r}",
+                    fix="fill short gaps (measure.observe.fill), or drop the marker",
+                )  # fmt: skip
+            frames = recording.positions[::stride]
+            count = (len(frames) - warm - 2) // length
+            if count < 1:
+                raise InputError(
+                    f"{len(frames) * period:.2f} s is shorter than one segment of {_SEGMENT + _WARM_UP + 0.08:.2f} s",
+                    where=f"recording {recording.name!r}", fix="record for 10 s or more",
+                )  # fmt: skip
+            for place in range(count):
+                begin = place * length
+                items.append(
+                    Segment(
+                        recording=index, start=begin * period, wind=recording.wind, noise=recording.noise,
+                        positions=frames[begin : begin + length + warm + 2],
+                    )
+                )  # fmt: skip
+        return cls(items=tuple(items), markers=first.markers, period=period, warm=warm)
+
+    def select(self, indices: Iterable[int]) -> Segments:
+        """Some of them."""
+        return replace(self, items=tuple(self.items[i] for i in indices))
+
+    @property
+    def first(self) -> int:
+        """The first frame of a segment that counts."""
+        return self.warm + 2
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentWind:
+    """The logged wind of every member at its own time.
+
+    Attributes:
+        period: of the samples [s].
+        samples: (n, 3, batch) [m/s].
+    """
+
+    period: float
+    samples: Tensor
+
+    @classmethod
+    def of(cls, segments: Segments, *, dtype: torch.dtype, device: torch.device | str) -> SegmentWind:
+        """Sampled at the frames of each segment."""
+        count = len(segments.items[0].positions) + 1
+        own = np.arange(count) * segments.period
+        samples = np.stack([s.wind.at(s.start + own) for s in segments.items], axis=-1)
+        return cls(period=segments.period, samples=torch.as_tensor(samples, dtype=dtype, device=device))
+
+    def velocity(self, time: float) -> Tensor:
+        """(3, batch) [m/s], linear between samples, `time` [s] since the start of the segment."""
+        place = min(max(time / self.period, 0.0), len(self.samples) - 1.001)
+        index = int(place)
+        return torch.lerp(self.samples[index], self.samples[index + 1], place - index)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Forecaster:
+    """Predicts the markers of segments by a model of one specimen.
+
+    Attributes:
+        specimen: the cloth.
+        markers: (marker, 2) [m].
+        integrator: of the model.
+        dtype, device: of the tensors.
+    """
+
+    specimen: Specimen
+    markers: Floats
+    integrator: SplitEuler
+    dtype: torch.dtype = torch.float32
+    device: torch.device | str = "cpu"
+
+    @cached_property
+    def _seen(self) -> Tensor:
+        """(marker, vertex): vertices onto markers."""
+        return self._real(onto(self.specimen.mesh.rest, self.markers))
+
+    @cached_property
+    def _lifted(self) -> Tensor:
+        """(vertex, marker): markers onto vertices."""
+        return self._real(onto(self.markers, self.specimen.mesh.rest))
+
+    def _real(self, values: Floats) -> Tensor:
+        return torch.tensor(values, dtype=self.dtype, device=self.device)
+
+    def system(self, segments: Segments, calibrations: Sequence[Calibration]) -> tuple[System, State]:
+        """The base model of every segment, each with its own calibration, and a start at rest."""
+        specimen = self.specimen
+        start = np.zeros((specimen.mesh.vertex_count, 3))
+        start[:, 0] = specimen.mesh.rest[:, 0] - specimen.mesh.rest[list(specimen.held), 0].min()
+        start[:, 2] = specimen.mesh.rest[:, 1] - specimen.mesh.rest[list(specimen.held), 1].min()
+        start += specimen.anchors[np.argmin(specimen.anchors[:, 2])]
+        start[list(specimen.held)] = specimen.anchors
+        handles = Handles(vertices=specimen.held, stiffness=specimen.stiffness)
+        materials = {c: c.material(specimen.material) for c in set(calibrations)}
+        scenes = [
+            Scene(
+                mesh=specimen.mesh, position=start, material=materials[c], handles=handles, gravity=specimen.gravity,
+                air=specimen.air,
+            )
+            for c in calibrations
+        ]  # fmt: skip
+        system, state = assemble(scenes, dtype=self.dtype, device=self.device)
+        wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
+        return replace(system, wind=wind), state
+
+    def errors(self, system: System, state: State, segments: Segments) -> Tensor:
+        """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted."""
+        return self.run(system, state, segments)[0]
+
+    def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
+        """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
+        period = segments.period
+        seen = self._real(np.stack([s.positions for s in segments.items], axis=-1))
+        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
+        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]) / (2 * period)
+        state = replace(state, position=x, velocity=v, time=period)
+        errors, predictions = [], []
+        with torch.no_grad():
+            for k in range(2, len(seen)):
+                state = self.integrator.advance(system, state, period)
+                predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
+                error = seen[k] - predicted
+                if k >= segments.first:
+                    errors.append(error)
+                    predictions.append(predicted)
+                lifted = torch.einsum("vm,mcb->vcb", self._lifted, error)
+                state = replace(
+                    state, position=state.position + lifted, velocity=state.velocity + lifted / period, time=k * period
+                )
+        return torch.stack(errors), torch.stack(predictions)
+
+    def sensitivity(
+        self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+    ) -> Tensor:
+        """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
+        system, state = column.system(*self.system(segments, calibrations))
+        return (base - self.errors(system, state, segments)) / column.step
+
+    def calibration_sensitivities(
+        self, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+    ) -> list[Tensor]:
+        """The same for each parameter of `THETA`."""
+        changes = []
+        for place, (_, _, step) in enumerate(THETA):
+            moved = [c.moved([step if k == place else 0.0 for k in range(len(THETA))]) for c in calibrations]
+            changes.append((base - self.errors(*self.system(segments, moved), segments)) / step)
+        return changes

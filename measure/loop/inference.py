@@ -1,0 +1,241 @@
+"""What the statistics of segments say: coefficients, tests against nulls, comparison on held-out segments.
+
+Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null recordings, whose own
+δ is known: the calibration they were simulated with. U is the wind's speed. Recordings of one cloth share the numerics
+they differ from the fit's by, so that μ has a part in common to a set: nuisance columns, learnt from the nulls as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.loop.columns import THETA
+from measure.loop.statistics import Statistics
+
+Floats = NDArray[np.float64]
+Chosen = Sequence[int]
+
+_SHIFTS = 3
+_PRIOR = np.array([0.3, 1.0, 1.0])
+"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
+30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011), damping within 5 ms."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NullModel:
+    """μ and Σ, from null segments.
+
+    Attributes:
+        coefficients: (feature, column) of μ in 1, U, U².
+        covariance: (column, column) Σ of one segment, about the mean of its numerics.
+        shifts: (shift, column) how μ moves from one set of numerics to another: principal directions, each as long as
+            its standard deviation.
+    """
+
+    coefficients: Floats
+    covariance: Floats
+    shifts: Floats
+
+    @classmethod
+    def fit(cls, nulls: Nulls) -> NullModel:
+        """From segments whose calibrations are known."""
+        clean = nulls.clean
+        features = _features(nulls.speeds)
+        coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
+        left = clean - features @ coefficients
+        means = np.stack([left[nulls.numerics == index].mean(axis=0) for index in np.unique(nulls.numerics)])
+        shared = means[np.searchsorted(np.unique(nulls.numerics), nulls.numerics)]
+        within = left - shared
+        covariance = within.T @ within / max(len(left) - len(means) - features.shape[1], 1)
+        covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(left))
+        return cls(coefficients=coefficients, covariance=covariance, shifts=_principal(means, covariance))
+
+    def mean(self, speeds: Floats) -> Floats:
+        """(segment, column)."""
+        return _features(speeds)[:, : len(self.coefficients)] @ self.coefficients
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Nulls:
+    """Segments of null recordings, with what they were made with.
+
+    Attributes:
+        statistics: of the segments.
+        speeds: (segment,) of the wind [m/s].
+        offsets: (segment, theta) steps from the calibration of the fit to the one they were simulated with.
+        numerics: (segment,) which mesh and method.
+    """
+
+    statistics: Statistics
+    speeds: Floats
+    offsets: Floats
+    numerics: NDArray[np.int64]
+
+    @property
+    def clean(self) -> Floats:
+        """(segment, column) r less what their calibrations explain."""
+        response = self.statistics.response[:, :, : len(THETA)]
+        return self.statistics.r - np.einsum("sij,sj->si", response, self.offsets)
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Nulls:
+        """Some segments."""
+        return Nulls(
+            statistics=self.statistics.select(chosen), speeds=self.speeds[chosen], offsets=self.offsets[chosen],
+            numerics=self.numerics[chosen],
+        )  # fmt: skip
+
+
+def _features(speeds: Floats) -> Floats:
+    return np.stack([np.ones_like(speeds), speeds, speeds**2], axis=1)
+
+
+def _principal(means: Floats, covariance: Floats) -> Floats:
+    """Directions that hold most of what the means vary by, in units of the covariance: (shift, column)."""
+    factor = np.linalg.cholesky(covariance)
+    whitened = np.linalg.solve(factor, (means - means.mean(axis=0)).T)
+    left, size, _ = np.linalg.svd(whitened, full_matrices=False)
+    kept = min(_SHIFTS, max(len(means) - 1, 0))
+    scale = size[:kept] / np.sqrt(max(len(means) - 1, 1))
+    return (factor @ (left[:, :kept] * scale)).T
+
+
+def _inflation(left: Floats, recording: NDArray[np.int64], covariance: Floats) -> float:
+    """How much more recordings' means vary than those of as many independent segments, at least 1."""
+    sums = np.stack(
+        [left[recording == index].sum(axis=0) / np.sqrt((recording == index).sum()) for index in np.unique(recording)]
+    )
+    ratio = np.mean(sums**2, axis=0) / np.diag(covariance)
+    return float(max(1.0, np.median(ratio)))
+
+
+def _shrunk(covariance: Floats, count: int) -> Floats:
+    """Toward its diagonal, by the share that chance correlations have at this count."""
+    share = min(1.0, len(covariance) / count)
+    return (1 - share) * covariance + share * np.diag(np.diag(covariance))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
+
+    Its columns are the statistics', then the null model's shifts.
+
+    Attributes:
+        recording: (segment,) index of each one's recording.
+        curvature: (segment, column, column) H = Rᵀ Σ⁻¹ R.
+        score: (segment, column) g = Rᵀ Σ⁻¹ (r − μ).
+        energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
+        columns: how many are the statistics'.
+    """
+
+    recording: NDArray[np.int64]
+    curvature: Floats
+    score: Floats
+    energy: Floats
+    columns: int
+
+    @classmethod
+    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+        """Of segments with their wind's speed (segment,) [m/s]."""
+        return cls._of(statistics.r, statistics, speeds, null)
+
+    @classmethod
+    def of_nulls(cls, nulls: Nulls, null: NullModel) -> Evidence:
+        """Of null segments, with what their calibrations explain taken out."""
+        return cls._of(nulls.clean, nulls.statistics, nulls.speeds, null)
+
+    @classmethod
+    def _of(cls, r: Floats, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+        left = r - null.mean(speeds)
+        shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
+        response = np.concatenate([statistics.response, shifts], axis=2)
+        precision = np.linalg.inv(null.covariance)
+        weighted = np.einsum("sia,ij->saj", response, precision)
+        return cls(
+            recording=statistics.recording, curvature=weighted @ response,
+            score=np.einsum("saj,sj->sa", weighted, left),
+            energy=np.einsum("si,ij,sj->s", left, precision, left), columns=r.shape[1],
+        )  # fmt: skip
+
+    @property
+    def nuisance(self) -> list[int]:
+        """Columns that are always fitted: the calibrated parameters and the shifts of the numerics."""
+        return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Evidence:
+        """Of some segments; indices may repeat."""
+        return Evidence(
+            recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
+            energy=self.energy[chosen], columns=self.columns,
+        )  # fmt: skip
+
+    def _total(self) -> tuple[Floats, Floats, float]:
+        """Sums over the segments, with the priors of the nuisance columns."""
+        curvature = self.curvature.sum(axis=0)
+        prior = np.concatenate([_PRIOR**-2, np.ones(self.score.shape[1] - self.columns)])
+        curvature[self.nuisance, self.nuisance] += prior
+        return curvature, self.score.sum(axis=0), float(self.energy.sum())
+
+    def fit(self, chosen: Chosen) -> Fit:
+        """Generalised least squares of the nuisance columns, under their priors, and the chosen ones."""
+        active = [*self.nuisance, *chosen]
+        curvature, score, energy = self._total()
+        covariance = np.linalg.inv(curvature[np.ix_(active, active)])
+        value = covariance @ score[active]
+        return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))
+
+    def drops(self, beside: Chosen = ()) -> Floats:
+        """(column,) how much each column, added to the nuisances and to some more, lowers the squared distance."""
+        active = [*self.nuisance, *beside]
+        curvature, score, _ = self._total()
+        solved = np.linalg.solve(curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]])
+        own = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
+        slope = score - curvature[active].T @ solved[:, -1]
+        drops = slope**2 / np.maximum(own, 1e-9 * np.diag(curvature))
+        drops[active] = 0.0
+        return drops[: self.columns]
+
+    def misfit(self, active: Chosen, value: Floats) -> Floats:
+        """(segment,) what coefficients leave of each segment."""
+        places = list(active)
+        quadratic = np.einsum("a,sab,b->s", value, self.curvature[:, places][:, :, places], value)
+        return self.energy - 2 * self.score[:, places] @ value + quadratic
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """Coefficients of some columns, with their covariance, and the squared distance they leave, prior included."""
+
+    active: tuple[int, ...]
+    value: Floats
+    covariance: Floats
+    left: float
+
+    def of(self, column: int) -> tuple[float, float]:
+        """Coefficient and standard error."""
+        place = self.active.index(column)
+        return float(self.value[place]), float(np.sqrt(self.covariance[place, place]))
+
+
+def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
+    """How much better each choice of columns predicts segments it was not fitted to: (choice, segment).
+
+    Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the
+    left-out segments' half misfits are compared with the base model's, fitted to the same.
+    """
+    folds = evidence.recording
+    if len(np.unique(folds)) < 2:
+        folds = (np.arange(len(folds)) >= len(folds) / 2).astype(np.int64)
+    result = np.zeros((len(choices), len(folds)))
+    for index in np.unique(folds):
+        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
+        base = inside.fit(())
+        before = outside.misfit(base.active, base.value)
+        for place, chosen in enumerate(choices):
+            fit = inside.fit(chosen)
+            result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
+    return result

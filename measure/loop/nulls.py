@@ -1,0 +1,120 @@
+"""Recordings of the base model itself, made with other numerics than the fit's: its errors when it is right.
+
+Nothing of the fitter's numerics is used: meshes are finer by random factors, steps are shorter by other methods.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.rng import stream
+from measure.loop.columns import Calibration
+from measure.observe.interpolation import onto
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from sim.handles import Handles
+from sim.integrate import Integrator
+from sim.integrate.implicit import BackwardEuler
+from sim.integrate.symplectic import Symplectic
+from sim.mesh import Diagonals, Mesh, grid
+from sim.scene import Scene, assemble
+
+Floats = NDArray[np.float64]
+
+_SETTLE = 3.0  # s; a flag of 1.5 m has forgotten a start from rest after two swings
+_FINER = (1.3, 1.75)
+_STEPS = (1e-3, 2e-3)  # s, of backward Euler
+_GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NullBatch:
+    """Null recordings that are simulated together, on one mesh by one method.
+
+    Attributes:
+        specimen: the cloth, its mesh that of the fit.
+        markers: (marker, 2) [m].
+        rate: [Hz].
+        duration: of each recording [s].
+        noise: standard deviation of a marker's coordinate [m].
+        calibrations: one a recording.
+        speeds: of the wind, along +x, one a recording [m/s].
+        seed: of the numerics, the starts and the noise.
+    """
+
+    specimen: Specimen
+    markers: Floats
+    rate: float
+    duration: float
+    noise: float
+    calibrations: tuple[Calibration, ...]
+    speeds: tuple[float, ...]
+    seed: int
+
+    def simulate(self) -> list[Trajectory]:
+        """One recording a calibration."""
+        flat, held = self._mesh()
+        seen = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, held))
+        jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
+        return [
+            Trajectory(
+                name=f"null {self.seed}-{place}", markers=self.markers, positions=seen[..., place] + jitter[..., place],
+                rate=self.rate, wind=WindTrack.constant((speed, 0.0, 0.0)), noise=self.noise,
+            )
+            for place, speed in enumerate(self.speeds)
+        ]  # fmt: skip
+
+    def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
+        """A finer grid in the fit's frame, and its vertices nearest to the attachments."""
+        rng = stream(self.seed, "null", "mesh")
+        rest = self.specimen.mesh.rest
+        low, size = rest.min(axis=0), np.ptp(rest, axis=0)
+        spacing = math.sqrt(size[0] * size[1] / self.specimen.mesh.vertex_count) / rng.uniform(*_FINER)
+        columns, rows = (max(2, round(extent / spacing)) for extent in size)
+        diagonals = list(Diagonals)[rng.integers(2)]
+        flat = grid(width=float(size[0]), height=float(size[1]), columns=columns, rows=rows, diagonals=diagonals)
+        flat = replace(flat, rest=flat.rest + low)
+        held = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
+        return flat, tuple(held)
+
+    def _frames(self, flat: Mesh, held: tuple[int, ...]) -> Floats:
+        """(frame, vertex, 3, recording) [m], after the start has been forgotten."""
+        specimen = self.specimen
+        integrator, damped = self._method()
+        lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
+        offset = flat.rest - specimen.mesh.rest[lowest]
+        start = specimen.anchors[np.argmin(specimen.anchors[:, 2])] + np.stack(
+            [offset[:, 0], 0 * offset[:, 0], offset[:, 1]], axis=1
+        )
+        roughness = 2e-3 * stream(self.seed, "null", "start").standard_normal((len(self.speeds), *start.shape))
+        scenes = []
+        for calibration, rough, speed in zip(self.calibrations, roughness, self.speeds, strict=True):
+            position = start + rough
+            position[list(held)] = specimen.anchors
+            material = calibration.material(specimen.material)
+            scenes.append(
+                Scene(
+                    mesh=flat, position=position, gravity=specimen.gravity, air=specimen.air, wind=(speed, 0.0, 0.0),
+                    material=replace(material, damping=max(material.damping - damped, 0.0)),
+                    handles=Handles(vertices=held, stiffness=specimen.stiffness),
+                )
+            )  # fmt: skip
+        system, state = assemble(scenes)
+        frames = []
+        with torch.no_grad():
+            for frame in range(round((_SETTLE + self.duration) * self.rate)):
+                state = integrator.advance(system, state, 1 / self.rate)
+                if frame >= round(_SETTLE * self.rate):
+                    frames.append(state.position.double().numpy().copy())
+        return np.stack(frames)
+
+    def _method(self) -> tuple[Integrator, float]:
+        """A method for these dampings, and the damping it adds by itself [s]."""
+        if max(c.damping for c in self.calibrations) <= _GENTLE:
+            return Symplectic(), 0.0
+        step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))]
+        return BackwardEuler(step=step, tolerance=1e-4), step

@@ -1,0 +1,133 @@
+"""Prediction errors and sensitivities, brought down to a few numbers a segment: all that inference needs.
+
+With e the errors, s_i the sensitivity of the predictions to column i and w weights of the markers, a segment gives
+
+    r_i = Σ w e·s_i / √(Σ w s_i²),   R_ij = Σ w s_i·s_j / √(Σ w s_i²),
+
+sums over frames and markers, w the inverse mean square of a marker's errors in the recording beyond what its noise
+explains: the errors' size along the direction of each column, and how coefficients δ move it,
+E r = μ + R δ, with μ what the model's own numerics leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from measure.loop.columns import Calibration, Column
+from measure.loop.forecast import Forecaster, Segments
+
+Floats = NDArray[np.float64]
+
+_CHUNK = 64
+"""Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
+_CLIP = 4.0
+"""Errors beyond so many times a marker's root mean square count as that much (Huber): folds snap in ways no effect
+explains."""
+
+_NOISE = 6.0
+"""Variance of e by markers of variance 1: each frame's weighs 1, the one before 2, the one before that 1, in amplitude,
+as for a point that moves evenly."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Statistics:
+    """Of segments.
+
+    Attributes:
+        recording: (segment,) index of each one's recording.
+        r: (segment, column).
+        response: (segment, column, column) R.
+        error: (segment,) mean squared prediction error [m²].
+        marker_error: (segment, marker) the same of each marker.
+    """
+
+    recording: NDArray[np.int64]
+    r: Floats
+    response: Floats
+    error: Floats
+    marker_error: Floats
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Statistics:
+        """Of some segments."""
+        return Statistics(
+            recording=self.recording[chosen], r=self.r[chosen], response=self.response[chosen],
+            error=self.error[chosen], marker_error=self.marker_error[chosen],
+        )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: Sequence[Statistics]) -> Statistics:
+        """One after another.
+
+        Raises:
+            UsageError: none.
+        """
+        if not parts:
+            raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
+        return cls(
+            recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
+            response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
+            marker_error=np.concatenate([p.marker_error for p in parts]),
+        )  # fmt: skip
+
+
+def statistics(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> Statistics:
+    """Run the base model, its parameters and every column along segments, each with its calibration.
+
+    The columns of the result are `THETA`'s, then those given.
+    """
+    recording = np.array([s.recording for s in segments.items])
+    # Segments of one recording share weights, and so stay in one chunk.
+    parts: list[Statistics] = []
+    for chosen in _chunks(recording):
+        own = segments.select(chosen)
+        starts = [calibrations[i] for i in chosen]
+        noise = np.array([s.noise for s in own.items])
+        base = forecaster.errors(*forecaster.system(own, starts), own)
+        changes = forecaster.calibration_sensitivities(own, starts, base)
+        changes += [forecaster.sensitivity(column, own, starts, base) for column in columns]
+        parts.append(_reduced(base, changes, recording[chosen], noise))
+    return Statistics.joined(parts)
+
+
+def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    chunks: list[list[int]] = [[]]
+    for index in np.unique(recording):
+        own = np.flatnonzero(recording == index).tolist()
+        if chunks[-1] and len(chunks[-1]) + len(own) > _CHUNK:
+            chunks.append([])
+        chunks[-1] += own
+    return [np.array(chunk) for chunk in chunks if chunk]
+
+
+def _reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64], noise: Floats) -> Statistics:
+    mean = (base**2).mean((0, 2))  # (marker, segment)
+    r = np.empty((len(recording), len(changes)))
+    response = np.empty((len(recording), len(changes), len(changes)))
+    stacked = torch.stack(list(changes))
+    for index in np.unique(recording):
+        own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
+        squared = mean[:, own].mean(1)
+        noisy = _NOISE * float(noise[recording == index][0]) ** 2
+        scale = torch.maximum(squared - noisy, squared / 4).sqrt()[None, :, None]
+        for place in own.tolist():
+            error = base[..., place] / scale
+            size = error.norm(dim=2, keepdim=True) / 3**0.5
+            error = (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1).double()
+            moved = (stacked[..., place] / scale).reshape(len(changes), -1).double()
+            inner = (moved @ moved.T).cpu().numpy()
+            length = np.sqrt(np.diag(inner))
+            r[place] = (moved @ error).cpu().numpy() / length
+            response[place] = inner / length[:, None]
+    return Statistics(
+        recording=recording, r=r, response=response, error=mean.mean(0).double().cpu().numpy() * 3,
+        marker_error=mean.T.double().cpu().numpy() * 3,
+    )  # fmt: skip
