@@ -98,6 +98,7 @@ class Study:
     linear: tuple[Outcome, ...]
     crossed: tuple[Outcome, ...]
     in_time: tuple[Outcome, ...]
+    linear_tables: Mapping[Candidate, LinearTable]
     tables: Mapping[Candidate, SimulatedTable]
     shapes: Mapping[Candidate, StripMotion]
     floor: Mapping[Kind, float]
@@ -170,8 +171,8 @@ def study(
 
     linear: list[Outcome] = []
     crossed: list[Outcome] = []
-    for candidate in Candidate:
-        table = linear_table(tried(candidate))
+    linear_tables = {candidate: linear_table(tried(candidate)) for candidate in Candidate}
+    for candidate, table in linear_tables.items():
         linear += [evidence.outcome(candidate, s, table, fitted_to=_FITTED, judged_by=_FITTED) for s in Shear]
         if candidate in IN_TIME:
             crossed += [
@@ -185,8 +186,8 @@ def study(
     best = min(in_time, key=lambda outcome: outcome.score)
     return Study(
         declared=_declared(case, evidence, linear_table, simulated), controls=_controls(case, simulated),
-        linear=tuple(linear), crossed=tuple(crossed), in_time=tuple(in_time), tables=tables,
-        shapes=_shapes(case, in_time), floor=_floor(case, best, simulated),
+        linear=tuple(linear), crossed=tuple(crossed), in_time=tuple(in_time), linear_tables=linear_tables,
+        tables=tables, shapes=_shapes(case, in_time), floor=_floor(case, best, simulated),
     )  # fmt: skip
 
 
