@@ -64,9 +64,9 @@ class Geometry:
             face_offset=face_offset, cloth_faces=offset.diff(), shift=placed.shift,
         )  # fmt: skip
 
-    def at(self, meshes: Meshes) -> Geometry:
-        """The same at another instant."""
-        cloth = meshes.positions + meshes.positions.new_tensor(self.shift)
+    def at(self, positions: Tensor) -> Geometry:
+        """The same with the cloth's vertices elsewhere: (all vertices, 3), as the meshes have them [m]."""
+        cloth = positions + positions.new_tensor(self.shift)
         return replace(self, positions=torch.cat([cloth, self.positions[len(cloth) :]]))
 
     def check(self, camera: Camera) -> None:

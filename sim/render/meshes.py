@@ -80,11 +80,15 @@ class Meshes:
         finite = all(math.isfinite(v) for v in (*self.anchor, self.heading, self.rate))
         if not finite or self.rate <= 0:
             raise _wrong("an anchor, heading or rate that makes no sense", "finite numbers, and a rate above 0")
-        for i in range(len(self)):
-            own = self.faces[self.face_offset[i] : self.face_offset[i + 1]]
-            count = self.vertex_offset[i + 1] - self.vertex_offset[i]
-            if int(own.min()) < 0 or int(own.max()) >= count:
-                raise _wrong(f"faces of frame {i} name vertices outside 0 to {count - 1}", "indices within their frame")
+        faces, counts = (torch.tensor(o, device=self.device).diff() for o in (self.face_offset, self.vertex_offset))
+        most = torch.repeat_interleave(counts, faces)[:, None]
+        wrong = torch.nonzero(((self.faces < 0) | (self.faces >= most)).any(dim=1)).flatten()
+        if len(wrong):
+            frame = sum(offset <= int(wrong[0]) for offset in self.face_offset) - 1
+            raise _wrong(
+                f"faces of frame {frame} name vertices outside 0 to {int(counts[frame]) - 1}",
+                "indices within their frame",
+            )
 
     def __len__(self) -> int:
         return len(self.vertex_offset) - 1

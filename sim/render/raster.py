@@ -16,7 +16,7 @@ from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
 from sim.render.raster_kernel import library
 from sim.render.sampling import Samples
-from sim.render.shutter import moved
+from sim.render.shutter import Motion
 from sim.render.stage import stage
 from sim.render.texture import Pyramid
 from sim.render.view import View
@@ -48,10 +48,11 @@ class Raster:
         placed = stage(meshes, zeta)
         samples = Samples.of(zeta, to_sun=placed.to_sun)
         geometry = Geometry.of(meshes, placed)
+        motion = Motion.of(meshes) if zeta.exposure_time > 0 else None
         out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=device)
         code = library() if device.type == "cpu" else None
         for index in range(zeta.raster_samples):
-            now = geometry.at(moved(meshes, float(samples.time[index])))
+            now = geometry if motion is None else geometry.at(motion.at(float(samples.time[index])))
             now.check(placed.camera)
             x, y = samples.jitter[index].tolist()
             view = View(camera=placed.camera, jitter=(x, y), samples=zeta.raster_samples)

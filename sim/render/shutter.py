@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -14,37 +14,59 @@ from sim.render.meshes import Frame, Meshes
 _INWARD = 1e-5  # share by which a material point on the very edge is moved towards the middle
 
 
-def moved(meshes: Meshes, offset: float) -> Meshes:
-    """The meshes with every frame `offset` seconds later than its instant.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """Where vertices are around the instants of their frames.
 
     Positions are linear in time between frames, and go on at the same velocity before the first and after the last one;
     a single frame stands still. Where the topology changes, a vertex of a frame is looked up in the next (or last) one
     by its place in the texture, which is fixed to the cloth.
 
-    Args:
-        offset: [s], at most a frame's time either way.
-
-    Raises:
-        InputError: texture places of one frame that are not covered by the next one's faces.
+    Attributes:
+        positions: (all vertices, 3) at the frames' instants [m].
+        rate: frames a second [Hz].
+        forth, back: (all vertices, 3) displacements within the frame's time after, and the one before [m].
     """
-    n, share = len(meshes), offset * meshes.rate
-    if share == 0 or n == 1:
-        return meshes
-    if meshes.one_topology:
-        x = meshes.positions.unflatten(0, (n, -1))
-        velocity = torch.diff(x, dim=0)
-        velocity = torch.cat([velocity, velocity[-1:]] if share > 0 else [velocity[:1], velocity])
-        return replace(meshes, positions=(x + share * velocity).flatten(0, 1))
-    return replace(meshes, positions=torch.cat([_one(meshes, i, share) for i in range(n)]))
+
+    positions: Tensor
+    rate: float
+    forth: Tensor
+    back: Tensor
+
+    @classmethod
+    def of(cls, meshes: Meshes) -> Motion:
+        """The motion of a sequence.
+
+        Raises:
+            InputError: texture places of one frame that are not covered by the next one's faces.
+        """
+        n, x = len(meshes), meshes.positions
+        if n == 1:
+            return cls(positions=x, rate=meshes.rate, forth=torch.zeros_like(x), back=torch.zeros_like(x))
+        if meshes.one_topology:
+            steps = torch.diff(x.unflatten(0, (n, -1)), dim=0)
+            forth, back = (torch.cat(parts).flatten(0, 1) for parts in ((steps, steps[-1:]), (steps[:1], steps)))
+        else:
+            forth = torch.cat([_step(meshes, i, i + 1 if i < n - 1 else i - 1) for i in range(n)])
+            back = torch.cat([_step(meshes, i, i - 1 if i > 0 else 1) for i in range(n)])
+        return cls(positions=x, rate=meshes.rate, forth=forth, back=back)
+
+    def at(self, offset: float) -> Tensor:
+        """(all vertices, 3) positions `offset` seconds after each frame's instant, within a frame's time of it."""
+        share = offset * self.rate
+        return self.positions + share * (self.forth if share > 0 else self.back) if share else self.positions
 
 
-def _one(meshes: Meshes, index: int, share: float) -> Tensor:
-    """A frame's positions, `share` of a frame's time later."""
+def moved(meshes: Meshes, offset: float) -> Meshes:
+    """The meshes with every frame `offset` seconds later than its instant, see `Motion`."""
+    return replace(meshes, positions=Motion.of(meshes).at(offset)) if offset else meshes
+
+
+def _step(meshes: Meshes, index: int, other: int) -> Tensor:
+    """How far a frame's vertices move in a frame's time, from where they are in another frame, one earlier or later."""
     here = meshes.frame(index)
-    step = 1 if share > 0 else -1
-    other, sign = (index + step, step) if 0 <= index + step < len(meshes) else (index - step, -step)
     there = _looked_up(meshes.frame(other), here.uv, where=f"frames {index} and {other}")
-    return here.positions + share * sign * (there - here.positions)
+    return (there - here.positions) * (other - index)
 
 
 def _looked_up(frame: Frame, uv: Tensor, *, where: str) -> Tensor:
