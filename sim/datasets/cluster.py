@@ -6,13 +6,14 @@ import logging
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.metadata import version
 from itertools import islice
 from typing import Any, cast
 
 from distributed import Client, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
 
-from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.errors import FlagdataError, NotFoundError, UsageError
 
 _CONNECT_TIMEOUT = 30.0  # s
 _AHEAD = 2  # jobs a thread, so that none waits for the next
@@ -36,7 +37,8 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
         workers: processes on this machine, of one thread each; of no meaning with a scheduler, which has its own.
 
     Raises:
-        NotFoundError: no scheduler answers there.
+        NotFoundError: no scheduler answers there, or it has no workers.
+        UsageError: its workers have another version of flagdata.
     """
     if scheduler is not None:
         try:
@@ -47,6 +49,7 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
                 fix="start one with dask scheduler, and workers with dask worker ADDRESS",
             ) from None  # fmt: skip
         with client:
+            _check(client, where=scheduler)
             yield client
         return
     with (
@@ -59,6 +62,29 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
         Client(cluster, set_as_default=False) as client,
     ):  # fmt: skip
         yield client
+
+
+def _check(client: Client, *, where: str) -> None:
+    """Make sure that somebody works there, and with this version of the code.
+
+    Raises:
+        NotFoundError: no worker came within `_CONNECT_TIMEOUT`.
+        UsageError: a worker has another version of flagdata, which may make something else of the same job.
+    """
+    try:
+        client.wait_for_workers(1, timeout=_CONNECT_TIMEOUT)
+    except TimeoutError:
+        raise NotFoundError(
+            f"the scheduler has no workers after {_CONNECT_TIMEOUT:g} s", where=where,
+            fix="start some with dask worker ADDRESS",
+        ) from None  # fmt: skip
+    found = cast("dict[str, str]", client.run(version, "flagdata"))
+    for worker, other in found.items():
+        if other != version("flagdata"):
+            raise UsageError(
+                f"the worker {worker} has flagdata {other}, not {version('flagdata')}", where=where,
+                fix="install the same version everywhere",
+            )  # fmt: skip
 
 
 @contextmanager

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -99,6 +101,18 @@ def test_a_killed_workers_jobs_are_done_by_the_other(
     builds.wait_for(process, tmp_path / "lake", SEQUENCES + 2)
     cluster.workers[0].kill()
     builds.finish(process)
+    assert builds.rows(tmp_path / "lake") == builds.rows(built)
+
+
+def test_without_a_scheduler_it_is_built_by_processes_of_this_machine(
+    recipe_file: Path, built: Path, builds: Any, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-m", "flagdata.cli", "build", str(recipe_file), "--lake", str(tmp_path / "lake")]
+    done = subprocess.run([*command, "--workers", "1", "--json"], capture_output=True, text=True, check=True)
+    said = json.loads(done.stdout)
+    assert said["schema"] == "flagdata.build/1"
+    assert (said["new_sequences"], said["new_films"], said["clips"]) == (SEQUENCES, FILMS, FILMS)
+    assert Path(said["card"]).parent == tmp_path / "lake" / "cards"
     assert builds.rows(tmp_path / "lake") == builds.rows(built)
 
 

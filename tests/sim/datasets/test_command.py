@@ -1,0 +1,94 @@
+"""`flagdata build` on the command line: the plan before anything is made, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from flagdata.cli import main
+from sim.datasets import jobs
+from sim.datasets.cast import casts
+from sim.datasets.reading import load
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(["build", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
+    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lake = tmp_path / "lake"
+    code, out, _ = said(capsys, recipe_file, "--lake", lake, "--plan", "--workers", 2, "--json")
+    assert code == 0
+    assert not lake.exists()
+    plan = json.loads(out)
+    assert plan["schema"] == "flagdata.build-plan/1"
+    assert plan["sequences"] == {"train": 4, "test": 2}
+    assert plan["films"] == plan["clips"] == {"train": 11, "test": 4}  # 30 frames a film are one clip
+    assert plan["missing"] == {"sequences": 6, "films": 15}
+    rates = plan["rates"]
+    work = 6 * rates["sequence_seconds"] + 15 * rates["film_seconds"]
+    assert plan["hours"] == pytest.approx(work / 2 / 3600)
+    assert plan["bytes"] == pytest.approx(6 * rates["sequence_bytes"] + 15 * rates["film_bytes"], abs=1)
+    # 30 frames of one slot each, and what a record needs beside them.
+    assert 30 * 2048 <= rates["film_bytes"] < 1.3 * 30 * 2048
+
+
+def test_the_planned_size_of_a_sequence_is_near_the_real_one(
+    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from flagdata.lake.meshes import write_meshes
+
+    _, out, _ = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--json")
+    simulation = next(casts(load(str(recipe_file)))).simulation
+    (outcome, _) = jobs.simulate(simulation, 0, [0, 1], "cpu").outcomes
+    assert outcome.sequence is not None
+    write_meshes(tmp_path / "one.zarr", outcome.sequence)
+    real = sum(file.stat().st_size for file in (tmp_path / "one.zarr").rglob("*") if file.is_file())
+    assert json.loads(out)["rates"]["sequence_bytes"] == pytest.approx(real, rel=0.25)
+
+
+def test_a_plan_for_people_has_a_line_a_side(
+    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--workers", 2)
+    assert code == 0
+    assert [line.split() for line in out.splitlines()] == [
+        ["side", "sequences", "films", "clips"], ["train", "4", "11", "11"], ["test", "2", "4", "4"],
+        ["all", "6", "15", "15"],
+    ]  # fmt: skip
+    assert "6 sequences and 15 films" in err
+    assert "2 workers" in err
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "says"),
+    [
+        (["flagsin"], 2, "did you mean 'flagsim'"),
+        (["flagsim", "--renderer", "rastre"], 2, "did you mean 'raster'"),
+        (["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], 2, "--workers with --scheduler"),
+    ],
+)
+def test_what_cannot_be_built_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, options: list[str], code: int, says: str
+) -> None:
+    found, _, err = said(capsys, *options, "--lake", tmp_path / "lake")
+    assert found == code
+    assert says in err
+    assert not (tmp_path / "lake").exists()
+
+
+def test_a_folder_that_is_no_lake_is_left_alone(
+    recipe_file: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "letter.txt").write_text("dear")
+    code, _, err = said(capsys, recipe_file, "--lake", tmp_path)
+    assert code == 1
+    assert "there is no lake here" in err
+    assert [entry.name for entry in tmp_path.iterdir()] == ["letter.txt"]
