@@ -71,6 +71,8 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
         InputError: it cannot be used.
     """
     where = f"recording {seen.name!r}"
+    if not np.isfinite(seen.positions).all(axis=2).any():
+        raise InputError("no marker was tracked in any frame", where=where, fix="check the columns of the positions")
     seen = frames.even(seen)
     edges = shape.Edges.between(seen.markers, where=where)
     seen = frames.without_stuck_markers(seen)
@@ -91,7 +93,7 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
         )
     wind = seen.wind or seen.known.wind
     seen = replace(
-        seen, markers=markers, positions=filled.positions, times=times - begin, faces=None,
+        seen, markers=markers, positions=filled.positions, times=times - begin,
         wind=None if wind is None else wind.later(begin),
         findings=(
             *seen.findings, *told, *filled.findings, *shape.check_cover(markers, corners, where=where),
@@ -123,6 +125,7 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
         found += attachment.beside_pins(recording, specimen)
         surroundings.check_up(recording, specimen)
         found += surroundings.check_direction(recording, specimen)
+        found += surroundings.check_sides(recording)
         surroundings.check_accelerations(recording, specimen)
         found += surroundings.check_strength(recording, specimen)
     attachment.check_places(experiment.recordings, specimen)

@@ -81,14 +81,13 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     if isinstance(sequence, MeshSequence) and len(rest) <= MARKERS:
         used = np.unique(faces)  # vertices that no face uses are no part of the cloth
         seats, positions = rest[used], sequence.positions[:, used].astype(np.float64)
-        kept = np.searchsorted(used, faces)
     else:
         mesh = model_mesh(corners, vertices=markers)
-        seats, kept, positions = mesh.rest, mesh.faces, sample(sequence, mesh.rest)
+        seats, positions = mesh.rest, sample(sequence, mesh.rest)
         found = (*found, _resampled(len(seats), remeshed=not fixed, where=where))
     return Observation(
         name=name, markers=seats, positions=positions, times=(sequence.time - sequence.time[0]) / NANOSECONDS,
-        faces=kept, outline=corners, known=known, findings=found,
+        outline=corners, known=known, findings=found,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding
+from measure.observe.cloth import outline
 from measure.observe.trajectory import Floats, WindTrack
 from sim.air import AirForce
 from sim.material import Material
@@ -68,7 +69,6 @@ class Observation:
         markers: (marker, 2) rest coordinates [m].
         positions: (frame, marker, 3) [m], z up; NaN where a point was not tracked.
         times: (frame,) [s], from 0.
-        faces: (face, 3) of the markers, where they are a mesh's vertices.
         outline: (corner, 2) of the cloth in rest coordinates [m], where it is known.
         wind: beside it; None for that of `known`.
         noise: standard deviation of a coordinate [m]; None to estimate it.
@@ -84,7 +84,6 @@ class Observation:
     markers: Floats
     positions: Floats
     times: Floats
-    faces: NDArray[np.int64] | None = None
     outline: Floats | None = None
     wind: WindTrack | None = None
     noise: float | None = None
@@ -131,14 +130,20 @@ def from_arrays(
 ) -> Observation:
     """A recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker, 2) [m], z up.
 
+    Args:
+        faces: (face, 3) of a mesh whose vertices the markers are; its edge is the cloth's.
+
     Raises:
         InputError: shapes that disagree, or a rate that is not positive.
     """
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"a rate of {rate!r} frames a second", where=f"recording {name!r}", fix="give Hz")
-    positions = np.asarray(positions, dtype=np.float64)
+    positions, rest = np.asarray(positions, dtype=np.float64), np.asarray(rest, dtype=np.float64)
+    corners = None
+    if faces is not None:
+        corners = outline(rest, np.asarray(faces, dtype=np.int64), where=f"recording {name!r}")
     return Observation(
-        name=name, markers=np.asarray(rest, dtype=np.float64), positions=positions,
+        name=name, markers=rest, positions=positions,
         times=np.arange(len(positions)) / rate, wind=wind, noise=noise, known=known or Known(),
-        faces=None if faces is None else np.asarray(faces, dtype=np.int64),
+        outline=corners,
     )  # fmt: skip

@@ -8,12 +8,14 @@ import numpy as np
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from measure.observe import cloth
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 
 # A pin's root-mean-square motion over that of the median marker. Held by springs of 1 kN/m in 8 m/s: below 0.01.
 _LOOSE, _FREE = 0.05, 0.3
 _STILL = 1e-3  # of the cloth's size: what moves less is still, whatever the rest does
+_SEEN = 0.02  # of the cloth's size: a pin that far beyond the outermost markers is not observed
 _ELSEWHERE = 0.02  # of the cloth's size: pins of two recordings further apart are not in one place
 
 
@@ -21,7 +23,8 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     """Refuse pins that move with the cloth, and tell those that move a little.
 
     Raises:
-        InputError: a pin moves by more than three tenths of what the median marker does.
+        InputError: a pin among the markers moves by more than three tenths of what the median marker does, or one
+            beyond them by more than all of it.
     """
     where = f"recording {recording.name!r}"
     seats = specimen.mesh.rest[list(specimen.held)]
@@ -35,7 +38,19 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     u, v = seats[worst]
     what = f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
     still = _still_points(recording)
-    if moved[worst] > max(_FREE * usual, 3 * recording.noise):
+    reach = cloth.hull(recording.markers, where=where)
+    away = 0.0 if cloth.inside(reach, seats[worst][None])[0] else cloth.distance_to(reach, seats[worst])
+    seen = away <= _SEEN * size
+    if not seen and moved[worst] <= usual:
+        return (
+            Finding(
+                kind="pins-not-observed", severity=Severity.WARNING, where=where, value=away,
+                what=f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its place is "
+                f"guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
+                fix="track a point at each pin",
+            ),
+        )  # fmt: skip
+    if not seen or moved[worst] > max(_FREE * usual, 3 * recording.noise):
         raise InputError(
             f"{what}, against {1e3 * usual:.3g} mm at the median marker: it is not held there", where=where,
             fix=f"name the pins where it is held; it moves least at (u, v) = {still} m",

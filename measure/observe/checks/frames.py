@@ -20,9 +20,10 @@ FEWEST = 40
 _JITTER = 0.1  # of a frame: times that are further off an even grid are not of a constant rate
 _REPEATED = 0.02  # of the usual squared step: a frame that moved less repeats the one before
 _MANY = 0.2  # of the frames: repeats that are so many mean a lower rate
+_FROZEN = 0.95  # of the frames: repeats that are so many are no repeats but a cloth that stands still
 _AROUND = 5  # frames on either side that tell the usual step
 _NEIGHBOURS = 4
-_MOVED_ON = 10.0  # times the smallest steps there are: the neighbours of a stuck marker move as much
+_MOVED_ON = 20.0  # times the smallest steps there are: the neighbours of a stuck marker move as much
 _PINNED = 0.5  # of the frames: a marker that stands still in so many is held
 _FAR = 0.05  # of the cloth's size: (0, 0, 0) is no position of a marker that never comes as near to it
 _JUMP = 1.7  # of the mean of the steps on either side: a frame is missing in between
@@ -83,10 +84,12 @@ def without_repeats(seen: Observation, sigma: float) -> Observation:
         sigma: standard deviation of a coordinate's noise [m].
 
     Raises:
-        InputError: a fifth of the frames or more are repeats.
+        InputError: a fifth of the frames or more are repeats, or nearly all.
     """
     where = f"recording {seen.name!r}"
     steps = _steps(seen.positions)
+    if (steps == 0).mean() > _FROZEN:
+        raise InputError("nothing moves: nearly all frames are the same", where=where, fix="record the cloth in a wind")
     square = steps - 6 * sigma**2
     usual = _neighbourhood(square)
     repeat = np.zeros(len(seen.positions), dtype=bool)

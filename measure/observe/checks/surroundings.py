@@ -15,9 +15,11 @@ _FLIES = 0.15  # of the cloth's size: a mean offset from the pins that is less s
 _BLOWS = 1.0  # of the ratio ρU²/(m g): wind that is weaker does not set the direction
 _UPWIND, _ASIDE = math.radians(100), math.radians(45)
 _RISES, _SAGS = 0.02, 0.05  # of the cloth's size
+_DOWNWARD = 0.3  # of a length along v: the mean cloth falls by so much at least where v runs downward
 _COVERED = 0.98  # of the recording: a log must cover so much
 _WILD, _SLOW = 30.0, 0.01  # of g + ρU²/m: root-mean-square accelerations beyond are of another clock or unit
-_CALM, _FLAT, _STRONG, _LIMP = 0.02, 0.8, 50.0, 0.1
+_QUASI_STATIC = 0.02  # of g x/L, a pendulum's at that motion: slower is no swinging cloth
+_CALM, _FLAT, _STRONG, _LIMP = 0.1, 0.5, 10.0, 0.25
 """ρU²/(m g), and the cloth's mean horizontal offset over what it is at most."""
 
 
@@ -125,11 +127,28 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
     )  # fmt: skip
 
 
+def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
+    """Tell rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
+    design = np.concatenate([recording.markers, np.ones((len(recording.markers), 1))], axis=1)
+    slope = np.linalg.lstsq(design, recording.positions.mean(axis=0), rcond=None)[0]
+    if slope[1, 2] > -_DOWNWARD:
+        return ()
+    return (
+        Finding(
+            kind="rest-upside-down", severity=Severity.WARNING, where=f"recording {recording.name!r}",
+            value=float(slope[1, 2]),
+            what="v runs downward on the cloth as it hangs: what is said of its top holds for its bottom",
+            fix="let v run from the bottom to the top, and u from the hoist to the fly",
+        ),
+    )  # fmt: skip
+
+
 def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
     """Refuse accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
 
     Raises:
-        InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m.
+        InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m, or below a fiftieth of what a
+            pendulum of the cloth's length has at such a motion.
     """
     positions, rate = recording.positions, recording.rate
     second = np.diff(positions, n=2, axis=0)
@@ -143,10 +162,14 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
             f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}", where=where,
             fix=f"is the rate of {rate:.4g} Hz too high, or the wind or the unit of the positions wrong?",
         )  # fmt: skip
-    if 0 < typical < _SLOW * expected and _ratio(specimen, recording.wind) > _BLOWS:
+    motion = float(np.sqrt(np.median(positions.var(axis=0).sum(axis=1))))
+    swing = weight * motion / float(np.ptp(specimen.mesh.rest, axis=0).max())
+    blows = _ratio(specimen, recording.wind) > _BLOWS
+    if typical < max(_SLOW * expected * blows, _QUASI_STATIC * swing):
         raise InputError(
             f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}", where=where,
-            fix=f"is the rate of {rate:.4g} Hz that of slow motion? Give the rate at which the camera ran",
+            fix=f"is the rate of {rate:.4g} Hz that of slow motion, or the unit of the wind another? Give the rate at "
+            "which the camera ran, and the wind in m/s",
         )  # fmt: skip
 
 
