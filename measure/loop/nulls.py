@@ -16,9 +16,11 @@ from flagdata.rng import stream
 from measure.loop.columns import Calibration
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from sim.effects import Effect, apply
 from sim.handles import Handles
 from sim.integrate import Integrator
 from sim.integrate.implicit import BackwardEuler
+from sim.integrate.split import SplitEuler
 from sim.integrate.symplectic import Symplectic
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
@@ -44,6 +46,7 @@ class NullBatch:
         calibrations: one a recording.
         speeds: of the wind, along +x, one a recording [m/s].
         seed: of the numerics, the starts and the noise.
+        effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
     """
 
     specimen: Specimen
@@ -54,6 +57,7 @@ class NullBatch:
     calibrations: tuple[Calibration, ...]
     speeds: tuple[float, ...]
     seed: int
+    effects: tuple[Effect, ...] = ()
 
     def simulate(self) -> list[Trajectory]:
         """One recording a calibration."""
@@ -103,7 +107,7 @@ class NullBatch:
                     handles=Handles(vertices=held, stiffness=specimen.stiffness),
                 )
             )  # fmt: skip
-        system, state = assemble(scenes)
+        system, state = apply(self.effects, *assemble(scenes))
         frames = []
         with torch.no_grad():
             for frame in range(round((_SETTLE + self.duration) * self.rate)):
@@ -114,7 +118,8 @@ class NullBatch:
 
     def _method(self) -> tuple[Integrator, float]:
         """A method for these dampings, and the damping it adds by itself [s]."""
-        if max(c.damping for c in self.calibrations) <= _GENTLE:
+        if max(c.damping for c in self.calibrations) <= _GENTLE and not self.effects:
             return Symplectic(), 0.0
         step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))]
-        return BackwardEuler(step=step, tolerance=1e-4), step
+        base = BackwardEuler(step=step, tolerance=1e-4)
+        return SplitEuler(base=base) if self.effects else base, step

@@ -1,0 +1,178 @@
+"""Which effect it is: candidates weighed, ranked by what they predict on recordings they were not fitted to, judged.
+
+Detection is by the calibrated statistic, attribution by held-out misfit: the largest statistic often points at the
+wrong effect, and cross-validation alone does not control false positives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from measure.loop.bank import columns
+from measure.loop.columns import THETA, EffectColumn, FieldColumn
+from measure.loop.inference import Evidence, gains
+from measure.loop.reference import Reference
+from measure.loop.verdict import Candidate, Conclusion, Estimate
+
+Floats = NDArray[np.float64]
+
+LEVEL = 0.9
+_FIRST = len(THETA)
+_FAR = 2.0
+"""Standard errors of the paired difference by which the named effect must lead."""
+_MOST = 0.5
+"""Share of the corrective field's gain below which the library has no answer."""
+
+EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
+"""Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Weighed:
+    """A candidate with what the decision needs.
+
+    Attributes:
+        column: place among the evidence's columns.
+        candidate: as reported.
+        gains: (segment,) held-out gain.
+        admissible: whether the fitted strength makes physical sense.
+    """
+
+    column: int
+    candidate: Candidate
+    gains: Floats
+    admissible: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judgement:
+    """What was decided.
+
+    Attributes:
+        conclusion: see `Conclusion`.
+        named: columns of the effects named.
+        ranking: candidates, best first, each with the reason why it was not named.
+        statistic, p_value: of the global test.
+        field_gain: (segment,) held-out gain of the corrective field.
+    """
+
+    conclusion: Conclusion
+    named: tuple[int, ...]
+    ranking: tuple[Weighed, ...]
+    statistic: float
+    p_value: float
+    field_gain: Floats
+
+
+def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgement:
+    """Weigh the library against the evidence of all recordings, at a level of the global test."""
+    drops = evidence.drops()
+    base = evidence.fit(())
+    statistic, p_value = reference.p_global(drops, base.left)
+    effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
+    smooth = [i + _FIRST for i, c in enumerate(columns()) if isinstance(c, FieldColumn)]
+    held_out = gains(evidence, [*([i] for i, _ in effects), smooth])
+    weighed = [
+        _weigh(evidence, reference, column, effect, own, drops)
+        for (column, effect), own in zip(effects, held_out, strict=False)
+    ]
+    ranking = _ranked(weighed)
+    if p_value > level:
+        reasons = {w.column: "the base model is not rejected" for w in ranking}
+        return _judgement(Conclusion.SUFFICIENT, (), ranking, reasons, statistic, p_value, held_out[-1])
+    best = next((w for w in ranking if w.admissible), ranking[0])
+    ahead = best.gains.sum() / max(held_out[-1].sum(), 1e-9)
+    enough = best.candidate.leftover > level
+    near = [w for w in ranking if w is not best and w.admissible and _behind(best, w) < _FAR and w.gains.sum() > 0]
+    reasons = {w.column: _reason(best, w) for w in ranking if w is not best}
+    if not best.admissible or best.gains.sum() <= 0 or (not enough and held_out[-1].sum() > 0 and ahead < _MOST):
+        reasons[best.column] = "what it leaves is more than half of what a smooth force field explains"
+        return _judgement(Conclusion.OUTSIDE, (), ranking, reasons, statistic, p_value, held_out[-1])
+    for rival in near:
+        reasons.pop(rival.column)
+    named = (best.column, *(w.column for w in near))
+    conclusion = Conclusion.ONE_OF if near else Conclusion.EFFECT if enough else Conclusion.PARTLY
+    return _judgement(conclusion, named, ranking, reasons, statistic, p_value, held_out[-1])
+
+
+def _judgement(
+    conclusion: Conclusion,
+    named: tuple[int, ...],
+    ranking: Sequence[Weighed],
+    reasons: dict[int, str],
+    statistic: float,
+    p_value: float,
+    field_gain: Floats,
+) -> Judgement:
+    explained = tuple(replace(w, candidate=replace(w.candidate, why_not=reasons.get(w.column, ""))) for w in ranking)
+    return Judgement(
+        conclusion=conclusion, named=named, ranking=explained, statistic=statistic, p_value=p_value,
+        field_gain=field_gain,
+    )  # fmt: skip
+
+
+def _weigh(
+    evidence: Evidence, reference: Reference, column: int, effect: EffectColumn, gained: Floats, drops: Floats
+) -> Weighed:
+    fit = evidence.fit([column])
+    value, _ = fit.of(column)
+    # Σ is learnt from nulls, so the standard error is, too: it is that which makes the nulls' mean drop 1.
+    error = abs(value) / math.sqrt(max(drops[column] / reference.spread[column], 1e-12))
+    least, most = effect.described.admissible
+    null = effect.described.null
+    admissible = least <= null + value <= most
+    by_recording = []
+    for index in np.unique(evidence.recording):
+        own = evidence.select(evidence.recording == index).fit([column])
+        single, claimed = own.of(column)
+        by_recording.append(estimate(single, claimed * math.sqrt(reference.spread[column]), effect.unit))
+    return Weighed(
+        column=column, gains=gained, admissible=admissible,
+        candidate=Candidate(
+            effect=effect.effect, parameter=effect.parameter, strength=estimate(null + value, error, effect.unit),
+            z=value / error if error > 0 else 0.0, p_value=reference.p_alone(drops[column], column),
+            p_family=reference.p_family(drops[column], column), gain=float(gained.sum()),
+            gain_error=_total_error(gained), behind=0.0, leftover=reference.p_left(fit.left),
+            by_recording=tuple(by_recording),
+        ),
+    )  # fmt: skip
+
+
+def estimate(value: float, error: float, unit: str) -> Estimate:
+    """A normal interval at `LEVEL`."""
+    reach = float(norm.ppf(0.5 + LEVEL / 2)) * error
+    return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=LEVEL)
+
+
+def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
+    ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
+    best = ordered[0]
+    return [replace(w, candidate=replace(w.candidate, behind=_behind(best, w))) for w in ordered]
+
+
+def _behind(best: Weighed, other: Weighed) -> float:
+    """Standard errors of the paired difference."""
+    if other is best or other.column == best.column:
+        return 0.0
+    difference = best.gains - other.gains
+    error = _total_error(difference)
+    return float(difference.sum() / error) if error > 0 else 0.0
+
+
+def _total_error(values: Floats) -> float:
+    """Standard error of a sum over segments."""
+    return float(np.std(values, ddof=1) * math.sqrt(len(values))) if len(values) > 1 else math.inf
+
+
+def _reason(best: Weighed, other: Weighed) -> str:
+    if not other.admissible:
+        return f"its strength would be {other.candidate.strength.value:.2g} {other.candidate.strength.unit}: unphysical"
+    if other.gains.sum() <= 0:
+        return "it predicts unseen recordings no better than the base model"
+    return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"

@@ -1,0 +1,152 @@
+"""The model with and without an effect, run again on recordings and times that neither was fitted to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from measure.loop.bank import columns
+from measure.loop.columns import THETA, Calibration, EffectColumn
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Evidence, Fit
+from measure.loop.verdict import Comparison, Estimate
+from sim.effects import EFFECTS, Effect, apply
+
+Floats = NDArray[np.float64]
+_LEVEL = 0.9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fold:
+    """Segments that are left out of a fit, and what is left out in words."""
+
+    words: str
+    outside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Predictions:
+    """Of segments, by one model: errors and predicted markers (frame, marker, 3, segment) [m]."""
+
+    errors: Floats
+    predicted: Floats
+
+    @property
+    def squared(self) -> Floats:
+        """(segment,) mean squared distance [m²]."""
+        return (self.errors**2).sum(axis=2).mean(axis=(0, 1))
+
+
+def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
+    """Each recording left out in turn, where there are two or more, and the last third of every recording."""
+    recording = np.array([s.recording for s in segments.items])
+    result: list[Fold] = []
+    if len(np.unique(recording)) > 1:
+        result += [
+            Fold(words=f"recording at {speeds[index]:.1f} m/s, unseen", outside=recording == index)
+            for index in np.unique(recording)
+        ]
+    late = np.zeros(len(recording), dtype=bool)
+    for index in np.unique(recording):
+        own = np.flatnonzero(recording == index)
+        late[own[-max(1, len(own) // 3) :]] = True
+    if not late.all():
+        result.append(Fold(words="last third of each recording, unseen", outside=late))
+    return tuple(result)
+
+
+def predict(
+    forecaster: Forecaster,
+    segments: Segments,
+    evidence: Evidence,
+    nominal: Calibration,
+    chosen: Sequence[int],
+    fold: NDArray[np.bool_] | None,
+) -> Predictions:
+    """Predictions of the segments left out, by the model with chosen columns, fitted to the others.
+
+    Args:
+        chosen: columns of effects, beside the calibrated parameters.
+        fold: (segment,) which are left out; None for a fit to all that predicts all.
+    """
+    inside = evidence if fold is None else evidence.select(~fold)
+    places = np.arange(len(segments)) if fold is None else np.flatnonzero(fold)
+    fit = inside.fit(chosen)
+    calibration = nominal.moved([float(v) for v in fit.value[: len(THETA)]])
+    own = segments.select(places)
+    system, state = forecaster.system(own, [calibration] * len(own))
+    errors, predicted = forecaster.run(*apply(fitted_effects(fit, chosen), system, state), own)
+    return Predictions(errors=_array(errors), predicted=_array(predicted))
+
+
+def fitted_effects(fit: Fit, chosen: Sequence[int]) -> tuple[Effect, ...]:
+    """The effects of chosen columns, at the strengths of a fit."""
+    weighed = [(column, columns()[column - len(THETA)]) for column in chosen]
+    return tuple(strengthened(c, fit.of(column)[0]) for column, c in weighed if isinstance(c, EffectColumn))
+
+
+def strengthened(column: EffectColumn, coefficient: float) -> Effect:
+    """The effect at a coefficient beyond its null value, kept to what is admissible."""
+    described = column.described
+    value = float(np.clip(described.null + coefficient, *described.admissible))
+    return EFFECTS[column.effect](**{column.parameter: value})
+
+
+def _array(values: torch.Tensor) -> Floats:
+    return values.double().cpu().numpy()
+
+
+def compare(
+    fold: Fold,
+    *,
+    frames: int,
+    before: Floats,
+    after: Floats,
+    control: Floats | None,
+    control_name: str,
+    floor: Floats,
+) -> Comparison:
+    """Errors of the segments left out.
+
+    Args:
+        before, after, control: (segment,) mean squared distances [m²].
+        floor: (segment,) the same of data simulated from the larger model, which it predicts with other numerics.
+    """
+    low = min(float(floor.mean()), float(before.mean()))
+    gained = float(before.mean() - after.mean())
+    room = float(before.mean()) - low
+    return Comparison(
+        what=fold.words, frames=frames, before=root(before), after=root(after), reduction=_difference(before, after),
+        floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(before.mean()) else None,
+        control=None if control is None else root(control), control_name=control_name,
+    )  # fmt: skip
+
+
+def root(squared: Floats) -> Estimate:
+    """Root of the mean over segments, with Student's interval of the mean, through the root [m]."""
+    mean = float(squared.mean())
+    reach = _reach(squared)
+    return Estimate(
+        value=math.sqrt(mean), low=math.sqrt(max(mean - reach, 0.0)), high=math.sqrt(mean + reach), unit="m",
+        level=_LEVEL,
+    )  # fmt: skip
+
+
+def _difference(before: Floats, after: Floats) -> Estimate:
+    """Of roots of means, paired by segment: linear in the squares, whose difference Student's interval is of."""
+    slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
+    value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
+    return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=_LEVEL)
+
+
+def _reach(values: Floats) -> float:
+    if len(values) < 2:
+        return math.inf
+    quantile = float(student.ppf(0.5 + _LEVEL / 2, len(values) - 1))
+    return quantile * float(values.std(ddof=1)) / math.sqrt(len(values))

@@ -1,0 +1,66 @@
+"""Where, when and at which frequencies the model errs, for the report."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from measure.loop.comparison import Predictions
+from measure.loop.forecast import Segments
+from measure.loop.verdict import Residual
+from measure.observe.trajectory import Experiment
+
+Floats = NDArray[np.float64]
+_SHOWN = 50
+"""Frames in motion: two seconds at 25 a second."""
+
+
+def residuals(
+    experiment: Experiment, segments: Segments, before: Predictions, after: Predictions | None
+) -> tuple[Residual, ...]:
+    """One a recording, from predictions of all segments by models fitted to all."""
+    recording = np.array([s.recording for s in segments.items])
+    made: list[Residual] = []
+    for index, own in enumerate(experiment.recordings):
+        places = np.flatnonzero(recording == index)
+        first, second = _joined(before.errors, places), None if after is None else _joined(after.errors, places)
+        starts = [segments.items[p].start + segments.first * segments.period for p in places]
+        length = before.errors.shape[0]
+        times = np.concatenate([start + np.arange(length) * segments.period for start in starts])
+        frequencies, spectrum = _spectrum(first, segments.period)
+        shown = slice(0, _SHOWN)
+        predicted = _joined(before.predicted, places)[shown]
+        made.append(
+            Residual(
+                recording=own.name, speed=own.wind.speed, held_out=False, times=_list(times),
+                in_time=_list(_over(first, (1,))), in_time_after=[] if second is None else _list(_over(second, (1,))),
+                markers=segments.markers.tolist(), in_space=_list(_over(first, (0,))),
+                in_space_after=[] if second is None else _list(_over(second, (0,))), mean=first.mean(axis=0).tolist(),
+                frequencies=_list(frequencies), spectrum=_list(spectrum),
+                spectrum_after=[] if second is None else _list(_spectrum(second, segments.period)[1]),
+                observed=(predicted + first[shown]).tolist(), before=predicted.tolist(),
+                after=[] if after is None else _joined(after.predicted, places)[shown].tolist(),
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _joined(values: Floats, places: NDArray[np.int64]) -> Floats:
+    """(frame, marker, 3) of one recording's segments, one after another."""
+    return np.concatenate([values[..., place] for place in places])
+
+
+def _over(errors: Floats, axes: tuple[int, ...]) -> Floats:
+    """Root mean square distance over frames (0) or markers (1) [m]."""
+    return np.sqrt((errors**2).sum(axis=2).mean(axis=axes))
+
+
+def _spectrum(errors: Floats, period: float) -> tuple[Floats, Floats]:
+    """Frequencies [Hz] and mean one-sided power density of the errors' coordinates, summed over axes [m²/Hz]."""
+    frequencies, density = welch(errors, fs=1 / period, axis=0, nperseg=min(50, len(errors)))
+    return frequencies[1:], density.sum(axis=2).mean(axis=1)[1:]
+
+
+def _list(values: Floats) -> list[float]:
+    return [float(v) for v in values]

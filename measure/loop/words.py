@@ -1,0 +1,98 @@
+"""The verdict in sentences: what was found, what was assumed, what would settle what is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from measure.loop.bank import columns
+from measure.loop.columns import THETA, FieldColumn
+from measure.loop.inference import Fit
+from measure.loop.verdict import Conclusion, Estimate, Verdict
+from measure.observe.trajectory import Experiment
+
+_SEPARATES: dict[frozenset[str], str] = {
+    frozenset({"tangential-linear-drag", "tangential-quadratic-drag"}): "a second wind speed, twice as fast: one drag "
+    "doubles, the other quadruples",
+    frozenset(
+        {"added-mass", "reactive-loading"}
+    ): "the cloth released in still air, where only its own motion loads it",
+    frozenset({"air-density", "porosity"}): "the air's temperature and pressure: they give its density",
+    frozenset({"air-density", "power-law-drag"}): "a second wind speed, twice as fast: a power law changes its scale",
+    frozenset({"lift", "power-law-drag"}): "a stiff plate of the same cloth at a few angles to the wind",
+    frozenset({"hem-mass", "hem-stiffness"}): "the hem weighed, or the cloth hanging in calm air",
+    frozenset({"shear", "vertical-wind"}): "the wind logged at the top and at the bottom of the flag",
+}
+
+
+def sentence(verdict: Verdict) -> str:
+    """The verdict in words."""
+    test = f"p = {verdict.test.p_value:.2g} against {len(verdict.test.null)} groups of nulls"
+    if verdict.conclusion is Conclusion.SUFFICIENT:
+        return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
+    rejected = f"The base model is rejected ({test})."
+    if verdict.conclusion is Conclusion.OUTSIDE:
+        return f"{rejected} No effect of the library explains what it lacks."
+    best = next(c for c in verdict.ranking if c.effect in verdict.named)
+    found = f"{best.effect}, {best.parameter} {_interval(best.strength)}"
+    if verdict.conclusion is Conclusion.ONE_OF:
+        return (
+            f"{rejected} One of {', '.join(verdict.named)} explains it; they predict unseen recordings equally well. "
+            f"The first of them would be {found}."
+        )
+    if verdict.conclusion is Conclusion.PARTLY:
+        return f"{rejected} It is partly explained by {found}; what is left is more than nulls leave."
+    return f"{rejected} It lacks {found}; with it, what is left is what nulls leave."
+
+
+def _interval(estimate: Estimate) -> str:
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{estimate.value:.3g} [{estimate.low:.3g}, {estimate.high:.3g}]{unit} {100 * estimate.level:.0f} %"
+
+
+def separating(verdict: Verdict) -> str:
+    """The cheapest experiment known that tells the named effects apart."""
+    if verdict.conclusion is not Conclusion.ONE_OF:
+        return ""
+    pairs = [text for effects, text in _SEPARATES.items() if effects <= set(verdict.named)]
+    if pairs:
+        return "; ".join(pairs)
+    return "a longer recording, at one more wind speed: the effects named differ in how they grow with the wind"
+
+
+def proposal(verdict: Verdict, field: Fit, smooth: Sequence[int]) -> str:
+    """What the corrective field looks like, where the library has no answer."""
+    if verdict.conclusion not in (Conclusion.OUTSIDE, Conclusion.PARTLY):
+        return ""
+    terms: list[tuple[float, str]] = []
+    weighed = columns()
+    for column in smooth:
+        mode = weighed[column - len(THETA)]
+        if isinstance(mode, FieldColumn):
+            value, error = field.of(column)
+            terms.append((abs(value / error), f"{_where(mode)} {value:+.2f} ± {error:.2f} m/s²"))
+    strongest = [text for _, text in sorted(terms, key=lambda term: -term[0])[:3]]
+    return "The smooth force field that fits best, per mass: " + "; ".join(strongest) + "."
+
+
+def _where(mode: FieldColumn) -> str:
+    axis = ("along the wind", "across the wind", "up")[mode.axis]
+    shapes = {
+        (0, 0): "all over", (1, 0): "hoist against fly", (0, 1): "bottom against top", (1, 1): "corner against corner",
+        (2, 0): "both ends against the middle",
+    }  # fmt: skip
+    return f"{axis}, {shapes[mode.mode]}"
+
+
+def assumptions(experiment: Experiment) -> tuple[str, ...]:
+    """What was taken as given."""
+    specimen = experiment.specimen
+    size = np.ptp(specimen.mesh.rest, axis=0)
+    return (
+        f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {specimen.material.name}, whose stretching is known",
+        f"it is held at {len(specimen.held)} points by springs of {specimen.stiffness:.3g} N/m",
+        "the wind at the flag is the logged one, the same all over it",
+        "density, bending and internal damping are free: what only changes them is no effect",
+        "the choice of the effect has seen all recordings; the errors before and after are of fits that had not",
+    )
