@@ -103,7 +103,7 @@ def test_settled_motion_has_the_references_statistics(
     for quantity, band in (("speed", 0.15), ("frequency", 0.20)):
         values = np.array([getattr(run, quantity) for run in runs])
         goal = getattr(expected, quantity)
-        # Without wind a flag swings to one side or the other, with 0.37 or 0.44 m/s at its edge: one run is one of them.
+        # Without wind a flag swings to one side or the other, at 0.37 or 0.44 m/s: one run is one of them.
         sampling = values.std(ddof=1) if wind == 0 else 0.0
         assert abs(values.mean() - goal) < band * goal + sampling
         # The reference's own value is one more draw from the same distribution.
