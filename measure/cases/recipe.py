@@ -48,6 +48,7 @@ class Case:
 
     Attributes:
         sheet: its length, mass and rigidity, no air.
+        source: where the data are from.
         density: of the air [kg/m³].
         true_rate: of the camera [Hz].
         column_scale, row_scale: [m/px] along the stream and across it.
@@ -64,6 +65,7 @@ class Case:
     about: str
     seed: int
     sheet: Sheet
+    source: str
     density: float
     true_rate: float
     column_scale: float
@@ -141,6 +143,7 @@ def parse_case(text: str, *, where: str) -> Case:
             mass=sheet.number("mass", nan, above=0),
             rigidity=sheet.number("rigidity", nan, above=0),
         ),
+        source=sheet.text("source", "") or "",
         density=air.number("density", nan, above=0),
         true_rate=camera.number("true-rate", nan, above=0),
         column_scale=camera.number("column-scale", nan, above=0),
@@ -165,7 +168,6 @@ def parse_case(text: str, *, where: str) -> Case:
             duration=simulation.number("duration", 1.0, above=0),
         ),
     )
-    sheet.text("source", None)
     for table in (sheet, air, camera, clips, thresholds, declared, simulation, top):
         table.done()
     return case
