@@ -181,12 +181,14 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
         raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
     shares, flag, run = top.table("composition"), top.table("flag"), top.table("recordings")
     log, markers, numerics = top.table("log"), top.table("markers"), top.table("numerics")
+    effects, outside, title = top.table("effects"), top.table("outside"), top.text("title", where) or where
+    top.done()
     materials = flag.texts("materials")
     for name in materials:
         if name not in material.names():
             raise UnknownNameError.of("material", name, material.names(), where=flag.where)
     recipe = ChallengeRecipe(
-        title=top.text("title", where) or where,
+        title=title,
         composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},
         width=flag.number("width", 1.5, above=0), height=flag.number("height", 1.0, above=0),
         materials=materials,
@@ -200,9 +202,9 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
         marker_columns=markers.whole("columns", 17, least=4), marker_rows=markers.whole("rows", 11, least=4),
         jitter=markers.number("jitter", 0.0, least=0),
         numerics={name: _numerics(numerics.table(name)) for name in numerics.names()},
-        effects=_strengths(top.table("effects"), EFFECTS), outside=_strengths(top.table("outside"), OUTSIDE),
+        effects=_strengths(effects, EFFECTS), outside=_strengths(outside, OUTSIDE),
     )  # fmt: skip
-    for table in (top, shares, flag, run, log, markers, numerics):
+    for table in (shares, flag, run, log, markers, numerics):
         table.done()
     return recipe
 
