@@ -50,8 +50,9 @@ def write_page(folder: Path, *, case: Case, seen: Observations, study: Study, ve
         "fit_lengths": _listed(1e3 * h for h in case.fit_lengths),
         "held_lengths": _listed(1e3 * h for h in case.held_out_lengths),
         "linear": [_model_row(o) for o in study.linear], "crossed": [_model_row(o) for o in study.crossed],
-        "in_time": [_model_row(o) for o in study.in_time], 
-        "floor": {kind.value: 100 * value for kind, value in study.floor.items()}, "ledger": ledger(study, verdict), "version": f"flagdata {code_version()}",
+        "in_time": [_model_row(o) for o in study.in_time],
+        "floor": {kind.value: 100 * value for kind, value in study.floor.items()}, "ledger": ledger(study, verdict),
+        "version": f"flagdata {code_version()}",
     }  # fmt: skip
     target = folder / "index.html"
     target.write_text(render("measure.cases", "page.html.j2", values), encoding="utf-8")

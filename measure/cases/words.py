@@ -23,17 +23,17 @@ def verdict_words(seen: Observations, study: Study, verdict: Verdict) -> list[st
     slow, fast = clips[0], clips[-1]
     found = (
         f"The sheet flutters at {slow.waves.frequency.value:.1f} Hz at {slow.spec.speed:g} m/s, up to "
-        f"{fast.waves.frequency.value:.1f} Hz at {fast.spec.speed:g} m/s. The base model, which has neither fluid inertia "
-        f"nor lift, never does: its tip ends up moving by {100 * still:.1f} % of the length at most."
+        f"{fast.waves.frequency.value:.1f} Hz at {fast.spec.speed:g} m/s. The base model, which has neither fluid "
+        f"inertia nor lift, never does: its tip ends up moving by {100 * still:.1f} % of the length at most."
     )
     closest = (
-        f"Closest on what was not fitted comes {best.candidate.value} ({best.load}) at {best.factor:.2f} of the tunnel's "
-        f"speed: {_kinds(best)}."
+        f"Closest on what was not fitted comes {best.candidate.value} ({best.load}) at {best.factor:.2f} of the "
+        f"tunnel's speed: {_kinds(best)}."
     )
     fitted, every = _names(verdict.remaining_fitted), _names(verdict.remaining)
     told = (
-        f"By frequencies and stop speeds alone, what remains within two standard errors of the best: {fitted}. With the "
-        f"speed of the wave along the sheet and the amplitude, to which nothing was fitted: {every}."
+        f"By frequencies and stop speeds alone, what remains within two standard errors of the best: {fitted}. With "
+        f"the speed of the wave along the sheet and the amplitude, to which nothing was fitted: {every}."
     )
     words = [found, closest, told]
     if verdict.insufficient:
