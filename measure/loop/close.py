@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,19 +22,20 @@ from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
 from measure.loop.alignment import aligned
-from measure.loop.attribution import EQUIVALENT, Judgement, estimate, judge
-from measure.loop.columns import THETA, Calibration, FieldColumn
-from measure.loop.comparison import Fold, Predictions, compare, fitted_effects, folds, predict
+from measure.loop.attribution import EQUIVALENT, Judgement, Weighed, estimate, judge
+from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
+from measure.loop.comparison import compare, folds, predict
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence
+from measure.loop.inference import Evidence, NullModel
+from measure.loop.model import Model
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank, Reference
+from measure.loop.refine import Refined, refine
 from measure.loop.residuals import residuals
 from measure.loop.statistics import statistics
-from measure.loop.verdict import Comparison, Conclusion, NullTest, Parameter, Verdict
+from measure.loop.verdict import Candidate, Comparison, NullTest, Parameter, Verdict
 from measure.loop.words import assumptions, proposal, sentence, separating
 from measure.observe.trajectory import Experiment, Trajectory
-from sim.effects import apply
 from sim.integrate.split import SplitEuler
 
 Floats = NDArray[np.float64]
@@ -126,8 +128,42 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     counts = [int((setting.recording == index).sum()) for index in range(len(setting.experiment.recordings))]
     reference = bank.reference(counts, seed=options.seed)
     judgement = judge(evidence, reference, level=options.level)
-    comparisons = _comparisons(setting, evidence, judgement, options, tell)
-    return _verdict(setting, bank, evidence, reference, judgement, comparisons, options, began)
+    solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
+    comparisons = _comparisons(solved, options, tell)
+    return _verdict(solved, bank, comparisons, options, began)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solved:
+    """A judged experiment, with the models fitted to it beyond the linear."""
+
+    setting: Setting
+    evidence: Evidence
+    null: NullModel
+    reference: Reference
+    judgement: Judgement
+
+    @cached_property
+    def base(self) -> Refined:
+        """The base model."""
+        return self._refined(())
+
+    @cached_property
+    def larger(self) -> Refined | None:
+        """With the first effect named; None where none is."""
+        named = self.judgement.named[:1]
+        return self._refined(named) if named else None
+
+    @cached_property
+    def control(self) -> tuple[Weighed, Refined] | None:
+        """The best effect that was not named, and the model with it."""
+        wrong = next((w for w in self.judgement.ranking if w.column not in self.judgement.named and w.admissible), None)
+        return None if wrong is None else (wrong, self._refined((wrong.column,)))
+
+    def _refined(self, chosen: Sequence[int]) -> Refined:
+        setting = self.setting
+        speeds = setting.speeds[setting.recording]
+        return refine(setting.forecaster, setting.segments, self.evidence, self.null, speeds, chosen)
 
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
@@ -156,79 +192,61 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
         return banks.load(Path(folder), words=words)
 
 
-def _comparisons(
-    setting: Setting, evidence: Evidence, judgement: Judgement, options: Options, tell: Stage
-) -> tuple[Comparison, ...]:
+def _comparisons(solved: Solved, options: Options, tell: Stage) -> tuple[Comparison, ...]:
     """Before and after on what was left out, where an effect is named."""
-    if not judgement.named or judgement.conclusion is Conclusion.OUTSIDE:
+    setting, larger = solved.setting, solved.larger
+    if larger is None:
         return ()
-    floor = _floor(setting, evidence, judgement.named[:1], options)
-    control = next((w for w in judgement.ranking if w.column not in judgement.named and w.admissible), None)
+    tell("models", 0, 1)
+    control = solved.control
+    floor = _floor(setting, larger.model, options)
     made: list[Comparison] = []
     left_out = folds(setting.segments, [float(u) for u in setting.speeds])
     for index, fold in enumerate(left_out):
         tell("before and after", index, len(left_out))
-        before = _left_out(setting, evidence, (), fold).squared
-        after = _left_out(setting, evidence, judgement.named[:1], fold).squared
-        wrong = None if control is None else _left_out(setting, evidence, (control.column,), fold).squared
-        frames = int(fold.outside.sum()) * (len(setting.segments.items[0].positions) - setting.segments.first)
-        own = np.isin(floor[0], np.unique(setting.recording[fold.outside]))
+        own = setting.segments.select(np.flatnonzero(fold.outside))
+        models = [solved.base.without(fold.outside), larger.without(fold.outside)]
+        models += [] if control is None else [control[1].without(fold.outside)]
+        squared = [predict(setting.forecaster, own, model).squared for model in models]
+        near = np.isin(floor[0], np.unique(setting.recording[fold.outside]))
         made.append(
             compare(
-                fold, frames=frames, before=before, after=after, control=wrong, floor=floor[1][own],
-                control_name="" if control is None else control.candidate.effect,
+                fold, frames=len(own) * (len(own.items[0].positions) - own.first), before=squared[0], after=squared[1],
+                control=None if control is None else squared[2], floor=floor[1][near],
+                control_name="" if control is None else control[0].candidate.effect,
             )
         )  # fmt: skip
     return tuple(made)
 
 
-def _left_out(setting: Setting, evidence: Evidence, chosen: Sequence[int], fold: Fold) -> Predictions:
-    return predict(setting.forecaster, setting.segments, evidence, setting.nominal, chosen, fold.outside)
-
-
-def _floor(
-    setting: Setting, evidence: Evidence, chosen: Sequence[int], options: Options
-) -> tuple[NDArray[np.int64], Floats]:
-    """Recording and mean squared error of segments simulated from the fitted model and predicted by it: what its
-    numerics alone leave."""
-    fit = evidence.fit(chosen)
-    effects = fitted_effects(fit, chosen)
-    calibration = setting.nominal.moved([float(v) for v in fit.value[: len(THETA)]])
+def _floor(setting: Setting, model: Model, options: Options) -> tuple[NDArray[np.int64], Floats]:
+    """Recording and mean squared error of segments simulated from a model and predicted by it: what numerics leave."""
     count = len(setting.experiment.recordings)
     first = setting.experiment.recordings[0]
     batch = NullBatch(
         specimen=setting.experiment.specimen, markers=first.markers, rate=first.rate, duration=_FLOOR_DURATION,
-        noise=first.noise, calibrations=(calibration,) * (count * _FLOOR_COPIES),
+        noise=first.noise, calibrations=(model.calibration,) * (count * _FLOOR_COPIES),
         speeds=tuple(float(u) for u in np.tile(setting.speeds, _FLOOR_COPIES)),
-        seed=child_seed(options.seed, "floor"), effects=effects,
+        seed=child_seed(options.seed, "floor"), effects=model.acting,
     )  # fmt: skip
     segments = Segments.of(batch.simulate())
-    system, state = apply(effects, *setting.forecaster.system(segments, [calibration] * len(segments)))
-    squared = (setting.forecaster.errors(system, state, segments) ** 2).sum(2).mean((0, 1)).double().numpy()
+    squared = predict(setting.forecaster, segments, model).squared
     return np.array([s.recording % count for s in segments.items]), squared
 
 
 def _verdict(
-    setting: Setting,
-    bank: NullBank,
-    evidence: Evidence,
-    reference: Reference,
-    judgement: Judgement,
-    comparisons: tuple[Comparison, ...],
-    options: Options,
-    began: float,
+    solved: Solved, bank: NullBank, comparisons: tuple[Comparison, ...], options: Options, began: float
 ) -> Verdict:
-    named = judgement.named
-    before = predict(setting.forecaster, setting.segments, evidence, setting.nominal, (), None)
-    after = predict(setting.forecaster, setting.segments, evidence, setting.nominal, named[:1], None) if named else None
+    setting, judgement = solved.setting, solved.judgement
+    before = predict(setting.forecaster, setting.segments, solved.base.model)
+    after = None if solved.larger is None else predict(setting.forecaster, setting.segments, solved.larger.model)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
-            statistic=judgement.statistic, null=[float(v) for v in reference.largest], p_value=judgement.p_value,
-            level=options.level, nulls=bank.words,
+            statistic=judgement.statistic, null=[float(v) for v in solved.reference.largest],
+            p_value=judgement.p_value, level=options.level, nulls=bank.words,
         ),
-        parameters=_parameters(evidence, named[:1], setting.nominal),
-        ranking=tuple(w.candidate for w in judgement.ranking), comparisons=comparisons,
+        parameters=_parameters(solved), ranking=_ranking(solved), comparisons=comparisons,
         residuals=residuals(setting.experiment, setting.segments, before, after),
         assumptions=assumptions(setting.experiment),
         provenance={
@@ -239,8 +257,22 @@ def _verdict(
     smooth = [i + len(THETA) for i, c in enumerate(banks.columns()) if isinstance(c, FieldColumn)]
     return replace(
         verdict, words=sentence(verdict), separating=separating(verdict),
-        proposal=proposal(verdict, evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
+        proposal=proposal(verdict, solved.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _ranking(solved: Solved) -> tuple[Candidate, ...]:
+    """The candidates; the first effect named with its strength beyond the linear."""
+    larger = solved.larger
+    made: list[Candidate] = []
+    for weighed in solved.judgement.ranking:
+        candidate = weighed.candidate
+        if larger is not None and weighed.column == solved.judgement.named[0]:
+            ((column, coefficient),) = larger.model.effects
+            error = larger.errors[-1] * float(np.sqrt(solved.reference.spread[weighed.column]))
+            candidate = replace(candidate, strength=estimate(column.described.null + coefficient, error, column.unit))
+        made.append(candidate)
+    return tuple(made)
 
 
 def _named(judgement: Judgement) -> tuple[str, ...]:
@@ -251,18 +283,31 @@ def _named(judgement: Judgement) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _parameters(evidence: Evidence, named: Sequence[int], nominal: Calibration) -> tuple[Parameter, ...]:
-    before, after = evidence.fit(()), evidence.fit(named)
+def _parameters(solved: Solved) -> tuple[Parameter, ...]:
     made: list[Parameter] = []
-    for place, (name, unit, _) in enumerate(THETA):
-        value, error = before.of(place)
-        moved, _ = after.of(place)
-        shown = f"{unit} from nominal"
-        made.append(
-            Parameter(
-                name=name, before=estimate(value, error, shown),
-                after=estimate(moved, after.of(place)[1], shown) if named else None,
-                shift=(moved - value) / error if named else None,
-            )
-        )  # fmt: skip
+    larger = solved.larger
+    for name, unit, value in _shown(solved.base.model.calibration):
+        place = [entry[0] for entry in THETA].index(name)
+        error = _scaled(solved.base.errors[place], name, value)
+        before = estimate(value, error, unit)
+        if larger is None:
+            made.append(Parameter(name=name, before=before, after=None, shift=None))
+            continue
+        moved = {n: v for n, _, v in _shown(larger.model.calibration)}[name]
+        after = estimate(moved, _scaled(larger.errors[place], name, moved), unit)
+        made.append(Parameter(name=name, before=before, after=after, shift=(moved - value) / error))
     return tuple(made)
+
+
+def _shown(calibration: Calibration) -> tuple[tuple[str, str, float], ...]:
+    """Name, unit and value of the calibrated parameters as a reader knows them."""
+    return (
+        ("density", "of nominal", calibration.density),
+        ("bending", "of nominal", calibration.bending),
+        ("damping", "s", calibration.damping),
+    )
+
+
+def _scaled(error: float, name: str, value: float) -> float:
+    """Standard error in the shown unit, of one in the units of `THETA`."""
+    return error * (DAMPING_UNIT if name == "damping" else value)

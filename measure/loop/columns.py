@@ -45,7 +45,7 @@ class Calibration:
         return Calibration(
             density=float(np.clip(self.density * math.exp(density), *_DENSITY)),
             bending=float(np.clip(self.bending * math.exp(bending), *_BENDING)),
-            damping=float(np.clip(self.damping + damping * _DAMPING_UNIT, *_DAMPING)),
+            damping=float(np.clip(self.damping + damping * DAMPING_UNIT, *_DAMPING)),
         )
 
     def steps_from(self, other: Calibration) -> tuple[float, float, float]:
@@ -53,17 +53,21 @@ class Calibration:
         return (
             math.log(self.density / other.density),
             math.log(self.bending / other.bending),
-            (self.damping - other.damping) / _DAMPING_UNIT,
+            (self.damping - other.damping) / DAMPING_UNIT,
         )
 
 
 _DENSITY = (0.4, 2.5)
 _BENDING = (0.05, 20.0)
 _DAMPING = (0.25e-3, 20e-3)  # s; with less, the motion of a flag does not converge in the mesh
-_DAMPING_UNIT = 5e-3  # s
+DAMPING_UNIT = 5e-3  # s
 
 THETA: tuple[tuple[str, str, float], ...] = (("density", "ln", 0.1), ("bending", "ln", 0.7), ("damping", "5 ms", 0.5))
 """Name, unit and step of the calibrated parameters: natural logarithms of factors, and damping in units of 5 ms."""
+
+PRIOR = np.array([0.3, 1.0, 1.0])
+"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
+30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011), damping within 5 ms."""
 
 
 class Column(ABC):

@@ -11,12 +11,9 @@ import torch
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from measure.loop.bank import columns
-from measure.loop.columns import THETA, Calibration, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, Fit
+from measure.loop.model import Model
 from measure.loop.verdict import Comparison, Estimate
-from sim.effects import EFFECTS, Effect, apply
 
 Floats = NDArray[np.float64]
 _LEVEL = 0.9
@@ -64,38 +61,11 @@ def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
 def predict(
     forecaster: Forecaster,
     segments: Segments,
-    evidence: Evidence,
-    nominal: Calibration,
-    chosen: Sequence[int],
-    fold: NDArray[np.bool_] | None,
+    model: Model,
 ) -> Predictions:
-    """Predictions of the segments left out, by the model with chosen columns, fitted to the others.
-
-    Args:
-        chosen: columns of effects, beside the calibrated parameters.
-        fold: (segment,) which are left out; None for a fit to all that predicts all.
-    """
-    inside = evidence if fold is None else evidence.select(~fold)
-    places = np.arange(len(segments)) if fold is None else np.flatnonzero(fold)
-    fit = inside.fit(chosen)
-    calibration = nominal.moved([float(v) for v in fit.value[: len(THETA)]])
-    own = segments.select(places)
-    system, state = forecaster.system(own, [calibration] * len(own))
-    errors, predicted = forecaster.run(*apply(fitted_effects(fit, chosen), system, state), own)
+    """Predictions of segments by a model."""
+    errors, predicted = forecaster.run(*model.system(forecaster, segments), segments)
     return Predictions(errors=_array(errors), predicted=_array(predicted))
-
-
-def fitted_effects(fit: Fit, chosen: Sequence[int]) -> tuple[Effect, ...]:
-    """The effects of chosen columns, at the strengths of a fit."""
-    weighed = [(column, columns()[column - len(THETA)]) for column in chosen]
-    return tuple(strengthened(c, fit.of(column)[0]) for column, c in weighed if isinstance(c, EffectColumn))
-
-
-def strengthened(column: EffectColumn, coefficient: float) -> Effect:
-    """The effect at a coefficient beyond its null value, kept to what is admissible."""
-    described = column.described
-    value = float(np.clip(described.null + coefficient, *described.admissible))
-    return EFFECTS[column.effect](**{column.parameter: value})
 
 
 def _array(values: torch.Tensor) -> Floats:

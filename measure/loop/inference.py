@@ -13,16 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.loop.columns import THETA
+from measure.loop.columns import PRIOR, THETA
 from measure.loop.statistics import Statistics
 
 Floats = NDArray[np.float64]
 Chosen = Sequence[int]
 
 _SHIFTS = 3
-_PRIOR = np.array([0.3, 1.0, 1.0])
-"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
-30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011), damping within 5 ms."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,7 +173,7 @@ class Evidence:
     def _total(self) -> tuple[Floats, Floats, float]:
         """Sums over the segments, with the priors of the nuisance columns."""
         curvature = self.curvature.sum(axis=0)
-        prior = np.concatenate([_PRIOR**-2, np.ones(self.score.shape[1] - self.columns)])
+        prior = np.concatenate([PRIOR**-2, np.ones(self.score.shape[1] - self.columns)])
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 

@@ -94,7 +94,7 @@ def statistics(
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.calibration_sensitivities(own, starts, base)
         changes += [forecaster.sensitivity(column, own, starts, base) for column in columns]
-        parts.append(_reduced(base, changes, recording[chosen], noise))
+        parts.append(reduced(base, changes, recording[chosen], noise))
     return Statistics.joined(parts)
 
 
@@ -108,7 +108,8 @@ def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def _reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64], noise: Floats) -> Statistics:
+def reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64], noise: Floats) -> Statistics:
+    """Of segments with their errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m]."""
     mean = (base**2).mean((0, 2))  # (marker, segment)
     r = np.empty((len(recording), len(changes)))
     response = np.empty((len(recording), len(changes), len(changes)))

@@ -1,0 +1,129 @@
+"""Models fitted beyond the linear: linearised again where the last fit led, until they stay (Gauss–Newton)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.loop.bank import columns
+from measure.loop.columns import PRIOR, THETA, Calibration, EffectColumn
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Evidence, NullModel
+from measure.loop.model import Model
+from measure.loop.statistics import Statistics, reduced
+
+Floats = NDArray[np.float64]
+
+_ROUNDS = 3
+_STAYS = 0.3
+"""Standard errors below which a step is not worth another round."""
+_LONGEST = 1.5
+"""A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refined:
+    """A model where Gauss–Newton led, linearised there.
+
+    Attributes:
+        model: fitted to all segments.
+        errors: standard errors of its calibrated parameters and strengths, as Σ has them.
+        statistics: at the model before the last step, `origin`, of all segments.
+        origin: that model.
+        null: the null model of its columns.
+        speeds: (segment,) of the wind [m/s].
+        stays: whether another round would hardly move it.
+    """
+
+    model: Model
+    errors: tuple[float, ...]
+    statistics: Statistics
+    origin: Model
+    null: NullModel
+    speeds: Floats
+    stays: bool
+
+    def without(self, outside: NDArray[np.bool_]) -> Model:
+        """The same model fitted to the other segments alone, one step from `origin`."""
+        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin)
+        return self.origin.moved(_cut(step))
+
+
+def refine(
+    forecaster: Forecaster,
+    segments: Segments,
+    evidence: Evidence,
+    null: NullModel,
+    speeds: Floats,
+    chosen: Sequence[int],
+) -> Refined:
+    """Fit the calibrated parameters and chosen columns to segments, from the linear fit on.
+
+    Every round uses the errors along the fitted columns alone, with their part of the null model.
+
+    Args:
+        speeds: (segment,) of the wind [m/s].
+    """
+    fit = evidence.fit(chosen)
+    own = [columns()[c - len(THETA)] for c in chosen]
+    effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
+    values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
+    model = Model(calibration=Calibration(), effects=effects).moved(_cut(np.array(values, dtype=np.float64)))
+    part = _part(null, [*range(len(THETA)), *chosen])
+    reached = _round(forecaster, segments, model, part, speeds)
+    for _ in range(_ROUNDS - 1):
+        if reached.stays:
+            break
+        reached = _round(forecaster, segments, reached.model, part, speeds)
+    return reached
+
+
+def _round(forecaster: Forecaster, segments: Segments, origin: Model, null: NullModel, speeds: Floats) -> Refined:
+    found = _linearised(forecaster, segments, origin)
+    step, errors = _step(found, null, speeds, origin)
+    return Refined(
+        model=origin.moved(_cut(step)), errors=tuple(float(e) for e in errors), statistics=found, origin=origin,
+        null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < _STAYS),
+    )  # fmt: skip
+
+
+def _cut(step: Floats) -> tuple[float, ...]:
+    longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
+    return tuple(float(v) for v in np.clip(step, -longest, longest))
+
+
+def _part(null: NullModel, places: list[int]) -> NullModel:
+    return NullModel(
+        coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
+        shifts=null.shifts[:, places],
+    )  # fmt: skip
+
+
+def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
+    base = forecaster.errors(*model.system(forecaster, segments), segments)
+    sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
+    changes = []
+    for place, size in enumerate(sizes):
+        moved = model.moved(tuple(size if k == place else 0.0 for k in range(len(sizes))))
+        changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / size)
+    noise = np.array([s.noise for s in segments.items])
+    return reduced(base, changes, np.array([s.recording for s in segments.items]), noise)
+
+
+def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
+    """Of generalised least squares from here, under the prior about the nominal calibration; with standard errors."""
+    count = found.r.shape[1]
+    shifts = np.broadcast_to(null.shifts.T, (len(found.r), *null.shifts.T.shape))
+    response = np.concatenate([found.response, shifts], axis=2)
+    precision = np.linalg.inv(null.covariance)
+    weighted = np.einsum("sia,ij->saj", response, precision)
+    curvature = np.einsum("saj,sjb->ab", weighted, response)
+    score = np.einsum("saj,sj->a", weighted, found.r - null.mean(speeds))
+    nuisances = len(null.shifts)
+    prior = np.concatenate([PRIOR**-2, np.zeros(count - len(PRIOR)), np.ones(nuisances)])
+    score[: len(PRIOR)] -= PRIOR**-2 * np.array(model.calibration.steps_from(Calibration()))
+    covariance = np.linalg.inv(curvature + np.diag(prior))
+    return (covariance @ score)[:count], np.sqrt(np.diag(covariance))[:count]
