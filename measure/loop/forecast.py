@@ -12,6 +12,7 @@ that its state has forgotten how it was started.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -36,6 +37,7 @@ Floats = NDArray[np.float64]
 HORIZON = 0.04
 """About this long a prediction is [s]: 25 frames a second, the paper's rate."""
 _SEGMENT = 2.0  # s
+_SHORTEST = 1.0  # s: a segment of a recording too short for one of the usual length
 _WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
 
 
@@ -78,6 +80,8 @@ class Segments:
     def of(cls, recordings: Sequence[Trajectory]) -> Segments:
         """Cut recordings; frames beyond a horizon of about 40 ms are used every so many, a remainder is left out.
 
+        Segments last 2 s, or as long as the shortest recording allows.
+
         Raises:
             InputError: recordings of different markers or rates, untracked points, or shorter than a segment.
         """
@@ -85,7 +89,8 @@ class Segments:
         stride = max(1, round(first.rate * HORIZON))
         period = stride / first.rate
         warm = round(_WARM_UP / period)
-        length = round(_SEGMENT / period)
+        shortest = min(math.ceil(len(r.positions) / stride) for r in recordings) - warm - 2
+        length = min(round(_SEGMENT / period), shortest)
         items: list[Segment] = []
         for index, recording in enumerate(recordings):
             if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
@@ -99,12 +104,13 @@ class Segments:
                     fix="fill short gaps (measure.observe.fill), or drop the marker",
                 )  # fmt: skip
             frames = recording.positions[::stride]
-            count = (len(frames) - warm - 2) // length
-            if count < 1:
+            if length * period < _SHORTEST:
+                needed = _SHORTEST + (warm + 2) * period
                 raise InputError(
-                    f"{len(frames) * period:.2f} s is shorter than one segment of {_SEGMENT + _WARM_UP + 0.08:.2f} s",
+                    f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
                     where=f"recording {recording.name!r}", fix="record for 10 s or more",
                 )  # fmt: skip
+            count = (len(frames) - warm - 2) // length
             for place in range(count):
                 begin = place * length
                 items.append(
