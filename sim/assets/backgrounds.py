@@ -43,6 +43,8 @@ def _weather(rng: np.random.Generator) -> Picture:
     above, below = _SKIES[kind]
     zenith, horizon = hue(rng, *above), hue(rng, *below)
     sky = over(np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6))
+    haze = fractal(rng, _ROWS, _COLUMNS, slope=2.0, stretch=4.0)[:, :, None]
+    sky = sky * (1 + rng.uniform(0.005, 0.04) * haze)
     if kind == "clear":
         return sky
     stretch = rng.uniform(1.2, 3.0)
