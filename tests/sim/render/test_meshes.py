@@ -21,8 +21,8 @@ def stored(frames: int = 3) -> MeshSequence:
     flat = np.stack([np.zeros(9), 5 + uv[:, 0] * 3, 1 + uv[:, 1] * 2], axis=1)
     rising = flat + np.arange(frames)[:, None, None] * [0.0, 0.0, 0.1]
     return MeshSequence(
-        time=np.arange(frames, dtype=np.int64) * STEP, positions=rising.astype(np.float32), faces=faces.astype(np.int32),
-        rest=rest.astype(np.float32),
+        time=np.arange(frames, dtype=np.int64) * STEP, positions=rising.astype(np.float32),
+        faces=faces.astype(np.int32), rest=rest.astype(np.float32),
     )  # fmt: skip
 
 
