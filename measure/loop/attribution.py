@@ -26,6 +26,8 @@ LEVEL = 0.9
 _FIRST = len(THETA)
 _FAR = 2.0
 """Standard errors of the paired difference by which the named effect must lead."""
+_APART = 3.0
+"""A rival whose squared z is lower by more than the square of this fits worse, whatever its held-out gain's error."""
 _MOST = 0.5
 """Share of the corrective field's gain below which the library has no answer."""
 
@@ -40,12 +42,14 @@ class Weighed:
     Attributes:
         column: place among the evidence's columns.
         candidate: as reported.
+        error: standard error of the strength.
         gains: (segment,) held-out gain.
         admissible: whether the fitted strength makes physical sense.
     """
 
     column: int
     candidate: Candidate
+    error: float
     gains: Floats
     admissible: bool
 
@@ -74,12 +78,13 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
     """Weigh the library against the evidence of all recordings, at a level of the global test."""
     drops = evidence.drops()
     base = evidence.fit(())
-    statistic, p_value = reference.p_global(drops, base.left)
+    statistics = reference.statistics(drops, base.left)
+    statistic, p_value = float(statistics.max()), reference.p_global(statistics, base.left)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     smooth = [i + _FIRST for i, c in enumerate(columns()) if isinstance(c, FieldColumn)]
     held_out = gains(evidence, [*([i] for i, _ in effects), smooth])
     weighed = [
-        _weigh(evidence, reference, column, effect, own, drops)
+        _weigh(evidence, reference, column, effect, own, statistics)
         for (column, effect), own in zip(effects, held_out, strict=False)
     ]
     ranking = _ranked(weighed)
@@ -89,7 +94,7 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
     best = next((w for w in ranking if w.admissible), ranking[0])
     ahead = best.gains.sum() / max(held_out[-1].sum(), 1e-9)
     enough = best.candidate.leftover > level
-    near = [w for w in ranking if w is not best and w.admissible and _behind(best, w) < _FAR and w.gains.sum() > 0]
+    near = [w for w in ranking if w is not best and w.admissible and _rivals(best, w)]
     reasons = {w.column: _reason(best, w) for w in ranking if w is not best}
     if not best.admissible or best.gains.sum() <= 0 or (not enough and held_out[-1].sum() > 0 and ahead < _MOST):
         reasons[best.column] = "what it leaves is more than half of what a smooth force field explains"
@@ -118,12 +123,13 @@ def _judgement(
 
 
 def _weigh(
-    evidence: Evidence, reference: Reference, column: int, effect: EffectColumn, gained: Floats, drops: Floats
+    evidence: Evidence, reference: Reference, column: int, effect: EffectColumn, gained: Floats, statistics: Floats
 ) -> Weighed:
     fit = evidence.fit([column])
     value, _ = fit.of(column)
-    # Σ is learnt from nulls, so the standard error is, too: it is that which makes the nulls' mean drop 1.
-    error = abs(value) / math.sqrt(max(drops[column] / reference.spread[column], 1e-12))
+    # The standard error is that which makes the nulls' mean squared z 1.
+    statistic = float(statistics[column])
+    error = abs(value) / math.sqrt(max(statistic, 1e-12))
     least, most = effect.described.admissible
     null = effect.described.null
     admissible = least <= null + value <= most
@@ -131,13 +137,14 @@ def _weigh(
     for index in np.unique(evidence.recording):
         own = evidence.select(evidence.recording == index).fit([column])
         single, claimed = own.of(column)
-        by_recording.append(estimate(single, claimed * math.sqrt(reference.spread[column]), effect.unit))
+        by_recording.append(estimate(single, claimed * error / fit.of(column)[1], effect.unit))
     return Weighed(
-        column=column, gains=gained, admissible=admissible,
+        column=column, error=error, gains=gained, admissible=admissible,
         candidate=Candidate(
-            effect=effect.effect, parameter=effect.parameter, strength=estimate(null + value, error, effect.unit),
-            z=value / error if error > 0 else 0.0, p_value=reference.p_alone(drops[column], column),
-            p_family=reference.p_family(drops[column], column), gain=float(gained.sum()),
+            effect=effect.effect, parameter=effect.parameter, null=null,
+            strength=estimate(null + value, error, effect.unit),
+            z=value / error if error > 0 else 0.0, p_value=reference.p_alone(statistic, column),
+            p_family=reference.p_family(statistic), gain=float(gained.sum()),
             gain_error=_total_error(gained), behind=0.0, leftover=reference.p_left(fit.left),
             by_recording=tuple(by_recording),
         ),
@@ -154,6 +161,13 @@ def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
     ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
     best = ordered[0]
     return [replace(w, candidate=replace(w.candidate, behind=_behind(best, w))) for w in ordered]
+
+
+def _rivals(best: Weighed, other: Weighed) -> bool:
+    """Whether another effect cannot be told from the best: neither by held-out gains nor by how well it fits at all."""
+    return (
+        other.gains.sum() > 0 and _behind(best, other) < _FAR and other.candidate.z**2 > best.candidate.z**2 - _APART**2
+    )
 
 
 def _behind(best: Weighed, other: Weighed) -> float:

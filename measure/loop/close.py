@@ -269,7 +269,8 @@ def _ranking(solved: Solved) -> tuple[Candidate, ...]:
         candidate = weighed.candidate
         if larger is not None and weighed.column == solved.judgement.named[0]:
             ((column, coefficient),) = larger.model.effects
-            error = larger.errors[-1] * float(np.sqrt(solved.reference.spread[weighed.column]))
+            linear = solved.evidence.fit([weighed.column]).of(weighed.column)[1]
+            error = larger.errors[-1] * weighed.error / linear
             candidate = replace(candidate, strength=estimate(column.described.null + coefficient, error, column.unit))
         made.append(candidate)
     return tuple(made)

@@ -19,7 +19,8 @@ from measure.loop.statistics import Statistics
 Floats = NDArray[np.float64]
 Chosen = Sequence[int]
 
-_SHIFTS = 3
+_SHIFTS = 8
+"""Of 28 kinds of numerics, the mean squared distance of nulls fell by half from none to 3, by another quarter to 10."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,8 @@ class NullBank:
     def reference(self, segments: Sequence[int], *, seed: int) -> Reference:
         """Statistics of groups like the data: so many recordings, of so many segments each, of one kind of numerics."""
         rng = stream(seed, "null", "groups")
-        drops, left = [], []
+        drops: list[Floats] = []
+        left: list[float] = []
         kinds = np.unique(self.nulls.numerics)
         for fold in range(2):
             inside = np.isin(self.nulls.numerics, kinds[fold::2])
@@ -72,43 +74,59 @@ class NullBank:
                 picked = evidence.select(np.concatenate(chosen))
                 drops.append(picked.drops())
                 left.append(picked.fit(()).left)
-        spread = np.maximum(np.mean(drops, axis=0), 1e-9)
-        largest = [float((own / spread).max()) for own in drops]
-        return Reference(drops=np.array(drops), spread=spread, largest=np.array(largest), left=np.array(left))
+        shares = np.array([_share(own, rest) for own, rest in zip(drops, left, strict=True)])
+        return Reference(shares=shares, spread=np.maximum(shares.mean(axis=0), _NOTHING), left=np.array(left))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
     """Null distributions.
 
+    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the nulls' mean
+    share: 1 in the mean if nothing is missing. Sets whose errors are larger all over are so no larger here.
+
     Attributes:
-        drops: (group, column) see `Evidence.drops`.
-        spread: (column,) their mean: 1 if Σ were known and errors normal.
-        largest: (group,) largest of drops/spread.
+        shares: (group, column).
+        spread: (column,) their mean.
         left: (group,) squared distance the base model leaves.
     """
 
-    drops: Floats
+    shares: Floats
     spread: Floats
-    largest: Floats
     left: Floats
 
-    def p_family(self, drop: float, column: int) -> float:
-        """Share of the groups whose largest scaled drop is at least this one's."""
-        return _p(self.largest, drop / self.spread[column])
+    @cached_property
+    def largest(self) -> Floats:
+        """(group,) the largest statistic of all columns."""
+        return (self.shares / self.spread).max(axis=1)
 
-    def p_alone(self, drop: float, column: int) -> float:
+    def statistics(self, drops: Floats, left: float) -> Floats:
+        """(column,) of data."""
+        return _share(drops, left) / self.spread
+
+    def p_family(self, statistic: float) -> float:
+        """Share of the groups whose largest statistic is at least this one."""
+        return _p(self.largest, statistic)
+
+    def p_alone(self, statistic: float, column: int) -> float:
         """The same for the column alone."""
-        return _p(self.drops[:, column], drop)
+        return _p(self.shares[:, column] / self.spread[column], statistic)
 
     def p_left(self, left: float) -> float:
         """Share of the groups in which the base model leaves at least this."""
         return _p(self.left, left)
 
-    def p_global(self, drops: Floats, left: float) -> tuple[float, float]:
-        """Statistic and p-value of the global test: the stronger of largest scaled drop and what is left, doubled."""
-        largest = float((drops / self.spread).max())
-        return largest, min(1.0, 2 * min(_p(self.largest, largest), self.p_left(left)))
+    def p_global(self, statistics: Floats, left: float) -> float:
+        """Of the global test, Bonferroni's of two: the largest statistic (4/5 of the level), what is left (1/5)."""
+        return min(1.0, self.p_family(float(statistics.max())) / 0.8, self.p_left(left) / 0.2)
+
+
+_NOTHING = 1e-6
+"""Mean share below which a column is never seen: that of the columns that are always fitted."""
+
+
+def _share(drops: Floats, left: float) -> Floats:
+    return drops / np.maximum(left - drops, 1e-9)
 
 
 def _p(null: Floats, value: float) -> float:
