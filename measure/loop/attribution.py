@@ -14,15 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from measure.loop.bank import columns
+from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn, FieldColumn
-from measure.loop.inference import Evidence, gains
-from measure.loop.reference import Reference
+from measure.loop.inference import Evidence, fluctuation, fluctuation_gains, gains
+from measure.loop.reference import GUSTS, Reference
 from measure.loop.verdict import Candidate, Conclusion, Estimate
+from sim.effects import EFFECTS
 
 Floats = NDArray[np.float64]
 
 LEVEL = 0.9
+GUST_COLUMN = -1
+"""Stands for gusts, which are no column: only their size can be found, not their course."""
 _FIRST = len(THETA)
 _FAR = 2.0
 """Standard errors of the paired difference by which the named effect must lead."""
@@ -76,10 +79,8 @@ class Judgement:
 
 def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgement:
     """Weigh the library against the evidence of all recordings, at a level of the global test."""
-    drops = evidence.drops()
-    base = evidence.fit(())
-    statistics = reference.statistics(drops, base.left)
-    statistic, p_value = float(statistics.max()), reference.p_global(statistics, base.left)
+    statistics = reference.statistics(evidence, names())
+    statistic, p_value = float(statistics.max()), reference.p_global(statistics, evidence.fit(()).left)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     smooth = [i + _FIRST for i, c in enumerate(columns()) if isinstance(c, FieldColumn)]
     held_out = gains(evidence, [*([i] for i, _ in effects), smooth])
@@ -87,7 +88,7 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
         _weigh(evidence, reference, column, effect, own, statistics)
         for (column, effect), own in zip(effects, held_out, strict=False)
     ]
-    ranking = _ranked(weighed)
+    ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[-1]))])
     if p_value > level:
         reasons = {w.column: "the base model is not rejected" for w in ranking}
         return _judgement(Conclusion.SUFFICIENT, (), ranking, reasons, statistic, p_value, held_out[-1])
@@ -147,6 +148,27 @@ def _weigh(
             p_family=reference.p_family(statistic), gain=float(gained.sum()),
             gain_error=_total_error(gained), behind=0.0, leftover=reference.p_left(fit.left),
             by_recording=tuple(by_recording),
+        ),
+    )  # fmt: skip
+
+
+def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
+    """Gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by twice their intensity."""
+    place = names().index(GUSTS)
+    found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
+    described = EFFECTS["gusts"].parameters()["intensity"]
+    by_recording = []
+    for index in np.unique(evidence.recording):
+        own = fluctuation(evidence.select(evidence.recording == index), place)
+        by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
+    return Weighed(
+        column=GUST_COLUMN, gains=gained, admissible=True, error=found.error / 2,
+        candidate=Candidate(
+            effect="gusts", parameter="intensity", null=described.null,
+            strength=estimate(found.deviation / 2, found.error / 2, described.unit), z=math.sqrt(statistic),
+            p_value=reference.p_alone(statistic, len(names())), p_family=reference.p_family(statistic),
+            gain=float(gained.sum()), gain_error=_total_error(gained), behind=0.0,
+            leftover=reference.p_left(evidence.fit(()).left - 2 * found.likelihood), by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
 

@@ -22,7 +22,7 @@ from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
 from measure.loop.alignment import aligned
-from measure.loop.attribution import EQUIVALENT, Judgement, Weighed, estimate, judge
+from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
 from measure.loop.comparison import compare, folds, predict
 from measure.loop.forecast import Forecaster, Segments
@@ -63,7 +63,7 @@ class Options:
     """
 
     seed: int = 0
-    level: float = 0.02
+    level: float = 0.03
     nulls: int = 192
     bank: Path | None = None
     workers: int = 1
@@ -150,14 +150,15 @@ class Solved:
 
     @cached_property
     def larger(self) -> Refined | None:
-        """With the first effect named; None where none is."""
+        """With the first effect named; None where none is, or where its course is unknown (gusts)."""
         named = self.judgement.named[:1]
-        return self._refined(named) if named else None
+        return self._refined(named) if named and named[0] != GUST_COLUMN else None
 
     @cached_property
     def control(self) -> tuple[Weighed, Refined] | None:
         """The best effect that was not named, and the model with it."""
-        wrong = next((w for w in self.judgement.ranking if w.column not in self.judgement.named and w.admissible), None)
+        taken = (*self.judgement.named, GUST_COLUMN)
+        wrong = next((w for w in self.judgement.ranking if w.column not in taken and w.admissible), None)
         return None if wrong is None else (wrong, self._refined((wrong.column,)))
 
     def _refined(self, chosen: Sequence[int]) -> Refined:

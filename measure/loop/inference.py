@@ -237,3 +237,65 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
             fit = inside.fit(chosen)
             result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
     return result
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fluctuation:
+    """A coefficient that differs from segment to segment, normally distributed about that of the fit.
+
+    Attributes:
+        deviation: its standard deviation, in units of its column.
+        error: of the deviation, from the curvature of the likelihood.
+        likelihood: log likelihood ratio against a coefficient that does not differ.
+    """
+
+    deviation: float
+    error: float
+    likelihood: float
+
+
+def fluctuation(evidence: Evidence, column: int) -> Fluctuation:
+    """How much a column's coefficient fluctuates, beside the nuisances; errors are taken as large as this set's are."""
+    score, curvature = _beside(evidence, column, scaled=True)
+    grid = np.concatenate([[0.0], np.geomspace(1e-3, 10.0, 200)]) ** 2
+    likelihood = _fluctuating(grid[:, None], score, curvature).sum(axis=1)
+    best = int(np.argmax(likelihood))
+    deviation = float(np.sqrt(grid[best]))
+    # Of τ where information is a normal variance's: Σ h²/(1 + τ² h)²/2 for τ², 4 τ² times that for τ.
+    information = 2 * grid[best] * float((curvature**2 / (1 + grid[best] * curvature) ** 2).sum())
+    error = information**-0.5 if information > 0 else float(np.sqrt(1 / np.sqrt((curvature**2).sum())))
+    return Fluctuation(deviation=deviation, error=error, likelihood=float(likelihood[best]))
+
+
+def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
+    """(segment,) log likelihood of each left-out recording's segments under the others' fluctuation, over none."""
+    folds = evidence.recording
+    if len(np.unique(folds)) < 2:
+        folds = (np.arange(len(folds)) >= len(folds) / 2).astype(np.int64)
+    result = np.zeros(len(folds))
+    for index in np.unique(folds):
+        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
+        fit = inside.fit(())
+        active = list(fit.active)
+        score = outside.score[:, column] - outside.curvature[:, column][:, active] @ fit.value
+        deviation = fluctuation(inside, column).deviation
+        result[folds == index] = _fluctuating(
+            np.full(len(score), deviation**2), score, outside.curvature[:, column, column]
+        )
+    return result
+
+
+def _beside(evidence: Evidence, column: int, *, scaled: bool) -> tuple[Floats, Floats]:
+    """(segment,) score and curvature of a column beside the fitted nuisances."""
+    fit = evidence.fit(())
+    active = list(fit.active)
+    score = evidence.score[:, column] - evidence.curvature[:, column][:, active] @ fit.value
+    curvature = evidence.curvature[:, column, column]
+    size = fit.left / (len(score) * evidence.columns) if scaled else 1.0
+    return score / size, curvature / size
+
+
+def _fluctuating(variance: Floats, score: Floats, curvature: Floats) -> Floats:
+    """log N(r; 0, Σ + τ² R Rᵀ) − log N(r; 0, Σ), by the matrix determinant lemma."""
+    grown = 1 + variance * curvature
+    return -np.log(grown) / 2 + variance * score**2 / grown / 2

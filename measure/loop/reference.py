@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.loop.inference import Evidence, NullModel, Nulls
+from measure.loop.inference import Evidence, NullModel, Nulls, fluctuation
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
 _LEAST = 24
 _KINDS = 4
+GUSTS = "air-density.change"
+"""The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
 """Null recordings below which no test at 2 % can be held."""
 
 
@@ -52,7 +54,7 @@ class NullBank:
     def reference(self, segments: Sequence[int], *, seed: int) -> Reference:
         """Statistics of groups like the data: so many recordings, of so many segments each, of one kind of numerics."""
         rng = stream(seed, "null", "groups")
-        drops: list[Floats] = []
+        shares: list[Floats] = []
         left: list[float] = []
         kinds = np.unique(self.nulls.numerics)
         for fold in range(2):
@@ -72,10 +74,10 @@ class NullBank:
                 group = rng.choice(len(own), size=len(segments), replace=len(segments) > len(own))
                 chosen = [rng.permutation(np.resize(own[g], n)) for g, n in zip(group, segments, strict=True)]
                 picked = evidence.select(np.concatenate(chosen))
-                drops.append(picked.drops())
+                shares.append(unscaled(picked, self.columns))
                 left.append(picked.fit(()).left)
-        shares = np.array([_share(own, rest) for own, rest in zip(drops, left, strict=True)])
-        return Reference(shares=shares, spread=np.maximum(shares.mean(axis=0), _NOTHING), left=np.array(left))
+        spread = np.maximum(np.mean(shares, axis=0), _NOTHING)
+        return Reference(shares=np.array(shares), spread=spread, left=np.array(left))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,10 +85,11 @@ class Reference:
     """Null distributions.
 
     A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the nulls' mean
-    share: 1 in the mean if nothing is missing. Sets whose errors are larger all over are so no larger here.
+    share: 1 in the mean if nothing is missing. Sets whose errors are larger all over are so no larger here. One more
+    statistic stands for gusts: the likelihood ratio of a wind pressure that fluctuates.
 
     Attributes:
-        shares: (group, column).
+        shares: (group, column), gusts the last.
         spread: (column,) their mean.
         left: (group,) squared distance the base model leaves.
     """
@@ -100,9 +103,9 @@ class Reference:
         """(group,) the largest statistic of all columns."""
         return (self.shares / self.spread).max(axis=1)
 
-    def statistics(self, drops: Floats, left: float) -> Floats:
-        """(column,) of data."""
-        return _share(drops, left) / self.spread
+    def statistics(self, evidence: Evidence, columns: tuple[str, ...]) -> Floats:
+        """(column,) of data, gusts the last."""
+        return unscaled(evidence, columns) / self.spread
 
     def p_family(self, statistic: float) -> float:
         """Share of the groups whose largest statistic is at least this one."""
@@ -125,8 +128,11 @@ _NOTHING = 1e-6
 """Mean share below which a column is never seen: that of the columns that are always fitted."""
 
 
-def _share(drops: Floats, left: float) -> Floats:
-    return drops / np.maximum(left - drops, 1e-9)
+def unscaled(evidence: Evidence, columns: tuple[str, ...]) -> Floats:
+    """Of some segments: each column's drop over what is left with it, and the likelihood ratio of gusts."""
+    drops, left = evidence.drops(), evidence.fit(()).left
+    gusts = fluctuation(evidence, columns.index(GUSTS)).likelihood
+    return np.append(drops / np.maximum(left - drops, 1e-9), max(gusts, 0.0))
 
 
 def _p(null: Floats, value: float) -> float:
