@@ -80,7 +80,7 @@ def make(
 
 
 def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key, flight: Flight) -> dict[str, str]:
-    markers = layout(recipe, stream(seed, key.name, "markers"))
+    markers = layout(recipe, stream(seed, "markers"))
     weights = seen(recipe.numerics[key.numerics], markers, width=recipe.width, height=recipe.height)
     place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), 2.0)
     names = _NAMES[: recipe.count]

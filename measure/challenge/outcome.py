@@ -101,10 +101,11 @@ class Outcome:
 
     @property
     def claims(self) -> tuple[bool, ...]:
-        """Of each claim that an effect acts, whether one of its class does. "One of" is a single claim."""
+        """Of each claim that an effect of some class acts, whether one does. "One of" is a single claim."""
+        named = dict.fromkeys(class_of(name) for name in self.named)
         if self.conclusion is Conclusion.ONE_OF:
-            return (any(class_of(name) in self.true_classes for name in self.named),) if self.named else ()
-        return tuple(class_of(name) in self.true_classes for name in self.named)
+            return (any(name in self.true_classes for name in named),) if named else ()
+        return tuple(name in self.true_classes for name in named)
 
     @property
     def reduction(self) -> float | None:

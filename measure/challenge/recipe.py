@@ -7,7 +7,7 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
     [flag]            width, height, materials: names; density, bending: ranges of factors on the nominal material
     [recordings]      count, duration, settle, apart [m/s]; rates, noises: dealt out evenly; speed: a range
     [log]             share: of the sets whose wind varies; rate; intensity: a range; length: integral scale
-    [markers]         columns, rows; jitter: as a share of the spacing
+    [markers]         columns, rows; jitter: as a share of the spacing; one pattern for all sets
     [numerics.NAME]   columns, rows, diagonals, integrator, step, thickness: of contact, none where it is 0; damping
     [effects.NAME]    parameter, range, negative: share of the sets with the other sign; an effect of the library
     [outside.NAME]    the same, of `measure.challenge.outside`

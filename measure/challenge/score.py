@@ -6,7 +6,7 @@ Definitions, in the words of the sheet:
 - *Half-detection strength*: the impact (see `Key.impact`) at which half are detected, of a class of effects (see
   `rates.Power`). Identification is graded on sets of one effect at twice that or more.
 - *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its class did.
-- *False discovery*: a claim that an effect acts where none of its class does. "One of" makes a single claim.
+- *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a single claim.
 - *None of the library*: the verdict says so, or that the library explains only a part.
 - *Control separated*: where one effect was named, the same freedom spent on the best wrong effect leaves an error that
   is larger by more than half the width of the reduction's interval.
@@ -28,6 +28,7 @@ from measure.challenge.key import opened
 from measure.challenge.outcome import Outcome
 from measure.challenge.rates import Power, Share
 from measure.challenge.recipe import Kind
+from measure.loop.verdict import Conclusion
 
 ENOUGH = 2.0
 """Times the half-detection strength, from where identification is graded."""
@@ -171,6 +172,7 @@ class Sheet:
             "class-level, all of one effect": self.share(one, lambda o: o.class_right),
             "top-1, all of one effect": self.share(one, lambda o: o.first_right),
             "true effect among those named": self.share(one, lambda o: o.among_named),
+            "several named as one of, of one effect": self.share(one, lambda o: o.conclusion is Conclusion.ONE_OF),
             "pairs: one class found": self.share(pairs, lambda o: o.found_classes >= 1),
             "pairs: both classes found": self.share(pairs, lambda o: o.found_classes == len(o.true_classes)),
             "pairs: incompleteness said or both found": self.share(

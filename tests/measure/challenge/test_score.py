@@ -124,6 +124,12 @@ def test_another_effect_of_the_class_is_right_at_class_level_only() -> None:
     assert (outcome.first_right, outcome.class_right, outcome.claims) == (False, True, (True,))
 
 
+def test_equivalent_effects_are_one_claim() -> None:
+    said = verdict(Conclusion.EFFECT, "air-density", "porosity")
+    assert Outcome.of(key("a", Kind.ONE, acting("permeability")), filing("a", said)).claims == (True,)
+    assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said)).claims == (False,)
+
+
 def test_one_of_several_is_one_claim_and_its_best_ranked_is_the_first() -> None:
     said = verdict(Conclusion.ONE_OF, "shear", "lift", ranking=(candidate("lift"), candidate("shear")))
     true = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
