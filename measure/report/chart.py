@@ -198,7 +198,7 @@ class Chart:
 def drawing(width: float, height: float, title: str, description: str, inside: str) -> Markup:
     """An SVG that names and describes itself. `inside` is markup already."""
     return Markup(
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:g} {height:g}" '
+        f'<svg role="img" viewBox="0 0 {width:g} {height:g}" '
         f'aria-label="{escape(title)}: {escape(description)}">{inside}</svg>'
     )
 

@@ -93,6 +93,8 @@ def _record(value: Any, kind: Any, where: str) -> Any:
 def _sequence(value: Any, kind: Any, where: str) -> Any:
     items = _expected(value, list, "a list", where)
     inner = get_args(kind)
+    if kind == list[float]:
+        return [_number(item, where) for item in items]
     if get_origin(kind) is list:
         return [_read(item, inner[0], f"{where}[{n}]") for n, item in enumerate(items)]
     if inner[-1] is Ellipsis:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,13 +25,27 @@ def about(value: float, half: float, unit: str = "m") -> Estimate:
     return Estimate(value=value, low=value - half, high=value + half, unit=unit)
 
 
-def residual(name: str, speed: float, *, held_out: bool, with_after: bool, seed: int, frames: int = 250) -> Residual:
-    """A flag of 1.2 × 0.8 m with 15 × 10 markers and a travelling wave."""
+@dataclass(frozen=True, kw_only=True)
+class Size:
+    """How much a recording holds."""
+
+    across: int = 9
+    up: int = 6
+    frames: int = 100
+    stretch: int = 10
+
+
+FULL = Size(across=15, up=10, frames=250, stretch=50)
+
+
+def residual(name: str, speed: float, *, held_out: bool, with_after: bool, seed: int, size_of: Size) -> Residual:
+    """A flag of 1.2 × 0.8 m with a travelling wave."""
     rng = np.random.default_rng(seed)
-    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1.2, 15), np.linspace(0, 0.8, 10)))
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1.2, size_of.across), np.linspace(0, 0.8, size_of.up)))
+    frames = size_of.frames
     times = np.arange(frames) / 25
     size = 0.003 * (speed / 5) * (0.4 + u / 1.2)
-    stretch = times[:50, None]
+    stretch = times[: size_of.stretch, None]
     shape = np.stack(
         [u + 0 * stretch, 0.12 * u * np.sin(5 * u - 9 * stretch), v - 0.1 * u**2 + 0 * stretch],
         axis=-1,
@@ -103,7 +117,7 @@ def comparison(what: str, before: float, *, with_after: bool, oracle: bool) -> C
     )
 
 
-def verdict(conclusion: Conclusion) -> Verdict:
+def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
     """Of the kind asked for, on three recordings."""
     rng = np.random.default_rng(4)
     sufficient = conclusion is Conclusion.SUFFICIENT
@@ -164,7 +178,7 @@ def verdict(conclusion: Conclusion) -> Verdict:
             for what, before in (("tunnel 7.0 m/s, unseen", 0.0042), ("last third of tunnel 5.5 m/s", 0.0033))
         ),
         residuals=tuple(
-            residual(name, speed, held_out=held_out, with_after=not sufficient, seed=n)
+            residual(name, speed, held_out=held_out, with_after=not sufficient, seed=n, size_of=size)
             for n, (name, speed, held_out) in enumerate(names)
         ),
         assumptions=("The pole is rigid and upright.", "Density of air 1.2 kg/m³, from the log's temperature."),

@@ -1,0 +1,81 @@
+"""The JSON document."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+import pytest
+
+from flagdata.errors import InputError
+from measure.loop.verdict import Conclusion, Verdict
+from measure.report.document import as_document, from_document
+from tests.measure.report.verdicts import verdict, with_holes
+
+
+def written(whole: Verdict) -> dict[str, Any]:
+    """Through text and back, with NaN refused."""
+    return json.loads(json.dumps(as_document(whole), allow_nan=False))
+
+
+def differences(a: Any, b: Any, where: str = "") -> list[str]:
+    """Where two verdicts differ; NaN equals NaN."""
+    if dataclasses.is_dataclass(a) and type(a) is type(b):
+        return [d for f in dataclasses.fields(a) for d in differences(getattr(a, f.name), getattr(b, f.name), f.name)]
+    if isinstance(a, list | tuple) and type(a) is type(b) and len(a) == len(b):
+        return [d for n, (x, y) in enumerate(zip(a, b, strict=True)) for d in differences(x, y, f"{where}[{n}]")]
+    same = a == b or (isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b))
+    return [] if same else [f"{where}: {a!r} ≠ {b!r}"]
+
+
+@pytest.mark.parametrize("conclusion", Conclusion)
+def test_every_field_of_every_kind_of_verdict_comes_back(conclusion: Conclusion) -> None:
+    whole = verdict(conclusion)
+    assert differences(from_document(written(whole)), whole) == []
+
+
+def test_missing_numbers_and_open_intervals_come_back() -> None:
+    whole = with_holes(verdict(Conclusion.EFFECT))
+    document = written(whole)
+    assert document["residuals"][0]["speed"] is None
+    assert document["ranking"][0]["strength"]["high"] == "Infinity"
+    assert differences(from_document(document), whole) == []
+
+
+def test_the_document_holds_every_field_by_its_name() -> None:
+    """Walked beside the dataclasses, so that a field added to the verdict cannot be left out."""
+
+    def walk(value: Any, document: Any) -> None:
+        if dataclasses.is_dataclass(value):
+            assert document.keys() == {f.name for f in dataclasses.fields(value)}
+            for field in dataclasses.fields(value):
+                walk(getattr(value, field.name), document[field.name])
+        elif isinstance(value, tuple) and value and dataclasses.is_dataclass(value[0]):
+            for inner, content in zip(value, document, strict=True):
+                walk(inner, content)
+
+    document = written(verdict(Conclusion.PARTLY))
+    assert document.pop("schema") == "flagdata.verdict/1"
+    walk(verdict(Conclusion.PARTLY), document)
+
+
+@pytest.mark.parametrize(
+    ("change", "where", "what"),
+    [
+        ({"schema": "flagdata.verdict/2"}, "schema", "flagdata.verdict/2"),
+        ({"conclusion": "perhaps"}, "verdict.conclusion", "perhaps"),
+        ({"seconds": "long"}, "verdict.seconds", "str instead of a number"),
+        ({"seconds": True}, "verdict.seconds", "bool instead of a number"),
+        ({"named": "lift"}, "verdict.named", "str instead of a list"),
+        ({"findings": [["kind"]]}, "verdict.findings[0]", "1 entries"),
+        ({"colour": "blue"}, "verdict", "unknown field colour"),
+        ({"test": {"statistic": 1.0}}, "verdict.test", "missing field level, null, nulls, p_value"),
+    ],
+)
+def test_a_document_that_does_not_fit_is_refused_with_the_place(change: dict[str, Any], where: str, what: str) -> None:
+    with pytest.raises(InputError) as refused:
+        from_document({**written(verdict(Conclusion.SUFFICIENT)), **change})
+    assert refused.value.where == where
+    assert what in refused.value.what
