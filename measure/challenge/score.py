@@ -72,6 +72,16 @@ class Coefficients:
 
 
 @dataclass(frozen=True, kw_only=True)
+class HalfStrength:
+    """Of an effect, in its own unit, with 90 % bounds."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Sheet:
     """The score of a challenge.
 
@@ -100,6 +110,20 @@ class Sheet:
         if power is None:
             return []
         return [o for o in self.of_kind(Kind.ONE) if o.key.impact >= ENOUGH * power.half[_class(o)][0]]
+
+    @property
+    def half_strengths(self) -> dict[str, HalfStrength]:
+        """Effect → the strength that is detected half of the time: that of its class as an impact, times the median of
+        strength over impact in its own sets, which are proportional while effects are weak."""
+        found: dict[str, HalfStrength] = {}
+        for effect in sorted({o.key.effects[0].effect for o in self.of_kind(Kind.ONE)}):
+            own = [o for o in self.of_kind(Kind.ONE) if o.key.effects[0].effect == effect and o.key.impact > 0]
+            if self.power is not None and own:
+                half, low, high = self.power.half[class_of(effect)]
+                scale = float(np.median([abs(o.key.effects[0].value) / o.key.impact for o in own]))
+                unit = own[0].key.effects[0].unit
+                found[effect] = HalfStrength(value=half * scale, low=low * scale, high=high * scale, unit=unit)
+        return found
 
     def share(self, cases: Sequence[Outcome], happened: Callable[[Outcome], bool]) -> Share:
         """Among some outcomes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,7 @@ def as_dict(sheet: Sheet) -> dict[str, Any]:
             "by_noise": _curve(sheet.by_noise),
             "by_rate": _curve(sheet.by_rate),
         },
+        "half_strengths": {effect: asdict(half) for effect, half in sheet.half_strengths.items()},
         "seconds": _spread([o.seconds for o in sheet.outcomes], lowest=0.9),
         "confusion": confusion(sheet),
         "outcomes": [_row(outcome) for outcome in sheet.outcomes],
@@ -91,6 +93,9 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
     parts += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
     parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
+    parts += ["", "| effect | half detected at | unit |", "|---|---|---|"]
+    for effect, half in sheet.half_strengths.items():
+        parts.append(f"| {effect} | {half.value:.2g} [{half.low:.2g}, {half.high:.2g}] | {half.unit} |")
     if picture is not None:
         parts += ["", f"![Power curves]({picture})"]
     parts += ["", "| true | said | sets |", "|---|---|---|"]

@@ -105,6 +105,17 @@ def test_who_sees_from_a_threshold_on_has_the_half_detection_strength_there() ->
     assert result.shares["top-1, all of one effect"].value == pytest.approx(0.5, abs=0.02)
 
 
+def test_half_strengths_are_in_the_effects_own_units() -> None:
+    """Strengths of 100 an impact of a metre, detected from 3 mm on: half at 0.3."""
+    sets = [
+        key(f"{i}", Kind.ONE, acting("lift", 100 * s), impact=s) for i, s in enumerate(np.geomspace(3e-4, 3e-2, 40))
+    ]
+    result = sheet(lambda k: verdict(Conclusion.EFFECT if k.impact >= 3e-3 else Conclusion.SUFFICIENT), sets)
+    # The spacing is 12 %.
+    assert result.half_strengths["lift"].value == pytest.approx(0.3, rel=0.12)
+    assert result.half_strengths["lift"].unit == "1"
+
+
 def test_power_separates_what_noise_hides() -> None:
     """A threshold of 1 mm without noise and of 10 mm with it."""
     result = sheet(
