@@ -257,7 +257,7 @@ class Fluctuation:
 def fluctuation(evidence: Evidence, column: int) -> Fluctuation:
     """How much a column's coefficient fluctuates, beside the nuisances; errors are taken as large as this set's are."""
     score, curvature = _beside(evidence, column, scaled=True)
-    grid = np.concatenate([[0.0], np.geomspace(1e-3, 10.0, 200)]) ** 2
+    grid: Floats = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
     likelihood = _fluctuating(grid[:, None], score, curvature).sum(axis=1)
     best = int(np.argmax(likelihood))
     deviation = float(np.sqrt(grid[best]))
@@ -280,7 +280,7 @@ def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
         score = outside.score[:, column] - outside.curvature[:, column][:, active] @ fit.value
         deviation = fluctuation(inside, column).deviation
         result[folds == index] = _fluctuating(
-            np.full(len(score), deviation**2), score, outside.curvature[:, column, column]
+            np.full(len(score), deviation**2, dtype=np.float64), score, outside.curvature[:, column, column]
         )
     return result
 
