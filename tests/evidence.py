@@ -40,12 +40,15 @@ def circumstances(seed: int) -> dict[str, Any]:
     }
 
 
-def run_all(kind: str, modules: Mapping[str, str]) -> None:
+def run_all(kind: str, modules: Mapping[str, str]) -> Path:
     """Command line shared by benchmarks and validation: run each named module's `run(seed)`, keep its dictionary.
 
     Args:
         kind: "bench" or "validate", the first part of the file names.
         modules: name → module with `run(*, seed: int, out: Path) -> dict`; pictures it makes go into `out`.
+
+    Returns:
+        The folder with the results.
     """
     parser = argparse.ArgumentParser(description=f"Run the {kind} suite and keep its results.")
     parser.add_argument("names", nargs="*", help=f"which to run, of {', '.join(modules)}; all if none is named")
@@ -62,3 +65,4 @@ def run_all(kind: str, modules: Mapping[str, str]) -> None:
         target = options.out / f"{kind}-{name}.json"
         target.write_text(json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
         print(f"{target}\n{json.dumps(result, indent=2)}")  # noqa: T201
+    return options.out

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from tests.evidence import run_all
+from tests.validation.page import draw_page
 
 VALIDATIONS = {
+    "arcsim": "tests.validation.arcsim",
     "clock-recovery": "tests.validation.clock_recovery",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
+    "renderers": "tests.validation.renderers",
+    "verification": "tests.validation.verification",
 }
 
 if __name__ == "__main__":
-    run_all("validate", VALIDATIONS)
+    draw_page(run_all("validate", VALIDATIONS))

@@ -6,6 +6,8 @@ from rest across the wind. Replicates differ by 1 mm of noise in the start.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -175,7 +177,13 @@ def _watch(system: System, state: State, method: Integrator, *, groups: int, loo
     )
 
 
-def torch_alone() -> None:
-    """One core and no gradients, for all of the page."""
+@contextmanager
+def one_core() -> Iterator[None]:
+    """One thread and no gradients."""
+    threads = torch.get_num_threads()
     torch.set_num_threads(1)
-    torch.set_grad_enabled(False)
+    try:
+        with torch.no_grad():
+            yield
+    finally:
+        torch.set_num_threads(threads)

@@ -15,7 +15,7 @@ from scipy.signal import welch
 
 from sim.run.diagnostics import CRUMPLED
 from sim.scene import GRAVITY
-from tests.validation.flags_reference import ReferenceMotion
+from tests.validation.arcsim import ReferenceMotion
 from tests.validation.flags_runs import CAMEL, ENERGY_EVERY, RATE, REPLICATES, SETTLED, Ensemble
 
 MOTION, THEORY, IMPLICIT, MARK = "#b5541c", "#1f5f8b", "#6a8f3c", "#444444"

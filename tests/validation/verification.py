@@ -1,4 +1,7 @@
-"""The verification curves: simulated points, theory over them, and the observed order of convergence."""
+"""The verification curves: simulated points, theory over them, and the observed order of convergence.
+
+Numbered as in the specification; flutter (8) has a set of its own.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,8 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 from scipy.special import jn_zeros
 
+from tests.validation.flags_runs import one_core
+from tests.validation.verification_tables import check, draw_tables
 from tests.verification.cases import (
     FRAME,
     OCTAVES,
@@ -51,6 +56,15 @@ def rates(sizes: list[float] | tuple[float, ...], errors: list[float]) -> list[f
 
 def _converging(sizes: list[float], errors: list[float]) -> dict[str, Any]:
     return {"size": sizes, "error": errors, "rates": rates(sizes, errors)}
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """The curves, the tables, and their pictures."""
+    with one_core():
+        result = {**verify(seed), "tables": check()}
+        draw_verification(result, out / "validate-verification.png")
+        draw_tables(out / "validate-verification-tables.png")
+    return result
 
 
 def verify(seed: int) -> dict[str, Any]:

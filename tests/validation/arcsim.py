@@ -1,4 +1,7 @@
-"""Beside ArcSim 0.2.1: its runs of the same flag, where the folder of reference data is there."""
+"""Beside ArcSim 0.2.1: its runs of the same flag, where the folder of reference data is there.
+
+Vertex by vertex while the motion is predictable, then in the statistics of replicates.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from sim.integrate.implicit import AirShape, BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.motion import edge_motion
 from sim.scene import assemble, flag
-from tests.validation.flags_runs import CAMEL
+from tests.validation.flags_runs import CAMEL, one_core
 
 RATE = 25.0
 RUNS = {("0.5 ms", 0.0): "flag_w0_dt05", ("0.5 ms", 4.0): "flag_w4_dt05", ("5 ms", 0.0): "flag_w0_dt5",
@@ -63,6 +66,17 @@ def _edge() -> NDArray[np.int64]:
 def _statistics(edge: NDArray[np.floating]) -> NDArray[np.float64]:
     motion = edge_motion(edge, rate=RATE)
     return np.array([*motion.position, motion.speed, motion.frequency])
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Distances, statistics and their picture; what is missing where the reference runs are."""
+    runs = folder()
+    if runs is None:
+        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+    with one_core():
+        result = {"mean_vertex_distance_m": distances(runs), "settled": settled(runs, seed)}
+    draw_reference(result["mean_vertex_distance_m"], result["settled"], out / "validate-arcsim.png")
+    return result
 
 
 def motions(runs: Path) -> list[ReferenceMotion]:
