@@ -1,0 +1,151 @@
+"""Inference on made statistics that obey its model exactly, where the answers are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import chi2, kstest
+
+from measure.loop.columns import PRIOR, THETA
+from measure.loop.inference import Evidence, NullModel, Nulls, fluctuation, gains
+from measure.loop.statistics import Statistics
+
+Floats = NDArray[np.float64]
+COLUMNS, RECORDINGS, SEGMENTS = 8, 160, 4
+
+
+class World:
+    """r = μ(U) + shift of the numerics + R δ + ε, with ε ~ N(0, Σ)."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        factor = self.rng.normal(size=(COLUMNS, COLUMNS)) / 2
+        self.covariance = factor @ factor.T + np.eye(COLUMNS)
+        self.slopes = self.rng.normal(size=(3, COLUMNS)) * np.array([[1.0], [0.2], [0.02]])
+        self.direction = 2 * self.rng.normal(size=COLUMNS)
+
+    def draw(self, delta: Floats, *, recordings: int, numerics: Floats, speeds: Floats) -> Statistics:
+        """Segments of recordings with coefficients (recording, column)."""
+        recording = np.repeat(np.arange(recordings), SEGMENTS)
+        response = self.rng.normal(size=(len(recording), COLUMNS, COLUMNS)) + 4 * np.eye(COLUMNS)
+        noise = self.rng.multivariate_normal(np.zeros(COLUMNS), self.covariance, size=len(recording))
+        u = speeds[recording]
+        mean = np.stack([np.ones_like(u), u, u**2], axis=1) @ self.slopes + numerics[recording, None] * self.direction
+        r = mean + np.einsum("sij,sj->si", response, delta[recording]) + noise
+        return Statistics(
+            recording=recording, r=r, response=response, error=np.ones(len(r)), marker_error=np.ones((len(r), 1))
+        )
+
+    def nulls(self) -> Nulls:
+        kinds = np.repeat(np.arange(20), RECORDINGS // 20)
+        offsets = self.rng.normal(size=(RECORDINGS, len(THETA))) * PRIOR
+        delta = np.concatenate([offsets, np.zeros((RECORDINGS, COLUMNS - len(THETA)))], axis=1)
+        speeds = self.rng.uniform(3, 8, RECORDINGS)
+        shift = self.rng.normal(size=20)[kinds]
+        own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
+        return Nulls(
+            statistics=own, speeds=speeds[own.recording], offsets=offsets[own.recording], numerics=kinds[own.recording]
+        )
+
+    def data(self, null: NullModel, delta: Floats) -> Evidence:
+        """Three recordings of one cloth in one kind of numerics."""
+        speeds = np.array([3.5, 5.0, 7.0])
+        shift = np.full(3, self.rng.normal())
+        own = self.draw(np.tile(delta, (3, 1)), recordings=3, numerics=shift, speeds=speeds)
+        return Evidence.of(own, speeds[own.recording], null)
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return World(1)
+
+
+@pytest.fixture(scope="module")
+def null(world: World) -> NullModel:
+    return NullModel.fit(world.nulls())
+
+
+def effect(strength: float, column: int = 5) -> Floats:
+    delta = np.zeros(COLUMNS)
+    delta[column] = strength
+    return delta
+
+
+def test_the_null_model_finds_mean_and_covariance(world: World, null: NullModel) -> None:
+    speeds = np.array([3.0, 5.0, 8.0])
+    features = np.stack([np.ones(3), speeds, speeds**2], axis=1)
+    # Twenty kinds of numerics, whose shift has deviation 1: 1/√20 of the direction, twice that at a parabola's ends;
+    # three deviations, and as many of the noise of 640 segments.
+    bound = 6 / 20**0.5 * np.abs(world.direction) + 0.5
+    assert (np.abs(null.mean(speeds) - features @ world.slopes) < bound).all()
+    ratio = np.diag(null.covariance) / np.diag(world.covariance)
+    assert ratio.min() > 0.7 and ratio.max() < 1.5
+
+
+def test_the_null_model_finds_how_numerics_shift_the_mean(world: World, null: NullModel) -> None:
+    first = null.shifts[0]
+    cosine = first @ world.direction / np.linalg.norm(first) / np.linalg.norm(world.direction)
+    assert abs(cosine) > 0.9
+
+
+def test_strengths_are_found_within_their_errors(world: World, null: NullModel) -> None:
+    scores = []
+    for _ in range(200):
+        value, error = world.data(null, effect(0.3)).fit([5]).of(5)
+        scores.append((value - 0.3) / error)
+    # 200 draws: the mean within 4/√200, the spread within a fifth.
+    assert abs(np.mean(scores)) < 0.3
+    assert 0.8 < np.std(scores) < 1.25
+
+
+def test_drops_of_nulls_follow_a_chi_square_of_one(world: World, null: NullModel) -> None:
+    drops = [world.data(null, effect(0.0)).drops()[5] for _ in range(300)]
+    assert kstest(drops, chi2(1).cdf).pvalue > 1e-3
+
+
+def test_drops_are_those_of_fits(world: World, null: NullModel) -> None:
+    evidence = world.data(null, effect(0.5))
+    without, with_it = evidence.fit(()).left, evidence.fit([5]).left
+    assert evidence.drops()[5] == pytest.approx(without - with_it, rel=1e-6)
+    beside = evidence.fit([4]).left - evidence.fit([4, 5]).left
+    assert evidence.drops([4])[5] == pytest.approx(beside, rel=1e-6)
+
+
+def test_always_fitted_columns_never_drop(world: World, null: NullModel) -> None:
+    assert not world.data(null, effect(0.5)).drops()[: len(THETA)].any()
+
+
+def test_the_true_effect_predicts_left_out_recordings_best(world: World, null: NullModel) -> None:
+    best = [
+        int(np.argmax(gains(world.data(null, effect(0.6)), [[3], [4], [5], [6], [7]]).sum(axis=1))) for _ in range(20)
+    ]
+    assert best == [2] * 20
+
+
+def test_what_is_not_there_gains_nothing(world: World, null: NullModel) -> None:
+    gained = [gains(world.data(null, effect(0.0)), [[5]]).sum() for _ in range(100)]
+    # Half a unit is what one free coefficient loses on as much data again; no gain in the mean.
+    assert np.mean(gained) < 0.1
+
+
+def test_a_fluctuation_is_found_with_its_size(world: World, null: NullModel) -> None:
+    found = []
+    for _ in range(40):
+        evidence = world.data(null, effect(0.0))
+        extra = world.rng.normal(0, 0.5, len(evidence.recording))
+        column = evidence.curvature[:, :, 5]
+        moved = Evidence(
+            recording=evidence.recording,
+            curvature=evidence.curvature,
+            columns=evidence.columns,
+            score=evidence.score + extra[:, None] * column,
+            energy=evidence.energy + 2 * extra * evidence.score[:, 5] + extra**2 * evidence.curvature[:, 5, 5],
+        )
+        found.append(fluctuation(moved, 5).deviation)
+    # Twelve segments a draw: their spread of 20 % averages to 4 % over 40.
+    assert np.mean(found) == pytest.approx(0.5, rel=0.2)
+
+
+def test_nulls_fluctuate_little(world: World, null: NullModel) -> None:
+    assert np.median([fluctuation(world.data(null, effect(0.0)), 5).deviation for _ in range(40)]) < 0.1
