@@ -80,7 +80,7 @@ def test_the_null_model_finds_mean_and_covariance(world: World, null: NullModel)
     bound = 6 / 20**0.5 * np.abs(world.direction) + 0.5
     assert (np.abs(null.mean(speeds) - features @ world.slopes) < bound).all()
     ratio = np.diag(null.covariance) / np.diag(world.covariance)
-    assert ratio.min() > 0.7 and ratio.max() < 1.5
+    np.testing.assert_allclose(ratio, 1.0, atol=0.4)  # 5 % by 640 segments, more by the inflation
 
 
 def test_the_null_model_finds_how_numerics_shift_the_mean(world: World, null: NullModel) -> None:
@@ -96,7 +96,7 @@ def test_strengths_are_found_within_their_errors(world: World, null: NullModel) 
         scores.append((value - 0.3) / error)
     # 200 draws: the mean within 4/√200, the spread within a fifth.
     assert abs(np.mean(scores)) < 0.3
-    assert 0.8 < np.std(scores) < 1.25
+    assert np.std(scores) == pytest.approx(1.0, abs=0.2)
 
 
 def test_drops_of_nulls_follow_a_chi_square_of_one(world: World, null: NullModel) -> None:
