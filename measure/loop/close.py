@@ -122,6 +122,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     setting = Setting.of(experiment)
     tell("sensitivities", 0, 1)
     found = statistics(setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns())
+    tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
     null = bank.model()
     evidence = Evidence.of(found, setting.speeds[setting.recording], null)
@@ -130,6 +131,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     judgement = judge(evidence, reference, level=options.level)
     solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
     comparisons = _comparisons(solved, options, tell)
+    tell("before and after", 1, 1)
     return _verdict(solved, bank, comparisons, options, began)
 
 
@@ -198,13 +200,12 @@ def _comparisons(solved: Solved, options: Options, tell: Stage) -> tuple[Compari
     setting, larger = solved.setting, solved.larger
     if larger is None:
         return ()
-    tell("models", 0, 1)
+    tell("before and after", 0, 1)
     control = solved.control
     floor = _floor(setting, larger.model, options)
     made: list[Comparison] = []
     left_out = folds(setting.segments, [float(u) for u in setting.speeds])
-    for index, fold in enumerate(left_out):
-        tell("before and after", index, len(left_out))
+    for fold in left_out:
         own = setting.segments.select(np.flatnonzero(fold.outside))
         models = [solved.base.without(fold.outside), larger.without(fold.outside)]
         models += [] if control is None else [control[1].without(fold.outside)]
