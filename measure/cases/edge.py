@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,11 +192,14 @@ def scatter(track: EdgeTrack) -> NDArray[np.float64]:
     return error
 
 
-def track_edge(path: Path, *, true_rate: float, options: EdgeOptions | None = None) -> EdgeTrack:
+def track_edge(
+    path: Path, *, true_rate: float, rate: float | Literal["native"] = "native", options: EdgeOptions | None = None
+) -> EdgeTrack:
     """The line in all frames of a clip, in its own pixels.
 
     Args:
         true_rate: at which the camera ran [Hz], whatever its container says.
+        rate: of the frames that are measured [Hz]; "native" measures each.
 
     Raises:
         InputError: the clip is damaged, or has fewer than two frames.
@@ -203,7 +207,7 @@ def track_edge(path: Path, *, true_rate: float, options: EdgeOptions | None = No
     """
     options = options or EdgeOptions()
     size = _longest_side(path)
-    camera = CameraOptions(start=0, true_fps=true_rate, rate="native", size=size)
+    camera = CameraOptions(start=0, true_fps=true_rate, rate=rate, size=size)
     times, found = [], []
     with open_camera(path, camera) as stream:
         left, top = (size - stream.info.width) // 2, (size - stream.info.height) // 2

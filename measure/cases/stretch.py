@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
 
 from flagdata.errors import InputError
 from measure.cases.edge import EdgeTrack
 
-_SMOOTH = 9  # columns; the scatter of single heights would lengthen the line
+_SMOOTH = 15  # columns of a running parabola; the scatter of single heights would lengthen the line
 _UPPER = (75.0, 98.0)  # percentiles between which the pile is measured
 _RESAMPLES = 200
 _BLOCKS = 20
@@ -50,7 +50,7 @@ def arc_lengths(track: EdgeTrack, ratio: float, *, least: int = 50) -> NDArray[n
         seen = np.flatnonzero(np.isfinite(height))
         if len(seen) >= least:
             whole = np.interp(np.arange(seen[0], seen[-1] + 1), seen, height[seen])
-            found[index] = np.hypot(1.0, ratio * np.diff(uniform_filter1d(whole, _SMOOTH))).sum()
+            found[index] = np.hypot(1.0, ratio * np.diff(savgol_filter(whole, _SMOOTH, 2))).sum()
     return found
 
 
