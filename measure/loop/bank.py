@@ -75,18 +75,19 @@ def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(math.log(span[0]), math.log(span[1]))))
 
 
-def evaluate(batch: NullBatch, numerics: int) -> Nulls:
-    """Simulate a batch and take its statistics, from the nominal calibration."""
+def evaluate(batch: NullBatch, numerics: int) -> tuple[Nulls, float]:
+    """Simulate a batch and take its statistics, from the nominal calibration; with the duration of a segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings)
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     nominal = Calibration()
     found = statistics(forecaster, segments, [nominal] * len(segments), columns())
     offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
-    return Nulls(
+    nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
         numerics=np.full(len(found.recording), numerics),
     )  # fmt: skip
+    return nulls, segments.duration
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
@@ -111,12 +112,13 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
 
 
 def _keep(folder: Path, batch: NullBatch, index: int) -> None:
-    nulls = evaluate(batch, index)
+    nulls, duration = evaluate(batch, index)
     own = nulls.statistics
     buffer = BytesIO()
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets,
+        duration=np.array(duration),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -137,6 +139,7 @@ def load(folder: Path, *, words: str) -> NullBank:
     if not paths:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []
+    durations: set[float] = set()
     count = 0
     for path in paths:
         try:
@@ -154,8 +157,14 @@ def load(folder: Path, *, words: str) -> NullBank:
         )  # fmt: skip
         numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
         parts.append(Nulls(statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics))
+        durations.add(round(float(content["duration"]), 1))
         count = int(own.recording.max()) + 1
-    return NullBank(nulls=_joined(parts), columns=names(), words=words)
+    if len(durations) > 1:
+        raise CorruptError(
+            f"segments of {', '.join(f'{d:g} s' for d in sorted(durations))}", where=str(folder),
+            fix="build a bank of one design into a folder of its own",
+        )  # fmt: skip
+    return NullBank(nulls=_joined(parts), columns=names(), duration=durations.pop(), words=words)
 
 
 def _joined(parts: Sequence[Nulls]) -> Nulls:

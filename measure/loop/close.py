@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
@@ -171,7 +171,13 @@ class Solved:
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
     if options.bank is not None:
-        return banks.load(options.bank, words=f"over priors, from {options.bank.name}")
+        bank = banks.load(options.bank, words=f"over priors, from {options.bank.name}")
+        if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
+            raise InputError(
+                f"its segments last {bank.duration:g} s, those of the recordings {setting.segments.duration:.2g} s",
+                where=str(options.bank), fix="record for longer, or leave the bank out",
+            )  # fmt: skip
+        return bank
     first: Trajectory = setting.experiment.recordings[0]
     batches = [
         banks.prior_batch(

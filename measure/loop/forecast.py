@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 HORIZON = 0.04
 """About this long a prediction is [s]: 25 frames a second, the paper's rate."""
 _SEGMENT = 2.0  # s
-_SHORTEST = 1.0  # s: a segment of a recording too short for one of the usual length
+_SHORTEST = 0.8  # s: a segment of recordings too short for two of the usual length
 _WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
 
 
@@ -80,7 +80,7 @@ class Segments:
     def of(cls, recordings: Sequence[Trajectory]) -> Segments:
         """Cut recordings; frames beyond a horizon of about 40 ms are used every so many, a remainder is left out.
 
-        Segments last 2 s, or as long as the shortest recording allows.
+        Segments last 2 s, or half of what the shortest recording allows.
 
         Raises:
             InputError: recordings of different markers or rates, untracked points, or shorter than a segment.
@@ -90,7 +90,7 @@ class Segments:
         period = stride / first.rate
         warm = round(_WARM_UP / period)
         shortest = min(math.ceil(len(r.positions) / stride) for r in recordings) - warm - 2
-        length = min(round(_SEGMENT / period), shortest)
+        length = min(round(_SEGMENT / period), shortest // 2)
         items: list[Segment] = []
         for index, recording in enumerate(recordings):
             if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
@@ -105,7 +105,7 @@ class Segments:
                 )  # fmt: skip
             frames = recording.positions[::stride]
             if length * period < _SHORTEST:
-                needed = _SHORTEST + (warm + 2) * period
+                needed = 2 * _SHORTEST + (warm + 2) * period
                 raise InputError(
                     f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
                     where=f"recording {recording.name!r}", fix="record for 10 s or more",
@@ -129,6 +129,11 @@ class Segments:
     def first(self) -> int:
         """The first frame of a segment that counts."""
         return self.warm + 2
+
+    @property
+    def duration(self) -> float:
+        """Of what counts of a segment [s]."""
+        return (len(self.items[0].positions) - self.first) * self.period
 
     def __len__(self) -> int:
         return len(self.items)

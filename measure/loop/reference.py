@@ -29,6 +29,7 @@ class NullBank:
     Attributes:
         nulls: their segments.
         columns: names of the columns.
+        duration: of a segment [s].
         words: how they were made.
 
     Raises:
@@ -37,6 +38,7 @@ class NullBank:
 
     nulls: Nulls
     columns: tuple[str, ...]
+    duration: float
     words: str
 
     def __post_init__(self) -> None:

@@ -41,7 +41,7 @@ def own_recording(specimen: Specimen, forecaster: Forecaster) -> Trajectory:
         name="still", markers=specimen.mesh.rest, positions=np.zeros((60, specimen.mesh.vertex_count, 3)), rate=RATE,
         wind=WindTrack.constant((4.0, 0.0, 0.0)),
     )  # fmt: skip
-    system, state = forecaster.system(Segments.of([still]), [Calibration()])
+    system, state = forecaster.system(Segments.of([still]).select([0]), [Calibration()])
     bulge = 0.02 * np.sin(7 * specimen.mesh.rest[:, 0]) * np.cos(5 * specimen.mesh.rest[:, 1])
     bent = state.position.clone()
     bent[:, 1, 0] += torch.as_tensor(bulge)
