@@ -19,11 +19,11 @@ def _dyes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
 
 def _yarn(rng: np.random.Generator) -> NDArray[np.float64]:
     """(row, column, 1) brightness of a plain weave with uneven yarns."""
-    period = rng.uniform(4.0, 10.0)
+    period = rng.uniform(2.0, 4.0)
     x, y = np.meshgrid(np.arange(_SIZE), np.arange(_SIZE))
     over = np.sin(np.pi * x / period) * np.sin(np.pi * y / period)
     uneven = fractal(rng, _SIZE, _SIZE, slope=0.6, stretch=6.0) + fractal(rng, _SIZE, _SIZE, slope=0.6, stretch=1 / 6)
-    return (1 + 0.08 * np.sign(over) * np.abs(over) ** 0.5 + 0.03 * uneven)[:, :, None]
+    return (1 + 0.06 * np.sign(over) * np.abs(over) ** 0.5 + 0.03 * uneven)[:, :, None]
 
 
 def _weave(rng: np.random.Generator) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ BENCHMARKS = {
     "lake": "tests.benchmarks.bench_lake",
     "pairs": "tests.benchmarks.bench_pairs",
     "records": "tests.benchmarks.bench_records",
+    "render": "tests.benchmarks.bench_render",
     "sim": "tests.benchmarks.bench_sim",
     "sim-cost": "tests.benchmarks.bench_sim_cost",
 }
