@@ -29,10 +29,12 @@ GUST_COLUMN = -1
 _FIRST = len(THETA)
 _FAR = 2.0
 """Standard errors of the paired difference by which the named effect must lead."""
+_TIED = 1.0
+"""Standard errors within which held-out gains say nothing."""
 _APART = 3.0
 """A rival whose squared z is lower by more than the square of this fits worse, whatever its held-out gain's error."""
-_MOST = 0.5
-"""Share of the corrective field's gain below which the library has no answer."""
+_BETTER = 1.5
+"""A mode of the corrective field whose statistic is larger by this factor says that the library has no answer."""
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
 """Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
@@ -66,7 +68,6 @@ class Judgement:
         named: columns of the effects named.
         ranking: candidates, best first, each with the reason why it was not named.
         statistic, p_value: of the global test.
-        field_gain: (segment,) held-out gain of the corrective field.
     """
 
     conclusion: Conclusion
@@ -74,7 +75,6 @@ class Judgement:
     ranking: tuple[Weighed, ...]
     statistic: float
     p_value: float
-    field_gain: Floats
 
 
 def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgement:
@@ -83,44 +83,72 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
     statistic, p_value = float(statistics.max()), reference.p_global(statistics, evidence.fit(()).left)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     smooth = [i + _FIRST for i, c in enumerate(columns()) if isinstance(c, FieldColumn)]
-    held_out = gains(evidence, [*([i] for i, _ in effects), smooth])
+    held_out = gains(evidence, [[i] for i, _ in effects])
     weighed = [
         _weigh(evidence, reference, column, effect, own, statistics)
-        for (column, effect), own in zip(effects, held_out, strict=False)
+        for (column, effect), own in zip(effects, held_out, strict=True)
     ]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[-1]))])
+
+    def judgement(conclusion: Conclusion, named: Sequence[Weighed], reasons: dict[int, str]) -> Judgement:
+        taken = {w.column for w in named}
+        told = [
+            replace(w, candidate=replace(w.candidate, why_not="" if w.column in taken else reasons.get(w.column, "")))
+            for w in ranking
+        ]
+        return Judgement(
+            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told), statistic=statistic,
+            p_value=p_value,
+        )  # fmt: skip
+
     if p_value > level:
-        reasons = {w.column: "the base model is not rejected" for w in ranking}
-        return _judgement(Conclusion.SUFFICIENT, (), ranking, reasons, statistic, p_value, held_out[-1])
-    best = next((w for w in ranking if w.admissible), ranking[0])
-    ahead = best.gains.sum() / max(held_out[-1].sum(), 1e-9)
-    enough = best.candidate.leftover > level
-    near = [w for w in ranking if w is not best and w.admissible and _rivals(best, w)]
-    reasons = {w.column: _reason(best, w) for w in ranking if w is not best}
-    if not best.admissible or best.gains.sum() <= 0 or (not enough and held_out[-1].sum() > 0 and ahead < _MOST):
-        reasons[best.column] = "what it leaves is more than half of what a smooth force field explains"
-        return _judgement(Conclusion.OUTSIDE, (), ranking, reasons, statistic, p_value, held_out[-1])
-    for rival in near:
-        reasons.pop(rival.column)
-    named = (best.column, *(w.column for w in near))
-    conclusion = Conclusion.ONE_OF if near else Conclusion.EFFECT if enough else Conclusion.PARTLY
-    return _judgement(conclusion, named, ranking, reasons, statistic, p_value, held_out[-1])
+        return judgement(Conclusion.SUFFICIENT, (), {w.column: "the base model is not rejected" for w in ranking})
+    best = ranking[0]
+    reasons = {w.column: _reason(best, w) for w in ranking[1:]}
+    field = float(statistics[smooth].max())
+    if not best.admissible or best.gains.sum() <= 0:
+        reasons[best.column] = "no effect of the library predicts unseen recordings better than the base model"
+        return judgement(Conclusion.OUTSIDE, (), reasons)
+    if best.candidate.z**2 * _BETTER < field:
+        reasons[best.column] = "a smooth force field explains more than any effect of the library"
+        return judgement(Conclusion.OUTSIDE, (), reasons)
+    near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
+    if best.candidate.leftover > level:
+        return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
+    second = _second(evidence, reference, best, ranking, level)
+    if second is not None:
+        return judgement(Conclusion.EFFECT, (best, second), reasons)
+    return judgement(Conclusion.PARTLY, (best,), reasons)
 
 
-def _judgement(
-    conclusion: Conclusion,
-    named: tuple[int, ...],
-    ranking: Sequence[Weighed],
-    reasons: dict[int, str],
-    statistic: float,
-    p_value: float,
-    field_gain: Floats,
-) -> Judgement:
-    explained = tuple(replace(w, candidate=replace(w.candidate, why_not=reasons.get(w.column, ""))) for w in ranking)
-    return Judgement(
-        conclusion=conclusion, named=named, ranking=explained, statistic=statistic, p_value=p_value,
-        field_gain=field_gain,
-    )  # fmt: skip
+def _second(
+    evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
+) -> Weighed | None:
+    """An effect that, beside the best, leaves no more than nulls do and predicts better than the best alone."""
+    if best.column == GUST_COLUMN:
+        return None
+    others = [w for w in ranking if w.column not in (best.column, GUST_COLUMN)]
+    pairs = gains(evidence, [[best.column], *([best.column, w.column] for w in others)])
+    order = np.argsort(-pairs[1:].sum(axis=1))
+    chosen, gained = others[order[0]], pairs[1 + order[0]] - pairs[0]
+    fit = evidence.fit([best.column, chosen.column])
+    strengths = [_strength(w, fit.of(w.column)[0]) for w in (best, chosen)]
+    lasting = gained.sum() > _FAR * _total_error(gained)
+    return chosen if lasting and all(strengths) and _leftover(evidence, reference, fit.active) > level else None
+
+
+def _strength(weighed: Weighed, coefficient: float) -> bool:
+    """Whether a strength is admissible."""
+    described = EFFECTS[weighed.candidate.effect].parameters()[weighed.candidate.parameter]
+    least, most = described.admissible
+    return least <= described.null + coefficient <= most
+
+
+def _leftover(evidence: Evidence, reference: Reference, active: Sequence[int]) -> float:
+    """p-value of the global test on what some columns leave."""
+    chosen = [column for column in active if _FIRST <= column < evidence.columns]
+    statistics = reference.statistics(evidence, names(), chosen)
+    return reference.p_global(statistics, evidence.fit(chosen).left)
 
 
 def _weigh(
@@ -146,7 +174,7 @@ def _weigh(
             strength=estimate(null + value, error, effect.unit),
             z=value / error if error > 0 else 0.0, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic), gain=float(gained.sum()),
-            gain_error=_total_error(gained), behind=0.0, leftover=reference.p_left(fit.left),
+            gain_error=_total_error(gained), behind=0.0, leftover=_leftover(evidence, reference, fit.active),
             by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
@@ -180,8 +208,11 @@ def estimate(value: float, error: float, unit: str) -> Estimate:
 
 
 def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """By held-out gain; of those that it cannot tell from the first, the one that fits best leads."""
     ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
-    best = ordered[0]
+    tied = [w for w in ordered if w.admissible and w.gains.sum() > 0 and _behind(ordered[0], w) < _TIED]
+    best = max(tied, key=lambda w: abs(w.candidate.z), default=ordered[0])
+    ordered = [best, *(w for w in ordered if w is not best)]
     return [replace(w, candidate=replace(w.candidate, behind=_behind(best, w))) for w in ordered]
 
 

@@ -29,7 +29,7 @@ from measure.loop.statistics import Statistics, statistics
 from measure.observe.trajectory import Floats, Specimen
 from sim.integrate.split import SplitEuler
 
-_BATCH = 16
+BATCH = 16
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
@@ -63,11 +63,11 @@ def prior_batch(
     damping = (_DAMPING[0], 1e-3 if gentle else _DAMPING[1])
     calibrations = tuple(
         Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, damping))
-        for _ in range(_BATCH)
+        for _ in range(BATCH)
     )
     return NullBatch(
         specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=calibrations,
-        speeds=tuple(float(u) for u in rng.uniform(*speeds, _BATCH)), seed=child_seed(seed, "null", "batch"),
+        speeds=tuple(float(u) for u in rng.uniform(*speeds, BATCH)), seed=child_seed(seed, "null", "batch"),
     )  # fmt: skip
 
 

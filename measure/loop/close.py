@@ -6,6 +6,7 @@ library's effects, judge, and run the chosen model again on what it was not fitt
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +34,7 @@ from measure.loop.reference import NullBank, Reference
 from measure.loop.refine import Refined, refine
 from measure.loop.residuals import residuals
 from measure.loop.statistics import statistics
-from measure.loop.verdict import Candidate, Comparison, NullTest, Parameter, Verdict
+from measure.loop.verdict import Candidate, Comparison, Conclusion, NullTest, Parameter, Verdict
 from measure.loop.words import assumptions, proposal, sentence, separating
 from measure.observe.trajectory import Experiment, Trajectory
 from sim.integrate.split import SplitEuler
@@ -45,6 +46,7 @@ Stage = Callable[[str, int, int], object]
 _FLOOR_DURATION = 4.5  # s: two segments of each recording
 _FLOOR_COPIES = 4
 _KINDS = 12
+_PLENTY = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,8 +128,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     bank = _bank(setting, options, tell)
     null = bank.model()
     evidence = Evidence.of(found, setting.speeds[setting.recording], null)
-    counts = [int((setting.recording == index).sum()) for index in range(len(setting.experiment.recordings))]
-    reference = bank.reference(counts, seed=options.seed)
+    reference = bank.reference(len(setting.segments), seed=options.seed)
     judgement = judge(evidence, reference, level=options.level)
     solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
     comparisons = _comparisons(solved, options, tell)
@@ -152,9 +153,15 @@ class Solved:
 
     @cached_property
     def larger(self) -> Refined | None:
-        """With the first effect named; None where none is, or where its course is unknown (gusts)."""
-        named = self.judgement.named[:1]
-        return self._refined(named) if named and named[0] != GUST_COLUMN else None
+        """With the effects that act; None where none does, or where its course is unknown (gusts)."""
+        named = self.acting
+        return self._refined(named) if named and GUST_COLUMN not in named else None
+
+    @property
+    def acting(self) -> tuple[int, ...]:
+        """Columns of the larger model: all effects named as acting, or the first of those that may be."""
+        named = self.judgement.named
+        return named if self.judgement.conclusion is Conclusion.EFFECT else named[:1]
 
     @cached_property
     def control(self) -> tuple[Weighed, Refined] | None:
@@ -182,11 +189,11 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
     batches = [
         banks.prior_batch(
             setting.experiment.specimen, markers=first.markers, rate=first.rate,
-            duration=max(len(r.positions) / r.rate for r in setting.experiment.recordings), noise=first.noise,
+            duration=_null_duration(setting.segments), noise=first.noise,
             speeds=(0.9 * float(setting.speeds.min()), 1.1 * float(setting.speeds.max())),
             seed=child_seed(options.seed, "null", index),
         )
-        for index in range(max(_KINDS, round(options.nulls / 16)))
+        for index in range(max(_KINDS, round(options.nulls / banks.BATCH)))
     ]  # fmt: skip
     done = 0
 
@@ -197,8 +204,15 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
 
     with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
         banks.build(Path(folder), batches, workers=options.workers, progress=count)
-        words = f"{16 * len(batches)} recordings of {len(batches)} meshes and methods, over the priors of the cloth"
+        total = banks.BATCH * len(batches)
+        words = f"{total} recordings of {len(batches)} meshes and methods, over the priors of the cloth"
         return banks.load(Path(folder), words=words)
+
+
+def _null_duration(segments: Segments) -> float:
+    """Of a null recording, so that those of a batch hold more segments than the data [s]."""
+    each = max(2, math.ceil(_PLENTY * len(segments) / banks.BATCH))
+    return (each * round(segments.duration / segments.period) + segments.first + 1) * segments.period
 
 
 def _comparisons(solved: Solved, options: Options, tell: Stage) -> tuple[Comparison, ...]:
@@ -275,10 +289,11 @@ def _ranking(solved: Solved) -> tuple[Candidate, ...]:
     made: list[Candidate] = []
     for weighed in solved.judgement.ranking:
         candidate = weighed.candidate
-        if larger is not None and weighed.column == solved.judgement.named[0]:
-            ((column, coefficient),) = larger.model.effects
+        if larger is not None and weighed.column in solved.acting:
+            place = solved.acting.index(weighed.column)
+            column, coefficient = larger.model.effects[place]
             linear = solved.evidence.fit([weighed.column]).of(weighed.column)[1]
-            error = larger.errors[-1] * weighed.error / linear
+            error = larger.errors[len(THETA) + place] * weighed.error / linear
             candidate = replace(candidate, strength=estimate(column.described.null + coefficient, error, column.unit))
         made.append(candidate)
     return tuple(made)

@@ -254,9 +254,12 @@ class Fluctuation:
     likelihood: float
 
 
-def fluctuation(evidence: Evidence, column: int) -> Fluctuation:
-    """How much a column's coefficient fluctuates, beside the nuisances; errors are taken as large as this set's are."""
-    score, curvature = _beside(evidence, column, scaled=True)
+def fluctuation(evidence: Evidence, column: int, beside: Chosen = ()) -> Fluctuation:
+    """How much a column's coefficient fluctuates, beside the nuisances and some columns more.
+
+    Errors are taken to be as large as this set's are.
+    """
+    score, curvature = _beside(evidence, column, beside)
     grid: Floats = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
     likelihood = _fluctuating(grid[:, None], score, curvature).sum(axis=1)
     best = int(np.argmax(likelihood))
@@ -285,13 +288,13 @@ def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
     return result
 
 
-def _beside(evidence: Evidence, column: int, *, scaled: bool) -> tuple[Floats, Floats]:
-    """(segment,) score and curvature of a column beside the fitted nuisances."""
-    fit = evidence.fit(())
+def _beside(evidence: Evidence, column: int, beside: Chosen) -> tuple[Floats, Floats]:
+    """(segment,) score and curvature of a column beside fitted ones, in units of what those leave."""
+    fit = evidence.fit(beside)
     active = list(fit.active)
     score = evidence.score[:, column] - evidence.curvature[:, column][:, active] @ fit.value
     curvature = evidence.curvature[:, column, column]
-    size = fit.left / (len(score) * evidence.columns) if scaled else 1.0
+    size = fit.left / (len(score) * evidence.columns)
     return score / size, curvature / size
 
 

@@ -53,8 +53,12 @@ class NullBank:
         """Learnt from all."""
         return NullModel.fit(self.nulls)
 
-    def reference(self, segments: Sequence[int], *, seed: int) -> Reference:
-        """Statistics of groups like the data: so many recordings, of so many segments each, of one kind of numerics."""
+    def reference(self, segments: int, *, seed: int) -> Reference:
+        """Statistics of groups like the data: so many segments, of recordings of one kind of numerics.
+
+        Raises:
+            InputError: no kind has that many.
+        """
         rng = stream(seed, "null", "groups")
         shares: list[Floats] = []
         left: list[float] = []
@@ -73,9 +77,13 @@ class NullBank:
             ]
             for _ in range(_GROUPS // 2):
                 own = places[rng.integers(len(places))]
-                group = rng.choice(len(own), size=len(segments), replace=len(segments) > len(own))
-                chosen = [rng.permutation(np.resize(own[g], n)) for g, n in zip(group, segments, strict=True)]
-                picked = evidence.select(np.concatenate(chosen))
+                chosen = np.concatenate([own[index] for index in rng.permutation(len(own))])[:segments]
+                if len(chosen) < segments:
+                    raise InputError(
+                        f"{segments} segments of data against {len(chosen)} nulls of one kind", where="null bank",
+                        fix="simulate longer nulls, or give shorter recordings",
+                    )  # fmt: skip
+                picked = evidence.select(chosen)
                 shares.append(unscaled(picked, self.columns))
                 left.append(picked.fit(()).left)
         spread = np.maximum(np.mean(shares, axis=0), _NOTHING)
@@ -105,9 +113,9 @@ class Reference:
         """(group,) the largest statistic of all columns."""
         return (self.shares / self.spread).max(axis=1)
 
-    def statistics(self, evidence: Evidence, columns: tuple[str, ...]) -> Floats:
-        """(column,) of data, gusts the last."""
-        return unscaled(evidence, columns) / self.spread
+    def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
+        """(column,) of data, gusts the last, where some columns are fitted already."""
+        return unscaled(evidence, columns, beside) / self.spread
 
     def p_family(self, statistic: float) -> float:
         """Share of the groups whose largest statistic is at least this one."""
@@ -130,10 +138,14 @@ _NOTHING = 1e-6
 """Mean share below which a column is never seen: that of the columns that are always fitted."""
 
 
-def unscaled(evidence: Evidence, columns: tuple[str, ...]) -> Floats:
-    """Of some segments: each column's drop over what is left with it, and the likelihood ratio of gusts."""
-    drops, left = evidence.drops(), evidence.fit(()).left
-    gusts = fluctuation(evidence, columns.index(GUSTS)).likelihood
+def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
+    """Of some segments: each column's drop over what is left with it, and the likelihood ratio of gusts.
+
+    Args:
+        beside: columns that are fitted already.
+    """
+    drops, left = evidence.drops(beside), evidence.fit(beside).left
+    gusts = fluctuation(evidence, columns.index(GUSTS), beside).likelihood
     return np.append(drops / np.maximum(left - drops, 1e-9), max(gusts, 0.0))
 
 

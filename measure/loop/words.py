@@ -34,12 +34,11 @@ def sentence(verdict: Verdict) -> str:
     rejected = f"The base model is rejected ({test})."
     if verdict.conclusion is Conclusion.OUTSIDE:
         return f"{rejected} No effect of the library explains what it lacks."
-    best = next(c for c in verdict.ranking if c.effect in verdict.named)
-    found = f"{best.effect}, {best.parameter} {_interval(best.strength)}"
+    found = " and ".join(f"{c.effect}, {c.parameter} {_interval(c.strength)}" for c in verdict.ranking if not c.why_not)
     if verdict.conclusion is Conclusion.ONE_OF:
         return (
             f"{rejected} One of {', '.join(verdict.named)} explains it; they predict unseen recordings equally well. "
-            f"The first of them would be {found}."
+            f"They would be: {found}."
         )
     if verdict.conclusion is Conclusion.PARTLY:
         return f"{rejected} It is partly explained by {found}; what is left is more than nulls leave."
