@@ -88,7 +88,7 @@ def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[NDArray[np.fl
     end = (time.total - 1) / time.rate
     begin = 0.0 if changing(crew.recipe) else time.settling / time.rate - spec.before
     count = math.floor((end - begin) * _FINE + 1e-9) + 1
-    times = begin + np.arange(count) / _FINE
+    times = np.maximum(end - np.arange(count)[::-1] / _FINE, begin)
     if not changing(crew.recipe):
         return times, np.tile(np.array(member.scene.wind, dtype=np.float64), (count, 1))
     system, _ = crew.assemble([member])

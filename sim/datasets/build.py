@@ -16,6 +16,7 @@ from typing import TypeAlias
 from distributed import Client
 
 from flagdata.dataset.clips import clip_rows
+from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.meshes import read_meshes
 from flagdata.record import Record
@@ -25,7 +26,7 @@ from sim.datasets.cast import Cast, Roll, casts
 from sim.datasets.cluster import Job, results
 from sim.datasets.films import Film, Sequences
 from sim.datasets.jobs import Filmed, Simulated
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.recipe import DatasetRecipe, side_filter
 from sim.run.publish import publish
 
 COMMIT_FILMS = 32
@@ -80,6 +81,7 @@ class Build:
         """Make what is missing.
 
         Raises:
+            ConflictError: the branch has films of this name by another recipe.
             RefusedError: too many sequences fail.
             WorkerError: workers kept dying.
             FlagdataError: a renderer, an asset or the disk failed.
@@ -151,6 +153,7 @@ class Build:
     def _film(self, rolls: Iterable[Roll]) -> list[Film]:
         films = self.films(rolls)
         frames = self.recipe.simulation.time.frames
+        self._refuse_mixture({film.artifact(frames=frames).id for film in films})
         known = self._known()
         missing = [film for film in films if film.artifact(frames=frames).id not in known]
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
@@ -167,6 +170,17 @@ class Build:
                 self._commit(waiting)
                 advance(len(waiting))
         return films
+
+    def _refuse_mixture(self, own: set[str]) -> None:
+        """Make sure that what bears the data set's name is of this recipe: its sides are told by names."""
+        for side in self.recipe.sides:
+            where = f"kind = 'recording' and {side_filter(self.recipe, side.name)}"
+            others = set(self.lake.rows(where, at=self.branch, columns=["artifact"])["artifact"].to_pylist()) - own
+            if others:
+                raise ConflictError(
+                    f"{len(others)} recordings called {self.recipe.name}-{side.name}-… are of another recipe",
+                    where=f"branch {self.branch}", fix="give the recipe another name, or build on another branch",
+                )  # fmt: skip
 
     def _shots(self, films: Sequence[Film]) -> Iterator[Job]:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()

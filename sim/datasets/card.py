@@ -21,7 +21,7 @@ from flagdata.lake import Lake
 from flagdata.provenance import canonical, code_version
 from flagdata.record import Record
 from flagdata.rng import stream
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.recipe import DatasetRecipe, side_filter
 
 _SHOWN = 24  # pictures of the contact sheet
 _COLUMNS = 6
@@ -45,11 +45,6 @@ class Distribution:
     middle: float
     high: float
     counts: list[int] | None
-
-
-def side_filter(recipe: DatasetRecipe, side: str) -> str:
-    """SQL over the catalog that takes one side: `ExplicitSplit(where={side: side_filter(recipe, side), …})`."""
-    return f"name like '{recipe.name}-{side}-%'"
 
 
 def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None) -> Path:

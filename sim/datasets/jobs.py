@@ -1,6 +1,7 @@
 """What workers do: pure functions from a recipe and a number to bytes. Workers know no lake and keep no state.
 
-Renderers and crews are kept from one job to the next, since they take time to make; they change no result.
+Renderers and crews are kept from one job to the next, since they take time to make; they change no result. Torch is
+left on one thread for good, since the last bits of its sums depend on how many it has.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from sim.datasets.record import Content, parameters_of, record_bytes, texts_of
 from sim.render import RENDERERS, Meshes, RenderParameters
 from sim.run.batch import Outcome, Stepper, run
 from sim.run.members import Crew
-from sim.run.publish import one_thread
 from sim.run.recipe import Recipe as Simulation
 from sim.run.recipe import Shape
 
@@ -65,12 +65,12 @@ class Filmed:
 
 def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: str) -> Simulated:
     """Simulate members of one material of a recipe together."""
+    torch.set_num_threads(1)
     crew, steppers = _crew(simulation)
-    with one_thread():
-        if base not in steppers:
-            steppers[base] = Stepper.of(crew, base)
-        members = [crew.member(index) for index in indices]
-        outcomes = run(crew, steppers[base], members, size=simulation.batch, device=device)
+    if base not in steppers:
+        steppers[base] = Stepper.of(crew, base)
+    members = [crew.member(index) for index in indices]
+    outcomes = run(crew, steppers[base], members, size=simulation.batch, device=device)
     return Simulated(name=simulation.name, outcomes=tuple(outcomes), step=steppers[base].step)
 
 
@@ -80,6 +80,7 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
     Raises:
         FlagdataError: a renderer that is not installed or fails, or an asset that is not there.
     """
+    torch.set_num_threads(1)
     assets = Assets(photos=recipe.photos)
     zeta = recipe.prior.draw(job.look, assets)
     crew, _ = _crew(job.cast.simulation)
@@ -111,7 +112,7 @@ def shot(
         member = _crew(simulation)[0].member(job.index)
         toward = member.parameters["wind_toward"]
         meshes = Meshes.flag(sequence, heading=float(toward) if isinstance(toward, float) else 0.0, device=device)
-    with one_thread(), torch.no_grad():
+    with torch.no_grad():
         return _renderer(recipe.renderer, assets).render(meshes, zeta)
 
 

@@ -21,6 +21,7 @@ from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
 from sim.datasets.films import Sequences
 from sim.datasets.recipe import DatasetRecipe
+from sim.run.publish import one_thread
 
 T = TypeVar("T")
 _FEW, _MORE = 3, 9  # frames of the two runs between which costs are linear
@@ -120,9 +121,10 @@ def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
     few, more = (_shortened(cast, frames) for frames in (_FEW, _MORE))
     whole = cast.simulation.time
     bases = range(len(cast.simulation.material.bases))
-    runs = [(_simulated(few, base, device), _simulated(more, base, device)) for base in bases]
+    with one_thread():
+        runs = [(_simulated(few, base, device), _simulated(more, base, device)) for base in bases]
+        films = [_filmed(recipe, short, run, device) for short, run in zip((few, more), runs[0], strict=True)]
     sequences = [_line(a.seconds, b.seconds, whole.total) for a, b in runs]
-    films = [_filmed(recipe, short, run, device) for short, run in zip((few, more), runs[0], strict=True)]
     return Rates(
         sequence_seconds=sum(sequences) / len(sequences),
         film_seconds=_line(films[0][0], films[1][0], whole.frames),

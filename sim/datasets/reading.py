@@ -95,14 +95,16 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
 
 
 def with_renderer(recipe: DatasetRecipe, renderer: str) -> DatasetRecipe:
-    """The recipe with another renderer.
+    """The recipe with another renderer, which is another data set and has another name.
 
     Raises:
         UnknownNameError: no renderer of that name.
     """
     if renderer not in RENDERERS:
         raise UnknownNameError.of("renderer", renderer, RENDERERS, where="--renderer")
-    return replace(recipe, renderer=renderer)
+    if renderer == recipe.renderer:
+        return recipe
+    return replace(recipe, renderer=renderer, name=f"{recipe.name}-{renderer}")
 
 
 def _simulation(table: Table, folder: Path) -> Simulation:

@@ -166,6 +166,11 @@ class DatasetRecipe:
         return recipe_hash(self.identity())
 
 
+def side_filter(recipe: DatasetRecipe, side: str) -> str:
+    """SQL over the catalog that takes one side: `ExplicitSplit(where={side: side_filter(recipe, side), …})`."""
+    return f"name like '{recipe.name}-{side}-%'"
+
+
 @cache
 def _content(folder: Path) -> str:
     """SHA-256 of the names and bytes of a folder's photographs."""

@@ -13,7 +13,9 @@ from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.assets import Assets
@@ -75,9 +77,11 @@ class Cycles:
         setup = self._scene(placed, parameters, pictures)
         timeout = _LEAST_TIMEOUT + _SLOWEST * parameters.width * parameters.height * parameters.cycles_samples
         self.worker.request([setup], timeout=timeout)
-        answers = self.worker.request(list(_frames(meshes, placed, parameters, pictures)), timeout=timeout, setup=setup)
-        light = torch.stack([torch.from_numpy(answer.arrays["rgba"].copy()) for answer in answers])
-        scene = light.unflatten(0, (pictures, len(meshes))).mean(0)
+        frames: list[NDArray[np.float32]] = []
+        for messages in _frames(meshes, placed, parameters, pictures):
+            answers = self.worker.request(messages, timeout=timeout, setup=setup)
+            frames.append(np.mean([answer.arrays["rgba"] for answer in answers], axis=0))
+        scene = torch.from_numpy(np.stack(frames))
         behind = torch.from_numpy(plate(self._assets.background(parameters.background), parameters))
         return develop(scene, behind, gain=parameters.gain).to(meshes.device)
 
@@ -113,29 +117,27 @@ class Workbench(Cycles):
     ENGINE = "BLENDER_WORKBENCH"
 
 
-def _frames(meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int) -> Iterator[Message]:
-    """All frames at the first instant of their exposure, then all at the next."""
+def _frames(meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int) -> Iterator[list[Message]]:
+    """The pictures of each frame: the meshes at instants that share out its exposure."""
     shift = torch.tensor(placed.shift, dtype=torch.float32)
     pole = {
         "positions/pole": placed.pole_positions.cpu().numpy(),
         "faces/pole": placed.pole_faces.cpu().int().numpy(),
         "uv/pole": torch.zeros(len(placed.pole_positions), 2).numpy(),
     }
-    for picture in range(pictures):
-        offset = zeta.exposure_time * ((picture + 0.5) / pictures - 0.5)
-        instant = moved(meshes, offset)
-        for index in range(len(meshes)):
+    instants = [moved(meshes, zeta.exposure_time * ((k + 0.5) / pictures - 0.5)) for k in range(pictures)]
+    for index in range(len(meshes)):
+        messages: list[Message] = []
+        for picture, instant in enumerate(instants):
             frame = instant.frame(index)
-            yield Message(
-                kind="frame",
-                fields={"seed": picture * len(meshes) + index},
-                arrays={
-                    "positions/cloth": (frame.positions.cpu() + shift).numpy(),
-                    "faces/cloth": frame.faces.cpu().int().numpy(),
-                    "uv/cloth": frame.uv.cpu().numpy(),
-                    **pole,
-                },
-            )
+            cloth = {
+                "positions/cloth": (frame.positions.cpu() + shift).numpy(),
+                "faces/cloth": frame.faces.cpu().int().numpy(),
+                "uv/cloth": frame.uv.cpu().numpy(),
+            }
+            seed = picture * len(meshes) + index
+            messages.append(Message(kind="frame", fields={"seed": seed}, arrays={**cloth, **pole}))
+        yield messages
 
 
 def _camera(camera: Camera) -> dict[str, Any]:

@@ -125,3 +125,16 @@ def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRe
     for name in ("wind_speed", "density", "camera_radius", "anemometer-lag.distance", "flag/"):
         assert name in text
     assert "<td>train</td><td>4</td><td>–</td><td>11</td><td>11</td>" in text
+
+
+def test_two_recipes_of_one_name_are_not_mixed(recipe_file: Path, builds: Any, built: Path, tmp_path: Path) -> None:
+    # The sides are told by names: a changed recipe must have another name, or a branch of its own.
+    (tmp_path / "scene.toml").write_text((recipe_file.parent / "scene.toml").read_text())
+    changed = tmp_path / "tiny.toml"
+    changed.write_text(recipe_file.read_text().replace("read-noise = 1.0", "read-noise = 2.0"))
+    before = builds.rows(built)
+    process = builds.start(changed, built)
+    said = process.communicate(timeout=300)[1].decode()
+    assert process.returncode == 1
+    assert "are of another recipe" in said
+    assert builds.rows(built) == before

@@ -15,6 +15,7 @@ from sim.datasets import jobs
 from sim.datasets.cast import Roll, casts
 from sim.datasets.films import Sequences
 from sim.datasets.recipe import DatasetRecipe
+from sim.run.publish import one_thread
 
 SEQUENCES, FILMS = 40, 80
 TARGETS = (
@@ -36,6 +37,11 @@ class Surroundings:
 
 @pytest.fixture(scope="module")
 def around(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
+    with one_thread():
+        return films(make, tmp_path_factory)
+
+
+def films(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
     recipe = make({"sequences = 4\nrenders = 11": f"sequences = {SEQUENCES}\nrenders = {FILMS}"})
     cast = next(casts(recipe))
     roll = Roll(cast=cast)
