@@ -126,6 +126,8 @@ class Kind(StrEnum):
     """Consecutive frames of a recording with their ground truth; a slice of the recording's object."""
     MESHES = "meshes"
     """A mesh sequence; a Zarr object."""
+    MARKERS = "markers"
+    """Tracked points of a cloth; a Zarr object."""
     MODEL = "model"
     MEASUREMENT = "measurement"
 

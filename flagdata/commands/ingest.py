@@ -1,4 +1,4 @@
-"""`flagdata ingest`: camera files, anemometer logs and mesh sequences into the lake, or a look at what a file is."""
+"""`flagdata ingest`: camera files, anemometer logs, meshes and markers into the lake, or a look at what a file is."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import click
 from click.core import ParameterSource
 
-from flagdata.commands.ingest_report import print_result, print_sniffed
+from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, json_option, lake_option, progress, say
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
+    from flagdata.ingest.markers import MarkerOptions
     from flagdata.ingest.meshes.store import MeshIngest
     from flagdata.ingest.store import CameraIngest, IngestResult, Labels, WindIngest
     from flagdata.lake import Lake
@@ -28,11 +29,13 @@ Done = TypeVar("Done")
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
 CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "zero_offset", "encoding")
-MESHES_ONLY = ("unit",)
+LENGTHS = ("unit",)
+"""Of meshes and markers."""
 FOREIGN = {
-    "camera": ("a camera file", (*WIND_ONLY, *MESHES_ONLY)),
-    "anemometer": ("an anemometer log", (*CAMERA_ONLY, *MESHES_ONLY, "rate")),
+    "camera": ("a camera file", (*WIND_ONLY, *LENGTHS)),
+    "anemometer": ("an anemometer log", (*CAMERA_ONLY, *LENGTHS, "rate")),
     "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
+    "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
 }
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = ("sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture")
@@ -46,6 +49,7 @@ class _Given:
     camera: CameraIngest
     wind: WindIngest
     meshes: MeshIngest
+    markers: MarkerOptions
     labels: Labels
     branch: str
     crop_picture: Path | None
@@ -60,7 +64,7 @@ class _Given:
     "--format",
     "format_name",
     metavar="FORMAT",
-    help="camera, meshes, or an anemometer format; by content if not given.",
+    help="camera, meshes, markers, or an anemometer format; by content if not given.",
 )
 @click.option("--session", metavar="NAME", help="One set-up at one place; splits never cut through it.")
 @click.option("--name", help="What people call the artifact; the file's name by default.")
@@ -71,7 +75,7 @@ class _Given:
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(
     "--rate", default="25", show_default=True, metavar="HZ|native",
-    help="Camera: frames a second to keep. Meshes: frames a second there are, by default as conf.json says.",
+    help="Camera: frames a second to keep. Meshes, markers: frames a second there are, by default as the source says.",
 )  # fmt: skip
 @click.option(
     "--crop", default="whole", show_default=True, metavar="BOX",
@@ -100,7 +104,7 @@ class _Given:
 )
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
-@click.option("--unit", default="m", show_default=True, metavar="UNIT", help="Meshes: of the vertices' positions.")
+@click.option("--unit", default="m", show_default=True, metavar="UNIT", help="Meshes, markers: of positions in space.")
 @json_option
 @lake_option
 @click.pass_context
@@ -133,10 +137,11 @@ def ingest(
     as_json: bool,
     lake_path: str,
 ) -> None:
-    """Bring camera files, anemometer logs and mesh sequences in.
+    """Bring camera files, anemometer logs, mesh sequences and marker tables in.
 
-    Whether a SOURCE is a camera's, an anemometer's or a folder of meshes is decided by its content, and an option goes
-    to the sources of its kind. Each is one commit: what fails leaves the lake as it was, and the others go on.
+    Whether a SOURCE is a camera's, an anemometer's, a folder of meshes or a table of markers is decided by its content,
+    and an option goes to the sources of its kind. Each is one commit: what fails leaves the lake as it was, and the
+    others go on.
 
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
@@ -160,11 +165,12 @@ def ingest(
             exposure=exposure, archive=archive,
         ),
         wind=_wind_options(
-            format_name=None if format_name in ("camera", "meshes") else format_name, sensor=sensor, zone_name=zone,
-            date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
+            format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
+            zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
             zero_offset=zero_offset, encoding=encoding,
         ),
         meshes=_mesh_options(rate=rate if "rate" in given else None, length=unit),
+        markers=_marker_options(rate=rate if "rate" in given else None, length=unit),
         labels=_labels(name, session),
         branch=branch,
         crop_picture=crop_picture,
@@ -267,6 +273,14 @@ def _mesh_options(*, rate: str | None, length: str) -> MeshIngest:
     return MeshIngest(rate=_number(rate, "--rate", "frames a second"), unit=length)
 
 
+def _marker_options(*, rate: str | None, length: str) -> MarkerOptions:
+    from flagdata.ingest.markers import MarkerOptions
+
+    if rate is None or rate.strip().lower() == "native":
+        return MarkerOptions(unit=length)
+    return MarkerOptions(rate=_number(rate, "--rate", "frames a second"), unit=length)
+
+
 def _number(text: str, option: str, wanted: str) -> float:
     try:
         return float(text)
@@ -295,14 +309,14 @@ def _ingest(
     kinds = _told(sources, lambda source: classify(source, format_name=format_name, recipe=recipe))
     _check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
     results, failures = _each(
-        sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_result, as_json=as_json
+        sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_results, as_json=as_json
     )
     if as_json:
         document(
             "ingest",
             {
                 "lake": str(lake.path),
-                "results": [result.as_dict() for result in results],
+                "results": [result.as_dict() for of_source in results for result in of_source],
                 "failures": _failures(failures),
             },
         )
@@ -383,18 +397,25 @@ def _check_applies(kinds: Sequence[str | None], options: _Given, *, given: froze
             )
 
 
-def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:
+def _one(lake: Lake, source: Path, kind: Guess, options: _Given) -> tuple[IngestResult, ...]:
+    """Artifacts of a source: of a table of markers one a recording, of any other one."""
+    from flagdata.ingest.markers.store import ingest_markers
     from flagdata.ingest.store import ingest_camera, ingest_wind
 
+    if kind.kind == "markers":
+        return ingest_markers(
+            lake, source, options.markers, labels=options.labels, branch=options.branch, reasons=kind.reasons
+        )
     if kind.kind == "meshes":
-        return _meshes(lake, source, kind, options)
+        return (_meshes(lake, source, kind, options),)
     if kind.kind != "camera":
-        return ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch)
+        return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
-        return ingest_camera(
+        result = ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
             progress=advance, crop_picture=picture.write if options.crop_picture else None,
         )  # fmt: skip
+    return (result,)
 
 
 def _meshes(lake: Lake, source: Path, kind: Guess, options: _Given) -> IngestResult:

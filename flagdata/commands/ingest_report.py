@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,8 +11,13 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import IngestResult
 
 
-def print_result(result: IngestResult) -> None:
-    """One ingest for people, on stdout."""
+def print_results(results: Sequence[IngestResult]) -> None:
+    """What one source became, for people, on stdout."""
+    for result in results:
+        _print_result(result)
+
+
+def _print_result(result: IngestResult) -> None:
     artifact, report = result.artifact, result.report
     if not result.created:
         click.echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
@@ -27,6 +32,8 @@ def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     lines += [("why", reason) for reason in report["reasons"]]
     if report["kind"] == "meshes":
         lines += _mesh_lines(report)
+    elif report["kind"] == "markers":
+        lines += _marker_lines(report)
     else:
         lines += _device_lines(report)
     for finding in report["findings"]:
@@ -44,6 +51,14 @@ def _mesh_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("time", f"{report['first']:.3f} to {report['first'] + report['span']:.3f} s of the simulation"),
         ("frames", f"{report['frames']} at {rate}"),
         ("mesh", f"{vertices} vertices, {faces} faces, {report['topology']} topology"),
+    ]
+
+
+def _marker_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    rate = "–" if report["rate"] is None else f"{report['rate']:.6g} Hz"
+    return [
+        ("frames", f"{report['frames']} at {rate}, over {report['span']:.3f} s"),
+        ("markers", f"{report['markers']}, {report['tracked']} positions tracked"),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Whether a source is a camera's, an anemometer's or a mesh sequence, by its content and never by its name alone."""
+"""Whether a source is a camera's, an anemometer's, a mesh sequence or a table of markers, by its content."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from flagdata.errors import FlagdataError, InputError, UnknownNameError
 from flagdata.ingest.anemometer import Guess, sniff
 from flagdata.ingest.anemometer.formats import FORMATS
 from flagdata.ingest.camera import CameraProbe, probe
+from flagdata.ingest.markers import COLUMNS, is_marker_table
 
 CAMERA = "camera"
 MESHES = "meshes"
+MARKERS = "markers"
 
 
 def guesses(path: Path) -> tuple[Guess, ...]:
@@ -21,6 +23,9 @@ def guesses(path: Path) -> tuple[Guess, ...]:
         InputError: it is empty, or a pipe or device, which has no content to go by.
     """
     _check_plain(path)
+    if path.is_file() and is_marker_table(path):
+        reason = f"its columns are {', '.join(COLUMNS)} and more"
+        return (Guess(format="marker table", score=0.99, reasons=(reason,), kind="markers"),)
     found = sniff(path)
     if found[0].kind != "other":
         return found
@@ -32,11 +37,12 @@ def guesses(path: Path) -> tuple[Guess, ...]:
 
 
 def classify(path: Path, *, format_name: str | None = None, recipe: str | None = None) -> Guess:
-    """What a source is to be ingested as: a guess whose kind is "camera", "anemometer" or "meshes".
+    """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes" or "markers".
 
     Args:
-        format_name: the user's word for it: "camera", "meshes" or an anemometer format; goes before the content.
-        recipe: a sensor recipe the user named, for any source that is neither a camera's nor meshes by its content.
+        format_name: the user's word for it: "camera", "meshes", "markers" or an anemometer format; goes before the
+            content.
+        recipe: a sensor recipe the user named, for any source that is no camera's, meshes or markers by its content.
 
     Raises:
         InputError: something else (one mesh, a record, an archive), with what to do.
@@ -48,18 +54,21 @@ def classify(path: Path, *, format_name: str | None = None, recipe: str | None =
         return Guess(format="video", score=1.0, reasons=("it was said to be a camera's",), kind="camera")
     if format_name == MESHES:
         return Guess(format="mesh folder", score=1.0, reasons=("it was said to be meshes",), kind="meshes")
+    if format_name == MARKERS:
+        return Guess(format="marker table", score=1.0, reasons=("it was said to be markers",), kind="markers")
     if format_name is not None:
         if format_name not in FORMATS:
-            raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, *FORMATS], where="--as")
+            raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, MARKERS, *FORMATS], where="--as")
         return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
     best = guesses(path)[0]
-    by_content = best.kind == CAMERA or (best.kind == MESHES and path.is_dir())
+    by_content = best.kind in (CAMERA, MARKERS) or (best.kind == MESHES and path.is_dir())
     if recipe is not None and not by_content:
         return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
     if by_content or best.kind == "anemometer":
         return best
     raise InputError(
-        f"neither a camera file nor an anemometer log nor a folder of meshes: {'; '.join(best.reasons)}",
+        "neither a camera file nor an anemometer log nor a folder of meshes nor a marker table: "
+        f"{'; '.join(best.reasons)}",
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )

@@ -161,15 +161,15 @@ def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> Non
         "attributes": dict(sequence.attributes),
     }
     group.update_attributes(json.loads(canonical(attributes)))
-    _write(group, "time", sequence.time, ("time",))
+    write_array(group, "time", sequence.time, ("time",))
     if ragged:
-        _write(group, "positions", sequence.positions, ("vertex", "xyz"))
-        _write(group, "vertex_offset", sequence.vertex_offset, ("edge",))
-        _write(group, "face_offset", sequence.face_offset, ("edge",))
+        write_array(group, "positions", sequence.positions, ("vertex", "xyz"))
+        write_array(group, "vertex_offset", sequence.vertex_offset, ("edge",))
+        write_array(group, "face_offset", sequence.face_offset, ("edge",))
     else:
-        _write(group, "positions", sequence.positions, CHANNELS["positions"].dims)
-    _write(group, "faces", sequence.faces, CHANNELS["faces"].dims)
-    _write(group, "rest", sequence.rest, CHANNELS["rest"].dims)
+        write_array(group, "positions", sequence.positions, CHANNELS["positions"].dims)
+    write_array(group, "faces", sequence.faces, CHANNELS["faces"].dims)
+    write_array(group, "rest", sequence.rest, CHANNELS["rest"].dims)
 
 
 def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> MeshSequence | RaggedMeshSequence:
@@ -267,7 +267,8 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
 }
 
 
-def _write(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...]) -> None:
+def write_array(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...]) -> None:
+    """Write an array of a moving mesh or of markers into a Zarr group: chunked by its first axis, with its units."""
     from zarr.codecs import BloscCodec, TransposeCodec
 
     rows = max(1, len(values))

@@ -100,7 +100,7 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
             *frames.lost_frames(filled.positions, where=where),
         ),
     )  # fmt: skip
-    seen = replace(seen, noise=_noise(seen))
+    seen = replace(seen, noise=_noise(seen) if filled.findings else sigma)
     frames.check_motion(filled.positions, seen.noise or 0.0, float(np.ptp(corners, axis=0).max()), where=where)
     return seen
 

@@ -45,8 +45,8 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
         return (
             Finding(
                 kind="pins-not-observed", severity=Severity.WARNING, where=where, value=away,
-                what=f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its place is "
-                f"guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
+                what=f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its "
+                f"place is guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
                 fix="track a point at each pin",
             ),
         )  # fmt: skip

@@ -45,11 +45,9 @@ def even(seen: Observation) -> Observation:
             fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: less does not tell one effect from another",
         )  # fmt: skip
     step = float(np.median(np.diff(seen.times)))
-    index = np.rint((seen.times - seen.times[0]) / step).astype(np.int64)
-    if (np.diff(index) > 0).all():
-        step = float(np.polyfit(index, seen.times, 1)[0])  # the median of rounded times is a rounded step
-        index = np.rint((seen.times - seen.times[0]) / step).astype(np.int64)
-    off = np.abs(seen.times - seen.times[0] - index * step)
+    index = np.concatenate([[0], np.cumsum(np.rint(np.diff(seen.times) / step).astype(np.int64))])
+    step, first = np.polyfit(index, seen.times, 1).tolist()  # the median of rounded times is a rounded step
+    off = np.abs(seen.times - first - index * step)
     if off.max() > _JITTER * step or (np.diff(index) < 1).any():
         frame = int(off.argmax())
         raise InputError(
@@ -62,16 +60,16 @@ def even(seen: Observation) -> Observation:
     if not lost:
         return replace(seen, times=times)
     longest = int(np.diff(index).max()) - 1
-    first = int(index[np.argmax(np.diff(index) > 1)]) + 1
+    gap = int(index[np.argmax(np.diff(index) > 1)]) + 1
     if longest > LONGEST:
         raise InputError(
-            f"{longest} frames on end are missing", where=f"{where}, frame {first}",
+            f"{longest} frames on end are missing", where=f"{where}, frame {gap}",
             fix="cut the recording there and give its parts as recordings of their own",
         )  # fmt: skip
     positions = np.full((len(times), *seen.positions.shape[1:]), np.nan)
     positions[index] = seen.positions
     found = Finding(
-        kind="frames-missing", severity=Severity.WARNING, where=f"{where}, frame {first}", count=lost,
+        kind="frames-missing", severity=Severity.WARNING, where=f"{where}, frame {gap}", count=lost,
         what=f"{lost} frames are missing between others and are interpolated",
     )  # fmt: skip
     return replace(seen, times=times, positions=positions, findings=(*seen.findings, found))

@@ -1,0 +1,102 @@
+"""From a marker table to artifacts of the lake, one a recording, in one commit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.ingest.markers.table import MarkerOptions, read_table
+from flagdata.ingest.source import Source
+from flagdata.ingest.store import REPORT_SCHEMA, IngestResult, Labels, find, result_of
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.markers import MarkerSequence, write_markers
+from flagdata.schema import Kind
+from flagdata.timebase import NANOSECONDS
+
+
+def ingest_markers(
+    lake: Lake,
+    path: Path,
+    options: MarkerOptions | None = None,
+    *,
+    labels: Labels | None = None,
+    branch: str = "main",
+    reasons: Sequence[str] = (),
+) -> tuple[IngestResult, ...]:
+    """Ingest a table of tracked points.
+
+    Args:
+        labels: of a table with several recordings the name goes before theirs.
+        reasons: why the file is taken to be markers, for the report.
+
+    Raises:
+        FlagdataError: as `read_table`; the lake is unchanged.
+        ConflictError: the file changed while it was read, or is in the lake under other labels.
+    """
+    options, labels = options or MarkerOptions(), labels or Labels()
+    source = Source.of(path)
+    recordings = read_table(path, options)
+    source.check_unchanged()
+    named: dict[str, Labels] = {}
+    made: dict[str, tuple[Artifact, dict[str, Any]]] = {}
+    present: dict[str, IngestResult] = {}
+    with lake.transaction(f"ingest markers {source.name}", branch=branch) as transaction:
+        for name, sequence in recordings.items():
+            stem = labels.name or source.stem
+            named[name] = Labels(name=f"{stem} {name}".strip(), session=labels.session)
+            recipe = {"ingest": "markers", "recording": name, **options.recipe()}
+            asked = named[name] if labels.name is not None else Labels(session=labels.session)
+            there = find(lake, Kind.MARKERS, source, recipe, asked, branch=branch)
+            if there is not None:
+                present[name] = there
+                continue
+            found = _findings(sequence)
+            report = _report(sequence, found, reasons)
+            staged = transaction.staging(".zarr")
+            with disk_errors("writing markers", staged):
+                write_markers(staged, sequence)
+            artifact = Artifact(
+                kind=Kind.MARKERS, name=named[name].name or source.stem, object=transaction.put(staged),
+                source_hash=source.hash, source_name=source.name, recipe=recipe, session=labels.session,
+                frame_count=len(sequence.time), rate=report["rate"], quality=quality_flags(found),
+                report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+            )  # fmt: skip
+            transaction.add(artifact)
+            made[name] = (artifact, report)
+    return tuple(
+        present[name] if name in present else result_of(lake, transaction, *made[name], named[name], branch=branch)
+        for name in recordings
+    )
+
+
+def _findings(sequence: MarkerSequence) -> tuple[Finding, ...]:
+    total = len(sequence.time) * len(sequence.names)
+    lost = total - sequence.tracked
+    if not lost:
+        return ()
+    return (
+        Finding(
+            kind="markers-not-tracked", severity=Severity.WARNING, count=lost, value=lost / total,
+            what=f"{lost} of {total} positions were not tracked",
+        ),
+    )  # fmt: skip
+
+
+def _report(sequence: MarkerSequence, found: Sequence[Finding], reasons: Sequence[str]) -> dict[str, Any]:
+    span = int(sequence.time[-1]) / NANOSECONDS
+    return {
+        "schema": REPORT_SCHEMA,
+        "kind": Kind.MARKERS.value,
+        "format": "marker table",
+        "reasons": list(reasons),
+        "frames": len(sequence.time),
+        "span": span,
+        "rate": (len(sequence.time) - 1) / span if span else None,
+        "markers": len(sequence.names),
+        "tracked": sequence.tracked,
+        "findings": [finding.as_dict() for finding in found],
+    }

@@ -1,0 +1,242 @@
+"""Marker tables, CSV or Parquet: one row a marker and frame.
+
+Columns: `marker` (its name), `u`, `v` (where it is on the flat cloth), `x`, `y`, `z` (where it is in space), `frame` (a
+whole number) or `time` [s] or both, and `recording` where a table holds several. A row that is missing, or whose
+position is empty, says that the marker was not tracked. Other columns are refused: a misspelt one would be missed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake.markers import MarkerSequence
+from flagdata.timebase import NANOSECONDS
+from flagdata.units import unit
+
+COLUMNS = ("marker", "u", "v", "x", "y", "z")
+"""Columns that every marker table has, beside `frame` or `time`."""
+_OPTIONAL = ("frame", "time", "recording")
+SIZE_LIMIT = 1 << 31
+"""Largest table that is read [B]."""
+POSITIONS_LIMIT = 50_000_000
+"""Most positions of a recording: frames times markers."""
+_SAME = 1e-6  # of a marker's own u and v: differences that are no difference
+_MAGIC = b"PAR1"
+_DELIMITERS = (",", ";", "\t")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarkerOptions:
+    """What a marker table does not say.
+
+    Attributes:
+        rate: frames a second [Hz], of a table with frame numbers and no times.
+        unit: of x, y and z.
+        rest_unit: of u and v; None for that of x, y and z.
+
+    Raises:
+        UsageError: an impossible rate, or a unit that is no length.
+    """
+
+    rate: float | None = None
+    unit: str = "m"
+    rest_unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.rate is not None and not (math.isfinite(self.rate) and 0 < self.rate <= 1e6):
+            raise UsageError(f"a rate of {self.rate!r} Hz", where="--rate", fix="give frames a second")
+        for name in (self.unit, self.rest_unit or self.unit):
+            if unit(name).si != "m":
+                raise UsageError(f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
+
+    def recipe(self) -> dict[str, Any]:
+        """As JSON."""
+        return {"rate": self.rate, "unit": self.unit, "rest_unit": self.rest_unit}
+
+
+def is_marker_table(path: Path) -> bool:
+    """Whether a file's header is that of a marker table."""
+    try:
+        columns = set(_columns(path))
+    except (InputError, OSError, pa.ArrowException):
+        return False
+    return columns >= set(COLUMNS)
+
+
+def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str, MarkerSequence]:
+    """The recordings of a table by name; one without a column `recording` is called "".
+
+    Args:
+        path: CSV (comma, semicolon or tab; decimal points) or Parquet.
+
+    Raises:
+        NotFoundError: no such file.
+        LimitError: a table too large to be read.
+        InputError: columns or values that are missing or malformed, markers that are told twice in a frame or lie in
+            two places of the cloth.
+        UnknownNameError: a column that is none of these.
+        UsageError: a rate that the table needs, or has no use for.
+    """
+    options = options or MarkerOptions()
+    if not path.is_file():
+        raise NotFoundError("no such file", where=str(path), fix="check the path")
+    if path.stat().st_size > SIZE_LIMIT:
+        raise LimitError(
+            f"a table of {path.stat().st_size} bytes", where=str(path), fix=f"at most {SIZE_LIMIT} are read"
+        )
+    names = _columns(path)
+    _check_columns(names, options, str(path))
+    table = _rows(path, names)
+    if not table.num_rows:
+        raise InputError("no rows", where=str(path), fix="export the table with its tracks")
+    if "recording" not in names:
+        return {"": _sequence(table, options, str(path))}
+    column = table["recording"]
+    if column.null_count:
+        raise InputError("a row without a recording", where=str(path), fix="fill the column, or leave it out")
+    found: dict[str, MarkerSequence] = {}
+    of = column.to_numpy()
+    for name in column.unique().to_pylist():
+        found[name] = _sequence(table.filter(pa.array(of == name)), options, f"{path}, recording {name!r}")
+    return found
+
+
+def _is_parquet(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(len(_MAGIC)) == _MAGIC
+
+
+def _columns(path: Path) -> list[str]:
+    if _is_parquet(path):
+        return list(pyarrow.parquet.read_schema(path).names)
+    with path.open("rb") as stream:
+        line = stream.readline(1 << 16).decode("utf-8-sig", "replace").strip()
+    return [name.strip().strip('"') for name in line.split(_delimiter(line))]
+
+
+def _delimiter(line: str) -> str:
+    return max(_DELIMITERS, key=line.count)
+
+
+def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None:
+    for name in names:
+        if name not in (*COLUMNS, *_OPTIONAL):
+            raise UnknownNameError.of("column", name, [*COLUMNS, *_OPTIONAL], where=where)
+    missing = [name for name in COLUMNS if name not in names]
+    if missing or len(set(names)) < len(names):
+        what = f"columns missing: {', '.join(missing)}" if missing else "a column is there twice"
+        raise InputError(what, where=where, fix=f"give {', '.join(COLUMNS)}, and frame or time")
+    if "time" not in names and "frame" not in names:
+        raise InputError("neither frame nor time", where=where, fix="add the number of the frame, or its time in s")
+    if "time" not in names and options.rate is None:
+        raise UsageError("the table has frame numbers only", where=where, fix="give its rate, in frames a second")
+    if "time" in names and options.rate is not None:
+        raise UsageError("the table has times of its own", where=where, fix="leave the rate out, or the column time")
+
+
+def _rows(path: Path, names: list[str]) -> pa.Table:
+    """The table with its numbers as float64 and its names as text."""
+    texts = ("marker", "recording")
+    wanted = pa.schema([(name, pa.string() if name in texts else pa.float64()) for name in names])
+    try:
+        if _is_parquet(path):
+            return pyarrow.parquet.read_table(path).select(names).cast(wanted)
+        with path.open("rb") as stream:
+            delimiter = _delimiter(stream.readline(1 << 16).decode("utf-8-sig", "replace"))
+        return pyarrow.csv.read_csv(
+            path, read_options=pyarrow.csv.ReadOptions(column_names=names, skip_rows=1),
+            parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),
+            convert_options=pyarrow.csv.ConvertOptions(
+                column_types=wanted, strings_can_be_null=True, null_values=["", "NaN", "nan", "NA"]
+            ),
+        )  # fmt: skip
+    except pa.ArrowException as error:
+        raise InputError(
+            f"not a table of numbers: {str(error).splitlines()[0]}", where=str(path),
+            fix="write numbers with a decimal point, and leave cells empty that have none",
+        ) from None  # fmt: skip
+
+
+def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequence:
+    if table["marker"].null_count:
+        raise InputError("a row without a marker", where=where, fix="name every marker")
+    names, marker = np.unique(table["marker"].to_numpy(), return_inverse=True)
+    instants, frame = _frames(table, options, where)
+    if len(instants) * len(names) > POSITIONS_LIMIT:
+        raise LimitError(
+            f"{len(instants)} frames of {len(names)} markers", where=where,
+            fix=f"give recordings of at most {POSITIONS_LIMIT} positions",
+        )  # fmt: skip
+    seat = frame * len(names) + marker
+    order = np.argsort(seat, kind="stable")
+    twice = np.flatnonzero(np.diff(seat[order]) == 0)
+    if len(twice):
+        row = int(order[twice[0] + 1])
+        raise InputError(
+            f"marker {names[marker[row]]!r} is there twice in a frame", where=f"{where}, row {row + 1}",
+            fix="keep one of them; is a column recording missing?",
+        )  # fmt: skip
+    length, rest_length = unit(options.unit, where=where), unit(options.rest_unit or options.unit, where=where)
+    positions = np.full((len(instants) * len(names), 3), np.nan)
+    positions[seat] = np.stack([length.to_si(_numbers(table, axis)) for axis in "xyz"], axis=1)
+    rest = np.stack([rest_length.to_si(_seats(table, axis, marker, names, where)) for axis in "uv"], axis=1)
+    if np.isinf(positions).any():
+        raise InputError("an infinite coordinate", where=where, fix="leave positions empty that were not tracked")
+    positions[~np.isfinite(positions).all(axis=1)] = np.nan
+    return MarkerSequence(
+        time=instants, positions=positions.reshape(len(instants), len(names), 3), rest=rest,
+        names=tuple(str(name) for name in names), attributes={"source": "marker table"},
+    )  # fmt: skip
+
+
+def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(n,) instants of the frames from 0 [ns], and (row,) the frame each row is of."""
+    column = "time" if "time" in table.column_names else "frame"
+    values = _numbers(table, column)
+    if not np.isfinite(values).all():
+        row = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise InputError(f"a row without {column}", where=f"{where}, row {row + 1}", fix="fill the column")
+    if column == "frame" and (values != np.rint(values)).any():
+        raise InputError("a frame number with decimals", where=where, fix="name the column time, if it is in seconds")
+    seconds = values if options.rate is None else values / options.rate
+    instants, frame = np.unique(np.rint((seconds - seconds.min()) * NANOSECONDS).astype(np.int64), return_inverse=True)
+    return instants, frame.astype(np.int64)
+
+
+def _seats(
+    table: pa.Table, axis: str, marker: NDArray[np.int64], names: NDArray[Any], where: str
+) -> NDArray[np.float64]:
+    """(marker,) the one value of u or v that each marker's rows give."""
+    values = _numbers(table, axis)
+    given = np.isfinite(values)
+    low, high = np.full(len(names), np.inf), np.full(len(names), -np.inf)
+    np.minimum.at(low, marker[given], values[given])
+    np.maximum.at(high, marker[given], values[given])
+    if (low > high).any():
+        lost = names[int(np.flatnonzero(low > high)[0])]
+        raise InputError(
+            f"marker {lost!r} has no {axis}", where=where, fix="say where each marker is on the flat cloth"
+        )
+    moved = high - low > _SAME * max(float(np.ptp(values[given])), 1e-30)
+    if moved.any():
+        strange = int(np.flatnonzero(moved)[0])
+        raise InputError(
+            f"marker {names[strange]!r} has {axis} from {low[strange]:.6g} to {high[strange]:.6g}", where=where,
+            fix="u and v are where it is on the flat cloth, and stay; is a column recording missing?",
+        )  # fmt: skip
+    return low
+
+
+def _numbers(table: pa.Table, column: str) -> NDArray[np.float64]:
+    return table[column].to_numpy(zero_copy_only=False).astype(np.float64)

@@ -1,0 +1,126 @@
+"""Tracked points of a cloth in Zarr v3: write-once folders, beside those of mesh sequences and packed as they are.
+
+A store holds `positions (time, marker, xyz)`, NaN where a point was not tracked, `rest (marker, uv)` and `time`, and in
+its attributes the markers' names and how many positions were tracked: a lost chunk cannot pass for lost markers.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import ConflictError, CorruptError, InputError
+from flagdata.lake.meshes import write_array
+from flagdata.provenance import canonical
+
+MARKERS_FORMAT = 1
+_HEAD = "flagdata_markers"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MarkerSequence:
+    """Tracked points.
+
+    Attributes:
+        time: (n,) int64 nanoseconds since the first frame; strictly increasing, from 0.
+        positions: (n, marker, 3) float64 [m], right-handed; NaN where a point was not tracked.
+        rest: (marker, 2) float64 [m] where the points are on the flat cloth.
+        names: of the markers, each once.
+        attributes: what else is known, JSON values.
+
+    Raises:
+        InputError: shapes that disagree, values that are infinite, rest coordinates that are not finite, time that does
+            not increase, two markers of one name.
+    """
+
+    time: NDArray[np.int64]
+    positions: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    names: tuple[str, ...]
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        frames, markers = len(self.time), len(self.names)
+        if self.positions.shape != (frames, markers, 3) or self.rest.shape != (markers, 2):
+            raise self._wrong(
+                f"{frames} times and {markers} names with positions of shape {self.positions.shape} and rest of shape "
+                f"{self.rest.shape}",
+                "give (time, marker, 3) and (marker, 2)",
+            )
+        if np.isinf(self.positions).any() or not np.isfinite(self.rest).all():
+            raise self._wrong("a coordinate is not finite", "mark points that were lost by NaN; give all u and v")
+        if not frames or self.time[0] != 0 or (np.diff(self.time) <= 0).any():
+            raise self._wrong("time does not increase from 0", "sort the frames, each once")
+        if len(set(self.names)) < markers:
+            raise self._wrong("two markers of one name", "give each its own")
+
+    def _wrong(self, what: str, fix: str) -> InputError:
+        return InputError(what, where="markers", fix=fix)
+
+    @property
+    def tracked(self) -> int:
+        """Positions that are there."""
+        return int(np.isfinite(self.positions).all(axis=2).sum())
+
+
+def write_markers(path: Path, sequence: MarkerSequence) -> None:
+    """Write a sequence as a new Zarr folder; to be put into a lake by `Transaction.put`.
+
+    Raises:
+        ConflictError: something is at `path` already.
+    """
+    import zarr
+
+    if path.exists():
+        raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    attributes = {
+        "Conventions": "CF-1.11",
+        _HEAD: {"format": MARKERS_FORMAT, "tracked": sequence.tracked},
+        "names": list(sequence.names),
+        "attributes": dict(sequence.attributes),
+    }
+    group.update_attributes(json.loads(canonical(attributes)))
+    write_array(group, "time", sequence.time, ("time",))
+    write_array(group, "positions", sequence.positions, ("time", "marker", "xyz"))
+    write_array(group, "rest", sequence.rest, ("marker", "uv"))
+
+
+def read_markers(path: Path) -> MarkerSequence:
+    """A stored sequence.
+
+    Raises:
+        CorruptError: not such a store, damaged, or of a newer format.
+    """
+    import zarr
+
+    restore = "run flagdata verify; ingest the table again or restore it from a copy"
+    try:
+        group = zarr.open_group(path, mode="r", zarr_format=3)
+        head: Any = group.attrs.get(_HEAD)
+        if not isinstance(head, dict):
+            raise CorruptError("a Zarr store, but not of markers", where=str(path), fix="open it with zarr or xarray")
+        if head["format"] > MARKERS_FORMAT:
+            raise CorruptError(
+                f"its format {head['format']} is newer than this flagdata's, {MARKERS_FORMAT}",
+                where=str(path), fix="install the newer flagdata",
+            )  # fmt: skip
+        attributes: Any = group.attrs["attributes"]
+        names: Any = group.attrs["names"]
+        time, positions, rest = (np.asarray(group[name][...]) for name in ("time", "positions", "rest"))  # type: ignore[index]
+        sequence = MarkerSequence(
+            time=time, positions=positions, rest=rest, names=tuple(names), attributes=dict(attributes)
+        )
+    except (InputError, KeyError, ValueError, TypeError, OSError, RuntimeError) as error:
+        raise CorruptError(f"the marker store is damaged: {error}", where=str(path), fix=restore) from error
+    if sequence.tracked != head["tracked"]:
+        raise CorruptError(
+            f"{sequence.tracked} positions, where {head['tracked']} were tracked", where=str(path), fix=restore
+        )
+    return sequence

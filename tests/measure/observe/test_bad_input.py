@@ -1,0 +1,223 @@
+"""What is wrong with a recording is refused or told with its reason; nothing is found in one that is in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError
+from measure.observe import Hold, Observation, Setup, Up, WindTrack, observe, sheet
+from tests.measure.observe.flags import HEIGHT, RATE, SETUP, WIDTH, flag
+
+NOISE = 1e-3
+
+
+@pytest.fixture(scope="module")
+def seen() -> Observation:
+    return replace(flag(noise=NOISE), noise=NOISE)
+
+
+def kinds(seen: Observation, setup: Setup = SETUP) -> set[str]:
+    return {finding.kind for finding in observe([seen], setup).findings}
+
+
+def moved(seen: Observation, change: Callable[[np.ndarray], None]) -> Observation:
+    positions = np.array(seen.positions)
+    change(positions)
+    return replace(seen, positions=positions)
+
+
+def test_nothing_is_found_in_a_recording_that_is_in_order(seen: Observation):
+    assert kinds(seen) == set()
+    assert kinds(replace(seen, noise=None)) == set()
+
+
+@pytest.mark.parametrize(
+    ("factor", "what"),
+    [(1000.0, "mm for m"), (100.0, "cm for m"), (39.37, "inches for m"), (0.85, "rest shape does not fit")],
+)
+def test_a_wrong_unit_is_named(seen: Observation, factor: float, what: str):
+    with pytest.raises(InputError, match=what):
+        observe([replace(seen, positions=seen.positions * factor)], SETUP)
+
+
+def test_a_rest_shape_that_is_too_short_one_way_is_refused(seen: Observation):
+    shorter = replace(seen, markers=seen.markers * [0.85, 1.0])
+    with pytest.raises(InputError, match="rest shape does not fit"):
+        observe([shorter], replace(SETUP, outline=sheet(0.85 * WIDTH, HEIGHT)))
+
+
+def test_markers_beyond_the_cloth_are_refused(seen: Observation):
+    with pytest.raises(InputError, match="not on the cloth"):
+        observe([seen], replace(SETUP, outline=sheet(0.9 * WIDTH, HEIGHT)))
+
+
+def test_pins_where_the_cloth_moves_are_refused_and_the_still_points_named(seen: Observation):
+    with pytest.raises(InputError, match=r"not held there.*\(0, "):
+        observe([seen], replace(SETUP, pins=((WIDTH, 0.0), (WIDTH, HEIGHT))))
+    with pytest.raises(InputError, match="not held there"):
+        observe([replace(seen, markers=[WIDTH, 0.0] + seen.markers * [-1.0, 1.0])], SETUP)
+
+
+def test_a_cloth_that_is_still_elsewhere_too_is_told(seen: Observation):
+    assert kinds(seen, replace(SETUP, pins=Hold.HOIST_CORNERS)) == {"still-away-from-pins"}
+
+
+def test_pins_that_are_not_on_the_cloth_are_refused(seen: Observation):
+    with pytest.raises(InputError, match="not on the cloth"):
+        observe([seen], replace(SETUP, pins=((-0.5, 0.0), (0.0, HEIGHT))))
+
+
+@pytest.mark.parametrize(("count", "what"), [(60, "60 frames"), (30, "30 frames")])
+def test_short_recordings_are_refused(seen: Observation, count: int, what: str):
+    with pytest.raises(InputError, match=what):
+        observe([replace(seen, positions=seen.positions[:count], times=seen.times[:count])], SETUP)
+
+
+def test_few_markers_are_refused(seen: Observation):
+    with pytest.raises(InputError, match="24 markers"):
+        observe([replace(seen, markers=seen.markers[::3], positions=seen.positions[:, ::3])], SETUP)
+
+
+def test_nothing_tracked_is_refused(seen: Observation):
+    with pytest.raises(InputError, match="no marker was tracked"):
+        observe([replace(seen, positions=np.full_like(seen.positions, np.nan))], SETUP)
+
+
+def test_a_still_cloth_is_refused(seen: Observation):
+    noise = NOISE * np.random.default_rng(1).standard_normal(seen.positions.shape)
+    with pytest.raises(InputError, match="nothing moves"):
+        observe([replace(seen, positions=seen.positions[:1] + noise)], SETUP)
+    with pytest.raises(InputError, match="nothing moves"):
+        observe([replace(seen, positions=np.repeat(seen.positions[:1], len(seen.times), axis=0))], SETUP)
+
+
+def test_lost_markers_are_told_and_left_out(seen: Observation):
+    def lose(positions: np.ndarray) -> None:
+        positions[20:, [5, 6]] = np.nan
+
+    observed = observe([moved(seen, lose)], SETUP)
+    assert {f.kind for f in observed.findings} == {"markers-left-out"}
+    assert len(observed.experiment.recordings[0].markers) == len(seen.markers) - 2
+
+
+def test_zeros_and_stuck_positions_are_not_taken_for_tracks(seen: Observation):
+    def spoil(positions: np.ndarray) -> None:
+        positions[30:32, 40] = 0.0
+        positions[70:73, 45] = positions[69, 45]
+
+    observed = observe([moved(seen, spoil)], SETUP)
+    assert {f.kind for f in observed.findings} == {"positions-stuck", "gaps-filled"}
+    error = np.abs(observed.experiment.recordings[0].positions - seen.positions).max()
+    assert error < 10e-3  # cubic over 60 to 80 ms of a 1.5 Hz wave; unrepaired 0.9 m and 30 mm
+
+
+def test_exchanged_markers_are_told(seen: Observation):
+    def exchange(positions: np.ndarray) -> None:
+        positions[50:52, [20, 60]] = positions[50:52, [60, 20]]
+
+    assert kinds(moved(seen, exchange)) == {"markers-astray", "gaps-filled"}
+
+
+def test_repeated_frames_are_told_and_many_are_refused(seen: Observation):
+    def few(positions: np.ndarray) -> None:
+        positions[[40, 90, 91]] = positions[[39, 89, 89]]
+
+    def every_second(positions: np.ndarray) -> None:
+        positions[1::2] = positions[::2]
+
+    assert kinds(moved(seen, few)) == {"repeated-frames", "gaps-filled"}
+    with pytest.raises(InputError, match="about 25"):
+        observe([moved(seen, every_second)], SETUP)
+
+
+def test_frames_that_the_times_say_are_missing_are_interpolated(seen: Observation):
+    keep = np.ones(len(seen.times), dtype=bool)
+    keep[[50, 51, 120]] = False
+    cut = replace(seen, positions=seen.positions[keep], times=seen.times[keep])
+    observed = observe([cut], SETUP)
+    assert {f.kind for f in observed.findings} == {"frames-missing", "gaps-filled"}
+    assert observed.experiment.recordings[0].positions.shape == seen.positions.shape
+    keep[50:56] = False
+    with pytest.raises(InputError, match="6 frames on end are missing"):
+        observe([replace(seen, positions=seen.positions[keep], times=seen.times[keep])], SETUP)
+
+
+def test_frames_lost_silently_are_told(seen: Observation):
+    keep = np.ones(len(seen.times), dtype=bool)
+    keep[[50, 120]] = False
+    cut = replace(seen, positions=seen.positions[keep], times=np.arange(keep.sum()) / RATE)
+    assert kinds(cut) == {"frames-lost"}
+
+
+def test_uneven_times_are_refused(seen: Observation):
+    jitter = 0.3 / RATE * np.random.default_rng(2).uniform(-1, 1, len(seen.times))
+    with pytest.raises(InputError, match="not evenly spaced"):
+        observe([replace(seen, times=seen.times + jitter)], SETUP)
+
+
+def test_times_rounded_to_a_millisecond_are_even(seen: Observation):
+    shifted = np.round(seen.times * (29.97 / RATE) ** -1, 3)  # 29.97 frames a second, in whole milliseconds
+    observed = observe([replace(seen, times=shifted)], SETUP)
+    assert observed.experiment.recordings[0].rate == pytest.approx(29.97, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("up", "what"), [(Up.MINUS_Z, "above its pins"), (Up.Y, "z must point up"), (Up.MINUS_Y, "z must point up")]
+)
+def test_another_axis_up_is_refused(seen: Observation, up: Up, what: str):
+    given = seen.known.wind
+    wrong = replace(seen.turned(up), wind=given)
+    with pytest.raises(InputError, match=what):
+        observe([wrong], SETUP)
+
+
+def test_a_wind_it_streams_against_is_refused_and_one_across_told(seen: Observation):
+    with pytest.raises(InputError, match="streams upwind"):
+        observe([replace(seen, wind=WindTrack.constant((-5.0, 0.0, 0.0)))], SETUP)
+    assert kinds(replace(seen, wind=WindTrack.constant((1.5, 4.8, 0.0)))) == {"flies-aside"}
+
+
+def test_a_wind_log_beside_the_recording_in_time_is_refused(seen: Observation):
+    times = np.arange(0.0, 60.0)
+    log = WindTrack(times=times + 100.0, velocity=np.tile([5.0, 0.0, 0.0], (60, 1)))
+    with pytest.raises(InputError, match="100 s to 159 s after the first frame"):
+        observe([replace(seen, wind=log)], SETUP)
+    assert kinds(replace(seen, wind=log.later(120.0))) == set()
+
+
+def test_a_wind_in_other_units_by_far_is_told_or_refused(seen: Observation):
+    assert kinds(replace(seen, wind=WindTrack.constant((0.3, 0.0, 0.0)))) == {"wind-does-not-fit"}
+    with pytest.raises(InputError, match="unit of the wind"):
+        observe([replace(seen, wind=WindTrack.constant((50.0, 0.0, 0.0)))], SETUP)
+
+
+def test_slow_motion_played_as_if_real_is_refused(seen: Observation):
+    with pytest.raises(InputError, match="slow motion"):
+        observe([replace(seen, times=seen.times * 20.0)], SETUP)
+
+
+def test_rest_coordinates_upside_down_are_told(seen: Observation):
+    turned = replace(seen, markers=[0.0, HEIGHT] + seen.markers * [1.0, -1.0])
+    assert kinds(turned) == {"rest-upside-down"}
+
+
+def test_pins_of_two_recordings_must_be_in_one_place(seen: Observation):
+    other = replace(flag(noise=NOISE, seed=5, name="other"), positions=seen.positions + np.array([0.1, 0.0, 0.0]))
+    with pytest.raises(InputError, match=r"pins are up to 0\.1"):
+        observe([seen, other], SETUP)
+
+
+def test_what_nobody_says_is_asked_for(seen: Observation):
+    for setup, what in (
+        (replace(SETUP, material=None), "material is not known"),
+        (replace(SETUP, pins=None), "where the cloth is held is not known"),
+    ):
+        with pytest.raises(InputError, match=what):
+            observe([seen], setup)
+    with pytest.raises(InputError, match="no wind is known"):
+        observe([replace(seen, known=replace(seen.known, wind=None))], SETUP)
+    assert kinds(seen, replace(SETUP, outline=None)) == {"cloth-assumed-to-end-at-markers"}
