@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageOps
 
 from flagdata.lake.meshes import MeshSequence
 from flagdata.rng import stream
@@ -29,7 +29,7 @@ from sim.scene import Scene, assemble, flag, hanging_cloth
 FRAME = 0.04  # s
 SETTLE = 50  # frames before the first that is shown
 ACROSS = 6
-TILE = 200  # px, of the assets
+TILE = (240, 160)  # px, of the assets
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -91,10 +91,8 @@ def _with_contact(scene: Scene) -> Scene:
 
 
 def _tile(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    side = min(image.shape[:2])
-    fitted = Image.fromarray(image).resize((TILE * image.shape[1] // side, TILE), Image.Resampling.LANCZOS)
-    left = (fitted.width - TILE) // 2
-    return np.asarray(fitted.crop((left, 0, left + TILE, TILE)))
+    """The middle of a picture, as large as fits, in a tile of 3:2."""
+    return np.asarray(ImageOps.fit(Image.fromarray(image), TILE, Image.Resampling.LANCZOS))
 
 
 def _sheet(tiles: Sequence[NDArray[np.uint8]], *, across: int) -> Image.Image:
