@@ -87,7 +87,7 @@ def tried(candidate: Candidate) -> tuple[Load, ...]:
         case Candidate.FRICTION:
             return tuple(Load(friction=c) for c in np.geomspace(5e-4, 0.2, 13).tolist())
         case Candidate.REACTIVE_AND_LIFT:
-            return tuple(Load(reactive=m, lift=c) for m, c in itertools.product(masses[::3], lifts[::3]))
+            return tuple(Load(reactive=m, lift=c) for m, c in itertools.product(masses[::4], lifts[::4]))
 
 
 def loaded(load: Load, *, bare: Sheet, length: float, density: float) -> Sheet:

@@ -23,7 +23,7 @@ from measure.cases.sheet import Sheet, leading, onset
 
 NEVER = math.log(10.0)
 """The error where a model has no prediction."""
-_SPEEDS = np.arange(0.4, 20.01, 0.1)
+_SPEEDS = np.arange(0.4, 20.01, 0.2)
 _HIGHEST = 40.0  # m/s, of onsets
 FACTORS = np.geomspace(0.25, 1.6, 94)
 """s that are tried, 2 % apart."""
@@ -64,8 +64,8 @@ class Predictor(Protocol):
     @property
     def loads(self) -> Sequence[Load]: ...
 
-    def predict(self, load: int, factor: float, condition: Condition) -> float:
-        """What the load at this index gives at `factor` times the tunnel's speed; NaN where it does not flutter."""
+    def predict(self, load: int, factors: NDArray[np.float64], condition: Condition) -> NDArray[np.float64]:
+        """(factor,) what the load at this index gives at `factors` times the tunnel's speed; NaN without flutter."""
         ...
 
 
@@ -103,18 +103,18 @@ class LinearTable:
         columns = [[onset(sheet, highest=_HIGHEST) for sheet in self._sheets(float(h))] for h in self._lengths]
         return np.array(columns).T
 
-    def predict(self, load: int, factor: float, condition: Condition) -> float:
+    def predict(self, load: int, factors: NDArray[np.float64], condition: Condition) -> NDArray[np.float64]:
         """As `Predictor.predict`.
 
         Raises:
             UsageError: a kind that linear stability does not give, or a length that was not named.
         """
         if condition.kind is Kind.FREQUENCY:
-            return float(np.interp(factor * condition.at, _SPEEDS, self._frequencies[load], right=np.nan))
+            return np.interp(factors * condition.at, _SPEEDS, self._frequencies[load], right=np.nan)
         if condition.kind is Kind.STOP:
             column = int(np.abs(self._lengths - condition.at).argmin())
             if abs(self._lengths[column] - condition.at) < 1e-6:
-                return float(self._onsets[load, column]) / factor
+                return self._onsets[load, column] / factors
             raise UsageError(f"no onset at {condition.at:g} m", where="linear table", fix="name the length")
         raise UsageError(f"no {condition.kind} in linear stability", where="linear table", fix="simulate in time")
 
@@ -130,8 +130,16 @@ class Fitted:
 
 def errors(predictor: Predictor, load: int, factor: float, conditions: Sequence[Condition]) -> NDArray[np.float64]:
     """(condition,) logarithms of predicted over measured; NEVER where there is no prediction."""
-    predicted = np.array([predictor.predict(load, factor, condition) for condition in conditions])
-    measured = np.array([condition.value for condition in conditions])
+    return _errors(predictor, load, np.array([factor]), conditions)[:, 0]
+
+
+def _errors(
+    predictor: Predictor, load: int, factors: NDArray[np.float64], conditions: Sequence[Condition]
+) -> NDArray[np.float64]:
+    """(condition, factor)."""
+    predicted = np.array([predictor.predict(load, factors, condition) for condition in conditions])
+    predicted = predicted.reshape(len(conditions), len(factors))
+    measured = np.array([condition.value for condition in conditions])[:, None]
     flutters = np.isfinite(predicted) & (predicted > 0)
     return np.where(flutters, np.log(np.where(flutters, predicted, 1.0) / measured), NEVER)
 
@@ -140,14 +148,21 @@ def fit(predictor: Predictor, shear: Shear, conditions: Sequence[Condition]) -> 
     """The load and, where it is free, the factor with the least loss; each kind of condition weighs alike."""
     factors = FACTORS if shear is Shear.FREE else np.ones(1)
     kinds = [[c for c in conditions if c.kind is kind] for kind in Kind]
-
-    def loss(load: int, factor: float) -> float:
-        return float(sum((errors(predictor, load, factor, part) ** 2).mean() for part in kinds if part))
-
-    return min(
-        (Fitted(load=k, factor=float(s), loss=loss(k, float(s))) for k in range(len(predictor.loads)) for s in factors),
-        key=lambda fitted: fitted.loss,
+    loss = np.array(
+        [
+            sum((_errors(predictor, load, factors, part) ** 2).mean(axis=0) for part in kinds if part)
+            for load in range(len(predictor.loads))
+        ]
     )
+    load, factor = np.unravel_index(int(loss.argmin()), loss.shape)
+    return Fitted(load=int(load), factor=float(factors[factor]), loss=float(loss.min()))
+
+
+def factor_that_meets(predictor: Predictor, load: int, conditions: Sequence[Condition], *, within: float) -> float:
+    """The factor at which the mean log error vanishes; NaN where none brings it within this of 0."""
+    mean = np.abs(_errors(predictor, load, FACTORS, conditions).mean(axis=0))
+    best = int(mean.argmin())
+    return float(FACTORS[best]) if mean[best] < within else math.nan
 
 
 @dataclass(frozen=True, kw_only=True)

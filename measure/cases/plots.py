@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from measure.cases.candidates import Candidate, Shear
-from measure.cases.evidence import FACTORS, Condition, Kind, Predictor, errors
+from measure.cases.evidence import Condition, Kind, factor_that_meets
 from measure.cases.limit_cycle import as_columns
 from measure.cases.observe import Clip, Observations, median_by_length
 from measure.cases.recipe import Case, Group
@@ -26,6 +26,7 @@ _COLOURS = {
 }
 _INK, _QUIET = "#1c2326", "#8a969c"
 _DPI = 110
+_MET = 0.03  # of a mean log error: half again the step of the factors
 
 
 def png(figure: Figure) -> bytes:
@@ -148,7 +149,8 @@ def lengths(case: Case, seen: Observations, study: Study) -> Figure:
         model = next(o for o in study.linear if o.candidate is candidate and o.shear is Shear.FREE)
         table = study.linear_tables[candidate]
         row = table.loads.index(model.load)
-        values = [table.predict(row, model.factor, Condition(kind=Kind.STOP, at=float(h), value=1.0)) for h in every]
+        one = np.array([model.factor])
+        values = [table.predict(row, one, Condition(kind=Kind.STOP, at=float(h), value=1.0))[0] for h in every]
         tunnel.plot(1e3 * every, values, "-", color=_COLOURS[candidate], lw=1.3,
                     label=f"{candidate.value}: {model.load}, s = {model.factor:.2f}")  # fmt: skip
     _published(theory, case, thresholds.curves)
@@ -184,16 +186,10 @@ def plane(case: Case, seen: Observations, table: SimulatedTable) -> Figure:
     colours = {Kind.FREQUENCY: "#1f6f9c", Kind.WAVE: "#3b7d6b", Kind.AMPLITUDE: "#7a4a9a", Kind.STOP: "#b4531a"}
     for kind, colour in colours.items():
         conditions = [c for g in (Group.FIT, Group.HELD_OUT) for c in seen.conditions(case, g, (kind,))]
-        met = [_met(table, row, conditions) for row in range(len(table.loads))]
+        met = [factor_that_meets(table, row, conditions, within=_MET) for row in range(len(table.loads))]
         axes.plot(strengths, met, "o-", color=colour, ms=3.5, lw=1.3, label=kind.value)
     axes.axhline(case.shear_factor, color=_QUIET, lw=0.8, ls=":")
     axes.axvline(case.reactive_share, color=_QUIET, lw=0.8, ls=":")
     axes.set(xlabel="M / (ρ L)", ylabel="s that meets it", xscale="log", ylim=(0.25, 1.3))
     axes.legend(frameon=False, fontsize=8, title="mean log error 0 for")
     return figure
-
-
-def _met(predictor: Predictor, load: int, conditions: Sequence[Condition]) -> float:
-    """The s of least |mean log error|; NaN where some condition has no prediction at any s that comes near."""
-    best = min((abs(float(errors(predictor, load, float(s), conditions).mean())), float(s)) for s in FACTORS)
-    return best[1] if best[0] < 0.03 else np.nan

@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 
 from flagdata.errors import InputError
 
-MODES = 10
+MODES = 8
 _NODES = 96
 
 
@@ -141,7 +141,7 @@ def leading(sheet: Sheet, speed: float) -> Leading:
     return Leading(growth=float(best.real), frequency=float(best.imag / (2 * np.pi)))
 
 
-def onset(sheet: Sheet, *, highest: float, samples: int = 160) -> float:
+def onset(sheet: Sheet, *, highest: float, samples: int = 120) -> float:
     """The lowest speed [m/s] at which a mode grows; NaN where none does up to `highest`."""
     # The undamped sheet in still air has Re r = 0 up to rounding.
     small = 1e-6 * abs(rates(sheet, 0.0)).min()

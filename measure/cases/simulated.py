@@ -58,7 +58,7 @@ def observed(motion: StripMotion, member: int) -> Flutter:
         return nothing
     columns = np.linspace(0.04, 1.0, _COLUMNS) * length
     try:
-        found = waves(motion.time, columns, as_columns(motion, member, columns), band=(3.0, 60.0))
+        found = waves(motion.time, columns, as_columns(motion, member, columns), band=(3.0, 45.0))
     except InputError:  # too few cycles in the time kept, or folded over for most of it
         return nothing
     return Flutter(
@@ -129,11 +129,11 @@ class SimulatedTable:
             for kind, name in parts.items()
         }
 
-    def predict(self, load: int, factor: float, condition: Condition) -> float:
+    def predict(self, load: int, factors: NDArray[np.float64], condition: Condition) -> NDArray[np.float64]:
         """As `Predictor.predict`; linear between the speeds simulated, NaN beyond them and next to no flutter."""
         if condition.kind is Kind.STOP:
-            return self._linear.predict(load, factor, condition)
-        return float(self.curve(condition.kind, load, np.array([factor * condition.at]))[0])
+            return self._linear.predict(load, factors, condition)
+        return self.curve(condition.kind, load, factors * condition.at)
 
     def curve(self, kind: Kind, load: int, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
         """(speed,) of one load, at speeds at the sheet [m/s]."""

@@ -43,14 +43,15 @@ class Stretch:
     spread_square: float
 
 
-def arc_lengths(track: EdgeTrack, ratio: float, *, least: int = 50) -> NDArray[np.float64]:
-    """(frame,) from the first to the last column seen [columns]; NaN for frames with fewer than `least`."""
-    found = np.full(len(track.height), np.nan)
+def arc_lengths(track: EdgeTrack, ratios: NDArray[np.float64], *, least: int = 50) -> NDArray[np.float64]:
+    """(frame, ratio) from the first to the last column seen [columns]; NaN for frames with fewer than `least`."""
+    found = np.full((len(track.height), len(ratios)), np.nan)
     for index, height in enumerate(track.height):
         seen = np.flatnonzero(np.isfinite(height))
         if len(seen) >= least:
             whole = np.interp(np.arange(seen[0], seen[-1] + 1), seen, height[seen])
-            found[index] = np.hypot(1.0, ratio * np.diff(savgol_filter(whole, _SMOOTH, 2))).sum()
+            rise = np.diff(savgol_filter(whole, _SMOOTH, 2))
+            found[index] = np.hypot(1.0, ratios[:, None] * rise).sum(axis=1)
     return found
 
 
@@ -64,7 +65,7 @@ def stretch(track: EdgeTrack, rng: np.random.Generator) -> Stretch:
     every = EdgeTrack(
         time=track.time[::2], height=track.height[::2], width=track.width[::2], seen=track.seen[::2]
     )  # fmt: skip
-    arcs = np.stack([arc_lengths(every, float(ratio)) for ratio in ratios], axis=1)
+    arcs = arc_lengths(every, ratios)
     arcs = arcs[np.isfinite(arcs).all(axis=1)]
     if len(arcs) < 100:
         raise InputError(

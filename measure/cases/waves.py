@@ -175,14 +175,16 @@ def _design(time: NDArray[np.float64], frequency: float, harmonics: int) -> NDAr
 
 
 def _residual(time: NDArray[np.float64], heights: NDArray[np.float64], frequency: float, harmonics: int) -> float:
+    """Sum of squares that the model leaves of all columns, each fitted to its own frames by the normal equations."""
     design = _design(time, frequency, harmonics)
-    total = 0.0
-    for column in heights.T:
-        seen = np.isfinite(column)
-        part = design[seen]
-        left = column[seen] - part @ np.linalg.lstsq(part, column[seen], rcond=None)[0]
-        total += float(left @ left)
-    return total
+    seen = np.isfinite(heights).astype(np.float64)
+    known = np.nan_to_num(heights)
+    pairs = (design[:, :, None] * design[:, None, :]).reshape(len(time), -1)
+    width = design.shape[1]
+    left = (seen.T @ pairs).reshape(-1, width, width)
+    right = known.T @ design
+    found = np.linalg.solve(left, right[..., None])[..., 0]
+    return float((known**2).sum() - (found * right).sum())
 
 
 def _fit(

@@ -48,9 +48,9 @@ def test_a_model_without_flutter_is_wrong_by_a_factor_of_ten() -> None:
 def test_a_length_that_was_not_named_and_a_kind_without_prediction_are_refused() -> None:
     table = LinearTable((Load(reactive=0.3),), bare=BARE, density=1.1, lengths=LENGTHS)
     with pytest.raises(UsageError, match="name the length"):
-        table.predict(0, 1.0, Condition(kind=Kind.STOP, at=0.2, value=5.0))
+        table.predict(0, np.ones(1), Condition(kind=Kind.STOP, at=0.2, value=5.0))
     with pytest.raises(UsageError, match="simulate"):
-        table.predict(0, 1.0, Condition(kind=Kind.WAVE, at=8.0, value=5.0))
+        table.predict(0, np.ones(1), Condition(kind=Kind.WAVE, at=8.0, value=5.0))
 
 
 def test_gains_are_paired_by_condition() -> None:

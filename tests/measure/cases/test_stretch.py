@@ -47,7 +47,7 @@ def test_a_straight_line_is_as_long_as_it_is() -> None:
         seen=np.zeros((2, 101), np.uint8),
     )  # fmt: skip
     # 3 : 4 : 5; a running parabola leaves a straight line as it is.
-    assert arc_lengths(track, 1.0) == pytest.approx([100 * 5 / 3] * 2, rel=1e-9)
+    assert arc_lengths(track, np.ones(1))[:, 0] == pytest.approx([100 * 5 / 3] * 2, rel=1e-9)
 
 
 def test_too_few_frames_are_refused() -> None:
