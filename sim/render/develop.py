@@ -12,6 +12,7 @@ from PIL import Image
 from torch import Tensor
 
 from flagdata.schema import FRAME_SIZE
+from sim.assets.colour import decoded
 from sim.render.parameters import RenderParameters
 
 _WHOLE = 0.6  # the background scale at which an image's shorter side just fills the frame
@@ -19,8 +20,7 @@ _WHOLE = 0.6  # the background scale at which an image's shorter side just fills
 
 @functools.cache
 def _decoding() -> NDArray[np.float32]:
-    code = np.arange(256) / 255
-    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return decoded(np.arange(256) / 255).astype(np.float32)
 
 
 def to_linear(image: NDArray[np.uint8]) -> NDArray[np.float32]:

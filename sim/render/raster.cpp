@@ -57,7 +57,7 @@ float dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // A triangle in an image, of positive area, with the pixels its bounding box holds.
 struct Triangle {
-  int32_t a, b, c;  // places of its corners among the vertices given to `snap`
+  int32_t a, b, c;  // places of its corners among the vertices of `Steps`
   int64_t area;     // twice, in steps²
   int32_t left, right, top, bottom;
 };
@@ -67,8 +67,11 @@ struct Steps {
   std::vector<int32_t> x, y;
   void resize(size_t n) { x.resize(n), y.resize(n); }
   void set(size_t i, float px, float py) {
-    x[i] = int32_t(std::nearbyint(std::clamp(double(px) * STEPS, -REACH, REACH)));
-    y[i] = int32_t(std::nearbyint(std::clamp(double(py) * STEPS, -REACH, REACH)));
+    x[i] = whole(px), y[i] = whole(py);
+  }
+  // 0 for the places of vertices in the camera's plane, which are no numbers: their triangles are not drawn.
+  static int32_t whole(float place) {
+    return std::isnan(place) ? 0 : int32_t(std::nearbyint(std::clamp(double(place) * STEPS, -REACH, REACH)));
   }
   // False where the triangle is flat or holds no sample.
   bool triangle(int32_t a, int32_t b, int32_t c, int64_t width, int64_t height, Triangle& t) const {
