@@ -95,7 +95,7 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
     parts += ["", "| effect | half detected at | unit |", "|---|---|---|"]
     for effect, half in sheet.half_strengths.items():
-        parts.append(f"| {effect} | {half.value:.2g} [{half.low:.2g}, {half.high:.2g}] | {half.unit} |")
+        parts.append(f"| {effect} | {_digits(half.value)} [{_digits(half.low)}, {_digits(half.high)}] | {half.unit} |")
     if picture is not None:
         parts += ["", f"![Power curves]({picture})"]
     parts += ["", "| true | said | sets |", "|---|---|---|"]
@@ -125,7 +125,7 @@ def plot(sheet: Sheet, path: Path) -> None:
     """Power curves by class, noise and frame rate; cases above (detected) and below (not)."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    figure = Figure(figsize=(13, 5.0), layout="constrained")
     panels = figure.subplots(1, 3, sharey=True)
     one = [o for o in sheet.of_kind(Kind.ONE) if o.key.impact > 0]
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
@@ -157,7 +157,7 @@ def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[st
                 height = 1.05 + 0.004 * index if outcome.detected else -0.05 - 0.004 * index
                 axes.plot(_MILLI * outcome.key.impact, height, "o", color=colour, ms=4)
     axes.semilogx(_MILLI * grid, power.at(grid), color="black", lw=2, label="a group not seen", ls="--")
-    axes.legend(fontsize=6, ncols=2, loc="center right")
+    axes.legend(fontsize=7, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
     axes.grid(alpha=0.3)
 
 
@@ -165,7 +165,8 @@ def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[str
     if power is None:
         return []
     return [
-        f"| {what}: {name} | {_MILLI * half:.2g} [{_MILLI * low:.2g}, {_MILLI * high:.2g}] mm | {counts[name]} |"
+        f"| {what}: {name} | {_digits(_MILLI * half)} [{_digits(_MILLI * low)}, {_digits(_MILLI * high)}] mm | "
+        f"{counts[name]} |"
         for name, (half, low, high) in power.half.items()
     ]
 
@@ -191,7 +192,13 @@ def _spread(values: Sequence[float], *, lowest: float) -> dict[str, float | int 
 def _words(values: Sequence[float], worst: float, name: str) -> str:
     if not values:
         return "no cases"
-    return f"median {np.median(values):.2g}, {name} {np.quantile(values, worst):.2g}, n = {len(values)}"
+    middle, decile = float(np.median(values)), float(np.quantile(values, worst))
+    return f"median {_digits(middle)}, {name} {_digits(decile)}, n = {len(values)}"
+
+
+def _digits(value: float) -> str:
+    """Two digits, and all before the point."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2g}"
 
 
 def _row(o: Outcome) -> dict[str, Any]:

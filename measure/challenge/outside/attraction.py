@@ -30,7 +30,7 @@ class Attraction(Effect):
         Value,
         strength(
             unit="N/m²",
-            prior=(0.0, 1.0),
+            prior=(0.0, 2.0),
             admissible=NOT_NEGATIVE,
             source="charged insulators bear up to σ²/(2 ε₀) = 40 N/m² at breakdown of air; cloth keeps a tenth or less",
         ),

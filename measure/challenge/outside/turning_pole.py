@@ -26,7 +26,7 @@ class TurningPole(Effect):
 
     rate: Annotated[
         Value,
-        strength(unit="rad/s", prior=(-0.8, 0.8), source="ships turn at up to 0.1, carousels at up to 1 rad/s"),
+        strength(unit="rad/s", prior=(-1.2, 1.2), source="ships turn at up to 0.1, carousels at 0.3 to 1.2 rad/s"),
     ] = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:

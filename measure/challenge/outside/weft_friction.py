@@ -1,4 +1,4 @@
-"""Friction of the air along one direction of the weave: a ribbed or napped cloth."""
+"""Friction of the air along one direction of the weave: cloth with a pile, ribs or fringes across it."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class WeftFriction(ForceEffect):
         Value,
         strength(
             unit="kg/(m² s)",
-            prior=(0.0, 0.2),
+            prior=(0.0, 0.5),
             admissible=NOT_NEGATIVE,
-            source="two to five times the friction of a smooth plate, 0.01–0.06 at 2–10 m/s: ribs across the flow",
+            source="ribs and pile have up to ten times the friction of a smooth plate, 0.01–0.06 at 2–10 m/s",
         ),
     ] = 0.0
 
