@@ -10,6 +10,7 @@ VALIDATIONS = {
     "clock-recovery": "tests.validation.clock_recovery",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
+    "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
     "renderers": "tests.validation.renderers",
     "verification": "tests.validation.verification",

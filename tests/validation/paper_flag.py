@@ -1,0 +1,33 @@
+"""The paper flag in the tunnel: the whole study of the case, and its page for the documentation."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from measure.cases.observe import observe
+from measure.cases.page import as_json, write_page
+from measure.cases.recipe import load_case
+from measure.cases.study import study
+from measure.cases.verdict import judge
+
+_ROOT = Path(__file__).parents[2]
+_DATA = Path(os.environ.get("FLAGDATA_REFERENCE", _ROOT.parent / "shared" / "data"))
+_WORK = _ROOT / "out" / "paper-flag"
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """The study; the page goes to docs/cases. That it was left out, and why, where the recordings are absent."""
+    if not _DATA.is_dir():
+        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+    case = replace(load_case("paper-flag"), seed=seed)
+    seen = observe(case, _DATA, keep=_WORK / "kept")
+    found = study(case, seen, keep=_WORK / "kept")
+    verdict = judge(case, seen, found)
+    page = write_page(_WORK, case=case, seen=seen, study=found, verdict=verdict)
+    target = out.parent / "cases" / "paper-flag.html"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(page.read_bytes())
+    return as_json(case, seen, found, verdict)
