@@ -124,6 +124,13 @@ class Table:
             raise self._wrong(key, value, 'a list of texts, ["…", "…"]')
         return tuple(value)
 
+    def flag(self, key: str) -> bool:
+        """A truth value; false if it is not there."""
+        value = self._take(key, False)
+        if not isinstance(value, bool):
+            raise self._wrong(key, value, "true or false")
+        return value
+
     def numbers(self, key: str) -> tuple[float, ...]:
         value = self._take(key, [])
         if not isinstance(value, list) or not all(
@@ -131,6 +138,21 @@ class Table:
         ):
             raise self._wrong(key, value, "a list of finite numbers")
         return tuple(float(item) for item in value)
+
+    def points(self, key: str) -> tuple[tuple[float, float], ...]:
+        """A list of pairs of finite numbers; empty if it is not there."""
+        value = self._take(key, [])
+        pairs = isinstance(value, list) and all(isinstance(item, list) and len(item) == 2 for item in value)
+        if not pairs or not all(_finite(number) for item in value for number in item):
+            raise self._wrong(key, value, "a list of pairs, [[0.0, 0.0], [0.0, 1.0]]")
+        return tuple((float(first), float(second)) for first, second in value)
+
+    def tables(self, key: str) -> tuple[Table, ...]:
+        """A list of tables inside; empty if it is not there."""
+        value = self._take(key, [])
+        if not isinstance(value, list):
+            raise self._wrong(key, value, f"tables, [[{key}]]")
+        return tuple(Table(item, where=f"{self.where} [[{key}]] {place}") for place, item in enumerate(value, start=1))
 
     def choice(self, key: str, default: E) -> E:
         value = self._take(key, default.value)
@@ -173,3 +195,7 @@ class Table:
 
     def _wrong(self, key: str, value: Any, wanted: str) -> InputError:
         return InputError(f"{key} is {value!r}", where=self.where, fix=f"give {wanted}")
+
+
+def _finite(value: Any) -> bool:
+    return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

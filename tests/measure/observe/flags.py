@@ -16,8 +16,8 @@ _GRAIN = 400  # steps of the integral along u
 
 
 def unrolled(u: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(frame, point, 2) a curve in the x–y plane whose direction is a travelling wave that grows from the hoist. Its arc
-    length is u exactly, since it is the integral of a unit vector."""
+    """(frame, point, 2) a curve in the x–y plane whose direction is a travelling wave that grows from the hoist.
+    Its arc length is u exactly, since it is the integral of a unit vector."""
     s = np.linspace(0.0, WIDTH, _GRAIN + 1)
     angle = 0.9 * (s / WIDTH) * np.sin(2 * np.pi * (1.5 * times[:, None] - s / 1.1))
     middle = (angle[:, 1:] + angle[:, :-1]) / 2

@@ -1,0 +1,326 @@
+"""Experiments as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+
+    title, up           "z", "-y", …: the axis of the recordings that points up; all else is said with z up
+    [cloth]             width, height, or mesh (an OBJ with texture coordinates in metres); vertices of the model mesh
+    [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); thicken, density, damping,
+                        stretching-factor, bending-factor
+    [pins]              at = "hoist-corners" | "top-corners" | "hoist", or points = [[u, v], …]; stiffness, or
+                        rigid = true
+    [air]               gravity, density, drag (of the quadratic normal force)
+    [[recording]]       source: an artifact's id, a folder of meshes, or a marker table; take (a recording of a table
+                        that holds several), name, rate, unit, rest-unit, noise
+    [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x towards +y); or log
+                        (an artifact's id or an anemometer's file) with axis or north, and offset or start (ISO 8601)
+
+All values are SI and radians. What a recording's own description says may be left out. Paths are relative to the file.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from flagdata import timebase
+from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.findings import Finding
+from flagdata.ingest.markers import MarkerOptions
+from flagdata.ingest.meshes import read_obj
+from flagdata.lake import Lake
+from flagdata.schema import Kind
+from measure.observe import markers, meshes, wind
+from measure.observe.cloth import VERTICES, outline
+from measure.observe.experiment import Observed, observe
+from measure.observe.observation import Observation, Up
+from measure.observe.setup import Hold, Setup, sheet
+from measure.observe.trajectory import WindTrack
+from measure.observe.wind import LogPlacement
+from sim.air import QuadraticNormal
+from sim.arcsim import read_material
+from sim.material import Material, named
+from sim.material import names as materials
+from sim.run.tables import Table
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindSource:
+    """A constant velocity [m/s], or a log and how it lies beside the recording."""
+
+    velocity: tuple[float, float, float] | None = None
+    log: str = ""
+    placement: LogPlacement | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingSource:
+    """One recording of an experiment.
+
+    Attributes:
+        source: an artifact's id, or a path.
+        take: the recording of a marker table that holds several; empty for the only one.
+        name: what reports call it; empty for its own.
+        rate: frames a second [Hz]; None for what the source says.
+        unit, rest_unit: of positions and, in a marker table, of u and v.
+        noise: standard deviation of a coordinate [m]; None to estimate it.
+        wind: beside it; None for what the source says.
+    """
+
+    source: str
+    take: str = ""
+    name: str = ""
+    rate: float | None = None
+    unit: str = "m"
+    rest_unit: str | None = None
+    noise: float | None = None
+    wind: WindSource | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExperimentRecipe:
+    """What to read, and what is known beside it.
+
+    Attributes:
+        title: of the report.
+        up: axis of the recordings that points up.
+        setup: of the cloth.
+        recordings: at least one.
+        folder: that paths are relative to.
+    """
+
+    title: str
+    up: Up
+    setup: Setup
+    recordings: tuple[RecordingSource, ...]
+    folder: Path
+
+
+def load(path: Path) -> ExperimentRecipe:
+    """The recipe in a file.
+
+    Raises:
+        NotFoundError: no such file, or one that it names.
+        UnknownNameError: a key or name that is not known.
+        InputError: a value that does not fit.
+        UsageError: values that do not fit together.
+    """
+    if not path.is_file():
+        raise NotFoundError("no such recipe file", where=str(path), fix="check the path")
+    try:
+        top = Table(tomllib.loads(path.read_text(encoding="utf-8")), where=str(path))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
+    folder = path.parent
+    recordings = tuple(_recording(table) for table in top.tables("recording"))
+    if not recordings:
+        raise InputError("no recording is named", where=str(path), fix="add a table [[recording]]")
+    recipe = ExperimentRecipe(
+        title=top.text("title", path.stem) or path.stem, up=top.choice("up", Up.Z), folder=folder,
+        setup=_setup(top, folder), recordings=recordings,
+    )  # fmt: skip
+    top.done()
+    return recipe
+
+
+def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
+    """The experiment of a recipe, checked.
+
+    Args:
+        lake: that artifacts are looked up in.
+
+    Raises:
+        NotFoundError: a source that is neither a path nor an artifact.
+        FlagdataError: a source that cannot be read or used.
+    """
+    return observe([_observation(source, recipe, lake) for source in recipe.recordings], recipe.setup)
+
+
+def _setup(top: Table, folder: Path) -> Setup:
+    flat = top.table("cloth")
+    width, height, mesh = (
+        flat.number("width", 0.0, above=0.0) if "width" in flat else None,
+        flat.number("height", 0.0, above=0.0) if "height" in flat else None,
+        flat.text("mesh", None),
+    )
+    if (width is None) != (height is None) or (mesh is not None and width is not None):
+        raise UsageError("a cloth of half a size, or of two", where=flat.where, fix="give width and height, or a mesh")
+    corners = None
+    if width is not None and height is not None:
+        corners = sheet(width, height)
+    elif mesh is not None:
+        shape = read_obj(folder / mesh)
+        corners = outline(shape.rest, shape.faces, where=str(folder / mesh))
+    vertices = flat.whole("vertices", VERTICES, least=16)
+    flat.done()
+    pins, stiffness = _pins(top.table("pins"))
+    air = top.table("air")
+    gravity = air.number("gravity", 0.0, least=0.0) if "gravity" in air else None
+    force = None
+    if "density" in air or "drag" in air:
+        base = QuadraticNormal()
+        force = QuadraticNormal(
+            density=air.number("density", base.density, least=0.0), drag=air.number("drag", base.drag, least=0.0)
+        )
+    air.done()
+    return Setup(
+        material=_material(top.table("material"), folder), outline=corners, pins=pins, stiffness=stiffness,
+        gravity=gravity, air=force, vertices=vertices,
+    )  # fmt: skip
+
+
+def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, float | None]:
+    points = table.points("points")
+    at = table.choice("at", Hold.HOIST_CORNERS) if "at" in table else None
+    if points and at is not None:
+        raise UsageError("both at and points are given", where=table.where, fix="keep one of them")
+    rigid = table.flag("rigid")
+    stiffness = table.number("stiffness", 0.0, above=0.0) if "stiffness" in table else None
+    if rigid and stiffness is not None:
+        raise UsageError("both rigid and a stiffness are given", where=table.where, fix="keep one of them")
+    table.done()
+    return at or points or None, math.inf if rigid else stiffness
+
+
+def _material(table: Table, folder: Path) -> Material | None:
+    name, file = table.text("name", None), table.text("file", None)
+    if name is None and file is None:
+        table.done()
+        return None
+    if name is not None and file is not None:
+        raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
+    if name is not None and name not in materials():
+        raise UnknownNameError.of("material", name, materials(), where=table.where)
+    base = named(name) if name is not None else _material_file(folder / (file or ""))
+    thicken = table.number("thicken", 1.0, above=0.0)
+    made = base.scaled(
+        density=thicken,
+        stretching=thicken * table.number("stretching-factor", 1.0, above=0.0),
+        bending=thicken * table.number("bending-factor", 1.0, least=0.0),
+    )
+    made = replace(
+        made, density=table.number("density", made.density, above=0.0),
+        damping=table.number("damping", made.damping, least=0.0),
+    )  # fmt: skip
+    table.done()
+    return made
+
+
+def _material_file(path: Path) -> Material:
+    if path.suffix == ".json":
+        return read_material(path)
+    if not path.is_file():
+        raise NotFoundError("no such material file", where=str(path), fix="check the path")
+    try:
+        return Material.from_mapping(tomllib.loads(path.read_text(encoding="utf-8")), name=path.stem)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
+
+
+def _recording(table: Table) -> RecordingSource:
+    source = table.text("source", None)
+    if not source:
+        raise InputError("no source is named", where=table.where, fix="add source, an artifact's id or a path")
+    recording = RecordingSource(
+        source=source, take=table.text("take", "") or "", name=table.text("name", "") or "",
+        rate=table.number("rate", 0.0, above=0.0) if "rate" in table else None,
+        unit=table.text("unit", "m") or "m", rest_unit=table.text("rest-unit", None),
+        noise=table.number("noise", 0.0, least=0.0) if "noise" in table else None,
+        wind=_wind(table.table("wind")) if "wind" in table else None,
+    )  # fmt: skip
+    table.done()
+    return recording
+
+
+def _wind(table: Table) -> WindSource:
+    velocity, log = table.numbers("velocity"), table.text("log", "") or ""
+    given = [bool(velocity), "speed" in table, bool(log)]
+    if sum(given) != 1:
+        raise UsageError(f"{sum(given)} winds", where=table.where, fix="give one of velocity, speed and log")
+    if log:
+        axis = _triple(table, "axis", table.numbers("axis"))
+        start = table.text("start", None)
+        placement = LogPlacement(
+            axis=axis, north=table.number("north", 0.0) if "north" in table else None,
+            offset=table.number("offset", 0.0) if "offset" in table else None,
+            start=timebase.parse(start, where=f"{table.where} start") if start is not None else None,
+        )  # fmt: skip
+        table.done()
+        return WindSource(log=log, placement=placement)
+    if not velocity:
+        speed, toward = table.number("speed", 0.0, least=0.0), table.number("toward", 0.0)
+        velocity = (speed * math.cos(toward), speed * math.sin(toward), 0.0)
+    source = WindSource(velocity=_triple(table, "velocity", velocity))
+    table.done()
+    return source
+
+
+def _triple(table: Table, key: str, values: tuple[float, ...]) -> tuple[float, float, float] | None:
+    if not values:
+        return None
+    if len(values) != 3:
+        raise InputError(f"{key} has {len(values)} numbers", where=table.where, fix="give [x, y, z]")
+    return values[0], values[1], values[2]
+
+
+def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:
+    seen = _opened(source, recipe.folder, lake).turned(recipe.up)
+    found: tuple[Finding, ...] = ()
+    track = None
+    if source.wind is not None:
+        track, found = _track(source.wind, recipe.folder, lake)
+    return replace(
+        seen, name=source.name or seen.name, wind=track, noise=source.noise, findings=(*seen.findings, *found)
+    )
+
+
+def _opened(source: RecordingSource, folder: Path, lake: Lake | None) -> Observation:
+    path = folder / source.source
+    if path.is_dir():
+        _refuse(source, ("take", "rest_unit"), "a folder of meshes")
+        return meshes.from_folder(path, rate=source.rate, unit=source.unit)
+    if path.is_file():
+        options = MarkerOptions(rate=source.rate, unit=source.unit, rest_unit=source.rest_unit)
+        return _take(markers.from_table(path, options), source)
+    if lake is None:
+        raise NotFoundError("no such file or folder", where=source.source, fix="check the path, or open a lake for ids")
+    _refuse(source, ("take", "rate", "rest_unit"), "an artifact")
+    if source.unit != "m":
+        raise UsageError("an artifact is in metres", where=source.source, fix="leave the unit out")
+    artifact = lake.artifact(source.source)
+    if artifact.kind is Kind.MARKERS:
+        return markers.from_artifact(lake, artifact)
+    return meshes.from_artifact(lake, artifact)
+
+
+def _refuse(source: RecordingSource, keys: tuple[str, ...], what: str) -> None:
+    given = {"take": bool(source.take), "rate": source.rate is not None, "rest_unit": source.rest_unit is not None}
+    for key in keys:
+        if given[key]:
+            fix = f"leave {key.replace('_', '-')} out"
+            raise UsageError(f"{key.replace('_', '-')} means nothing for {what}", where=source.source, fix=fix)
+
+
+def _take(found: tuple[Observation, ...], source: RecordingSource) -> Observation:
+    if not source.take:
+        if len(found) > 1:
+            raise UsageError(
+                f"the table holds {len(found)} recordings", where=source.source,
+                fix=f"add take, one of {', '.join(seen.name for seen in found)}",
+            )  # fmt: skip
+        return found[0]
+    for seen in found:
+        if seen.name == source.take:
+            return seen
+    raise UnknownNameError.of("recording", source.take, [seen.name for seen in found], where=source.source)
+
+
+def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTrack, tuple[Finding, ...]]:
+    if source.velocity is not None:
+        return WindTrack.constant(source.velocity), ()
+    placement = source.placement or LogPlacement()
+    path = folder / source.log
+    if path.is_file():
+        return wind.from_log(path, placement)
+    if lake is None:
+        raise NotFoundError("no such log", where=source.log, fix="check the path, or open a lake for ids")
+    return wind.from_artifact(lake, lake.artifact(source.log), placement)
