@@ -105,7 +105,7 @@ class Residual:
         markers: (u, v) of the markers [m].
         in_space: root mean square over the frames, base model [m], one a marker.
         in_space_after: with the effect.
-        mean: (x, y, z) mean over the frames, base model [m], one a marker.
+        mean: (x, y, z) mean of observed − predicted over the frames, base model [m], one a marker.
         frequencies: [Hz].
         spectrum: of the error, base model [m²/Hz].
         spectrum_after: with the effect.
