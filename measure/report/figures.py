@@ -10,6 +10,7 @@ from markupsafe import Markup
 from measure.loop.verdict import NullTest, Residual
 from measure.report.chart import Chart, Linear, Logarithmic
 from measure.report.quantity import display, number
+from measure.report.sentences import critical_value
 
 _LEFT, _RIGHT, _TOP = 62.0, 628.0, 34.0
 _BINS = 24
@@ -68,7 +69,7 @@ def against_wind(residuals: Sequence[Residual]) -> Markup:
     shown = display([*before, *after], "m")
     chart = Chart(
         title="Prediction error against wind",
-        description="one point a recording; hollow where neither model was fitted to it",
+        description="one point a recording",
         x=Linear.over([r.speed for r in placed], _LEFT, _RIGHT),
         y=Linear.over([v * shown.factor for v in (*before, *after)], 194, _TOP, at_least=[0.0]),
         x_label="mean logged wind [m/s]",
@@ -109,17 +110,6 @@ def null_distribution(test: NullTest) -> Markup:
     _named(chart, test.statistic, 30, f"observed {number(test.statistic)}")
     chart.note(_LEFT, 48, "nulls in a bin", "start")
     return chart.svg()
-
-
-def critical_value(test: NullTest) -> float | None:
-    """The least statistic with a p-value not above the level; None where there are too few nulls for any.
-
-    p = (1 + k)/(1 + n) ≤ level allows k = ⌊level (1 + n)⌋ − 1 nulls at least as large, so the statistic has to exceed
-    the next one.
-    """
-    null = sorted((v for v in test.null if math.isfinite(v)), reverse=True)
-    allowed = math.floor(test.level * (1 + len(null)) + 1e-9) - 1
-    return null[allowed] if 0 <= allowed < len(null) else None
 
 
 def _named(chart: Chart, value: float, y: float, text: str) -> None:

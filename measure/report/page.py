@@ -69,6 +69,7 @@ def page(verdict: Verdict) -> str:
         "gain_row": lambda c: rows.gain_row(c, gains, "after" if c.effect in verdict.named else "single"),
         "strength_row": rows.strength_row,
         "null": figures.null_distribution(verdict.test),
+        "some_unseen": any(r.held_out for r in verdict.residuals),
         "windless": [r.recording for r in verdict.residuals if not math.isfinite(r.speed)],
         "against_wind": figures.against_wind(verdict.residuals),
         **_residuals(verdict.residuals, sentences.after_label(verdict)),

@@ -48,8 +48,9 @@ def test_sentence(test: NullTest) -> str:
     says = "is rejected" if test.p_value <= test.level else "is not rejected"
     spread = p_interval(test)
     interval = f" [{probability(spread.low)}, {probability(spread.high)}] {level_text(_LEVEL)}" if spread else ""
+    more = "" if counted(test) else ", to which more than the statistic shown here contributes"
     return (
-        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}. "
+        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}{more}. "
         f"{as_large(test)} of {len(null)} nulls reach the observed statistic {number(test.statistic)}."
     )
 
@@ -58,7 +59,7 @@ def test_remark(test: NullTest) -> str:
     """What limits the test; empty where nothing does."""
     count = sum(map(math.isfinite, test.null))
     least = 1 / (1 + count)
-    if least > test.level:
+    if counted(test) and least > test.level:
         return (
             f"With {count} nulls no p-value below {probability(least)} is possible: it could not have rejected at "
             f"level {test.level:g}."
@@ -73,10 +74,27 @@ def as_large(test: NullTest) -> int:
     return sum(1 for v in test.null if math.isfinite(v) and v >= test.statistic)
 
 
-def p_interval(test: NullTest) -> Estimate | None:
-    """Clopper–Pearson interval of the chance that a null is at least as large; None without nulls."""
+def counted(test: NullTest) -> bool:
+    """Whether the p-value is (1 + nulls at least as large)/(1 + nulls), and not, say, combined with another test's."""
     count = sum(map(math.isfinite, test.null))
-    if not count:
+    return math.isclose(test.p_value, (1 + as_large(test)) / (1 + count), rel_tol=1e-9)
+
+
+def critical_value(test: NullTest) -> float | None:
+    """The least statistic with a p-value not above the level; None where there are too few nulls, or it is not counted.
+
+    p = (1 + k)/(1 + n) ≤ level allows k = ⌊level (1 + n)⌋ − 1 nulls at least as large, so the statistic has to exceed
+    the next one.
+    """
+    null = sorted((v for v in test.null if math.isfinite(v)), reverse=True)
+    allowed = math.floor(test.level * (1 + len(null)) + 1e-9) - 1
+    return null[allowed] if counted(test) and 0 <= allowed < len(null) else None
+
+
+def p_interval(test: NullTest) -> Estimate | None:
+    """Clopper–Pearson interval of the chance that a null is at least as large; None where p is not that chance."""
+    count = sum(map(math.isfinite, test.null))
+    if not count or not counted(test):
         return None
     interval = binomtest(as_large(test), count).proportion_ci(_LEVEL, method="exact")
     return Estimate(

@@ -9,7 +9,6 @@ import pytest
 
 from measure.loop.verdict import Conclusion, NullTest
 from measure.report import sentences
-from measure.report.figures import critical_value
 from tests.measure.report.verdicts import about, verdict
 
 
@@ -33,7 +32,7 @@ def test_nothing_is_said_of_a_p_value_without_nulls() -> None:
 def test_the_critical_value_is_the_one_that_leaves_room_for_the_allowed_nulls() -> None:
     """99 nulls 1…99 at level 0.03: p ≤ 0.03 allows 2 nulls at least as large (98, 99), so 97 has to be exceeded."""
     nulls = [float(v) for v in range(1, 100)]
-    assert critical_value(null_test(nulls, 0.0, 0.03)) == 97.0
+    assert sentences.critical_value(null_test(nulls, 0.0, 0.03)) == 97.0
     for statistic, significant in ((97.0, False), (97.5, True)):
         test = null_test(nulls, statistic, 0.03)
         assert (test.p_value <= test.level) is significant
@@ -41,8 +40,20 @@ def test_the_critical_value_is_the_one_that_leaves_room_for_the_allowed_nulls() 
 
 def test_too_few_nulls_for_the_level_are_called_so() -> None:
     test = null_test([1.0] * 19, 5.0, 0.01)
-    assert critical_value(test) is None
+    assert sentences.critical_value(test) is None
     assert "no p-value below 0.05" in sentences.test_remark(test)
+
+
+def test_a_p_value_that_other_tests_contribute_to_gets_no_interval_and_no_critical_value() -> None:
+    """Bonferroni over two tests: p is not the share of the nulls shown, so nothing is derived from that share."""
+    alone = null_test([float(v) for v in range(1, 100)], 98.5, 0.05)
+    combined = replace(alone, p_value=alone.p_value / 0.8)
+    assert sentences.critical_value(alone) is not None
+    assert sentences.p_interval(alone) is not None
+    assert sentences.critical_value(combined) is None
+    assert sentences.p_interval(combined) is None
+    assert "more than the statistic shown here contributes" in sentences.test_sentence(combined)
+    assert "contributes" not in sentences.test_sentence(alone)
 
 
 def test_a_base_model_that_is_not_rejected_is_not_called_true() -> None:
