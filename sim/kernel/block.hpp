@@ -142,17 +142,16 @@ class Block {
   const int64_t b, blocks;
   const V damping;
   I base;
-  std::array<contact::Search<T>, L> search_;
-  std::vector<contact::Point<T>> near_;
-  std::vector<T> moved_;  // how far each vertex is from there
+  contact::Lists<T, L>* const lists_;
+  std::vector<contact::Point<T>> lane_, speed_;  // positions and velocities of one lane
+  std::vector<T> near_;                          // and its near allowances
   T step_ = 0;            // of the time, where steps follow one another
-  std::vector<T> built_;  // positions at each lane's last search
   std::vector<T> normals_;
   std::vector<T> before_;  // positions one sweep of the limits ago
 
  public:
-  Block(const Problem<T>& problem, int64_t block, int64_t count)
-      : p(problem), b(block), blocks(count), damping(load(problem.damping + block * L)) {
+  Block(const Problem<T>& problem, int64_t block, int64_t count, contact::Lists<T, L>* lists = nullptr)
+      : p(problem), b(block), blocks(count), damping(load(problem.damping + block * L)), lists_(lists) {
     for (int l = 0; l < L; ++l) base[l] = p.table[b * L + l] * int32_t(p.counts[0] * p.counts[1] * p.counts[2]);
   }
 
@@ -320,36 +319,43 @@ class Block {
   void contacts(const T* x, const T* v, T* f) {
     const int64_t n = p.vertices;
     const int real = int(p.batch - b * L < L ? p.batch - b * L : L);
-    V worst = V{};
-    if (built_.empty()) {
-      built_.assign(x, x + 3 * L * n);
-      moved_.assign(L * n, T(0));
+    auto& [search, seen, moved, allowed] = *lists_;
+    auto beyond = V{} > V{};
+    if (seen.empty()) {
+      seen.resize(3 * L * n), moved.resize(L * n), allowed.resize(L * n);
+      beyond = ~beyond;
     } else {
       for (int64_t i = 0; i < n; ++i) {
-        const V3 move = sub(load3(x + 3 * L * i), load3(built_.data() + 3 * L * i));
-        const V square = dot(move, move);
-        worst = maximum(worst, square);
-        store(moved_.data() + L * i, root(square));
+        const V3 move = sub(load3(x + 3 * L * i), load3(seen.data() + 3 * L * i));
+        const V distance = root(dot(move, move));
+        store(moved.data() + L * i, distance);
+        beyond |= ~(distance <= load(allowed.data() + L * i));  // also what is no number
       }
     }
     const T* mass = p.mass + b * n * L;
     for (int l = 0; l < real; ++l) {
-      if (!search_[l].holds(worst[l])) {
-        near_.resize(n);
-        T fastest = 0;
-        for (int64_t i = 0; i < n; ++i) {
-          const int64_t at = 3 * L * i + l;
-          near_[i] = {x[at], x[at + L], x[at + 2 * L]};
-          fastest = std::max(fastest, v[at] * v[at] + v[at + L] * v[at + L] + v[at + 2 * L] * v[at + 2 * L]);
-        }
-        search_[l].build(p.contact, near_.data(), step_ * std::sqrt(fastest));
-        for (int64_t i = l; i < 3 * L * n; i += L) built_[i] = x[i];
-        for (int64_t i = l; i < L * n; i += L) moved_[i] = 0;
-        worst[l] = 0;
-      }
-      if (!search_[l].pairs().empty())
-        contact::apply<T, L>(p.contact, search_[l], moved_.data() + l, std::sqrt(worst[l]), x + l, v + l, mass + l,
-                             T(damping[l]), f + l);
+      if (beyond[l]) refresh(l, x, v);
+      if (!search[l].near().empty())
+        contact::apply<T, L>(p.contact, search[l], moved.data() + l, x + l, v + l, mass + l, T(damping[l]), f + l);
+    }
+  }
+
+  // Another near list for a lane.
+  void refresh(int l, const T* x, const T* v) {
+    const int64_t n = p.vertices;
+    lane_.resize(n), speed_.resize(n), near_.resize(n);
+    for (int64_t i = 0; i < n; ++i) {
+      const int64_t at = 3 * L * i + l;
+      lane_[i] = {x[at], x[at + L], x[at + 2 * L]};
+      speed_[i] = {v[at], v[at + L], v[at + 2 * L]};
+    }
+    auto& [search, seen, moved, allowed] = *lists_;
+    search[l].refresh(p.contact, lane_.data(), speed_.data(), step_, near_.data());
+    for (int64_t i = 0; i < n; ++i) {
+      const int64_t at = 3 * L * i + l;
+      seen[at] = lane_[i].x, seen[at + L] = lane_[i].y, seen[at + 2 * L] = lane_[i].z;
+      moved[L * i + l] = 0;
+      allowed[L * i + l] = near_[i];
     }
   }
 

@@ -1,30 +1,39 @@
 // Self-contact for one block: what sim/contact.py defines, with a search that looks only at what is near.
 //
-// Every lane has its own candidates: pairs of a vertex and a face closer than the thickness plus a skin, ordered by
-// distance. They hold until some vertex of the lane has moved half the skin, so that a step seldom searches; and while no
-// vertex has moved further than m, only pairs closer than the thickness plus 2 m need looking at. The skin is what the
-// lane's fastest vertex goes in some steps: a slow cloth, whose layers lie close, then has few candidates.
+// Every lane has its own candidates, in two nested lists (Verlet's). The far list holds all pairs of a vertex and a
+// face that touch before any vertex has gone further than its far allowance from where it was; it is made by a search
+// over the cloth and serves some tens of steps. The near list holds those of them that touch before any vertex has gone
+// further than its near allowance, and serves a few steps. Allowances are what each vertex goes at its own speed and a
+// share of the lane's, so that a few fast vertices do not widen the lists of all. Whatever the lists, the pairs that
+// touch, and so the forces, are the same.
 
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <type_traits>
 #include <vector>
+#if defined(__AVX512DQ__)
+#include <immintrin.h>
+#endif
 
 namespace contact {
 
 template <typename T>
 struct Settings {
-  int64_t vertices, faces;
+  int64_t vertices, faces, groups, blocks;
   const int32_t* face;        // (faces, 3)
   const T* vertex_area;       // (vertices)
-  const T* rest;              // (vertices, 2)
   const T* centre;            // (faces, 2) at rest
   const T* apart;             // (faces) squared rest distance from the centre beyond which a vertex is another layer's
+  const int32_t* group;       // (groups, width) vertices that are close at rest; -1 where there is none
+  const T* group_rest;        // (2, groups, width) their rest positions; NaN where there is none
+  const T* group_box;         // (4, groups up to a multiple of width) of these: least and greatest u, then v; NaN beyond
+  const int32_t* block;       // (blocks, width) faces that are close at rest; -1 where there is none
   double thickness, stiffness, friction;  // thickness 0: no contact
 };
 
@@ -73,149 +82,268 @@ inline T closest(Point<T> p, Point<T> a, Point<T> b, Point<T> c, T w[3]) {
 // The candidates of one lane.
 template <typename T>
 class Search {
-  struct Pair {
-    T distance;
-    int32_t vertex, face;
-  };
-  std::vector<Pair> pairs_;
-  T skin_ = -1;  // of the last search; negative before it
-  std::vector<T> x_, y_, z_, u_, v_;  // vertices in the order of their bins
-  std::vector<int32_t> order_, bin_;
-
-  static constexpr int kBins = 128;
-  static constexpr int kWidth = 64 / sizeof(T);
+  static constexpr int W = 64 / sizeof(T);
   typedef T Wide __attribute__((vector_size(64)));
   using Mask = decltype(Wide{} < Wide{});
   using Flag = std::conditional_t<sizeof(T) == 4, int32_t, int64_t>;
 
-  // Steps that a search is meant to serve, and the range of skins [thicknesses].
-  static constexpr int kSteps = 16;
-  static constexpr double kThinnest = 0.25, kThickest = 4;
+  struct Pair {
+    T distance;  // at most that when its list was made
+    int32_t vertex, face;
+  };
+  std::vector<Pair> far_, near_;
+  std::vector<Point<T>> built_;      // positions when the far list was made
+  std::vector<T> allowed_, moved_;   // far allowances, and what is used up of them
+  std::vector<T> x_, y_, z_, a_;     // positions and allowances in the order of the groups
+  std::vector<T> boxes_;             // (6, groups up to a multiple of W) least and greatest x, y, z, with allowances
+  std::vector<T> close_;             // (10, ...) of the groups near a block: their boxes in space and at rest
+  std::vector<int32_t> closest_;     // which groups these are
+
+  // Steps that the lists are meant to serve, and the fewest that are worth a near list; the share of the lane's mean
+  // speed in a vertex's own; the least allowance for a step [thicknesses].
+  static constexpr double kFarSteps = 28, kNearSteps = 8, kFewest = 3, kShare = 0.5, kLeast = 0.002;
 
  public:
-  const std::vector<Pair>& pairs() const { return pairs_; }
+  const std::vector<Pair>& near() const { return near_; }
 
-  // Whether the candidates still hold after moves of squared length up to `worst`.
-  bool holds(T worst) const { return skin_ > 0 && worst < skin_ * skin_ / 4; }
-
-  // `pace` is how far the fastest vertex goes in a step: a slow cloth gets a thin skin, and few candidates.
-  void build(const Settings<T>& s, const Point<T>* x, T pace) {
-    pairs_.clear();
-    skin_ = std::clamp(2 * kSteps * pace, T(kThinnest * s.thickness), T(kThickest * s.thickness));
-    const T reach = T(s.thickness) + skin_;
-    Point<T> low = x[0], high = x[0];
-    for (int64_t i = 0; i < s.vertices; ++i) {
-      if (!(std::abs(x[i].x) < T(1e4) && std::abs(x[i].y) < T(1e4) && std::abs(x[i].z) < T(1e4))) return;  // diverged
-      low = {std::min(low.x, x[i].x), std::min(low.y, x[i].y), std::min(low.z, x[i].z)};
-      high = {std::max(high.x, x[i].x), std::max(high.y, x[i].y), std::max(high.z, x[i].z)};
-    }
-    // Slabs across the axis along which the cloth is longest.
-    const Point<T> size = high - low;
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    auto along = [axis](const Point<T>& p) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; };
-    const T start = along(low), inverse = T(kBins) / std::max(along(size), T(1e-6));
-    auto bin = [&](T value) { return std::clamp(int((value - start) * inverse), 0, kBins - 1); };
+  // Makes the near list for positions x and velocities v, with steps of `step`. `near_allowed` gets its allowances.
+  void refresh(const Settings<T>& s, const Point<T>* x, const Point<T>* v, T step, T* near_allowed) {
+    near_.clear();
     const size_t n = size_t(s.vertices);
-    bin_.assign(kBins + 1, 0);
-    for (size_t i = 0; i < n; ++i) ++bin_[bin(along(x[i])) + 1];
-    for (int i = 0; i < kBins; ++i) bin_[i + 1] += bin_[i];
-    order_.resize(n);
-    std::vector<int32_t> place(bin_.begin(), bin_.end() - 1);
-    for (size_t i = 0; i < n; ++i) order_[place[bin(along(x[i]))]++] = int32_t(i);
-    // Padded with what is near nothing, so that the search may read in whole vectors.
-    for (auto* values : {&x_, &y_, &z_, &u_, &v_}) values->assign(n + kWidth, std::numeric_limits<T>::quiet_NaN());
+    T mean = 0;
     for (size_t i = 0; i < n; ++i) {
-      const int32_t v = order_[i];
-      x_[i] = x[v].x, y_[i] = x[v].y, z_[i] = x[v].z;
-      u_[i] = s.rest[2 * v], v_[i] = s.rest[2 * v + 1];
+      near_allowed[i] = std::sqrt(dot(v[i], v[i]));
+      mean += near_allowed[i];
     }
-    for (int64_t f = 0; f < s.faces; ++f) look(s, x, f, reach, bin, along);
-    std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+    const T h = T(s.thickness), lane = T(kShare) * mean / T(n), least = T(kLeast) * h;
+    // What a vertex goes in a step, at least.
+    for (size_t i = 0; i < n; ++i) near_allowed[i] = step * (near_allowed[i] + lane) + least;
+    moved_.resize(n);
+    bool holds = built_.size() == n;
+    if (holds)
+      for (size_t i = 0; i < n; ++i) {
+        const Point<T> move = x[i] - built_[i];
+        moved_[i] = std::sqrt(dot(move, move));
+        holds = holds && moved_[i] + T(kFewest) * near_allowed[i] <= allowed_[i];
+      }
+    if (!holds) {
+      allowed_.resize(n);
+      for (size_t i = 0; i < n; ++i) allowed_[i] = T(kFarSteps) * near_allowed[i];
+      build(s, x);
+    }
+    for (size_t i = 0; i < n; ++i) near_allowed[i] = std::min(T(kNearSteps) * near_allowed[i], allowed_[i] - moved_[i]);
+    for (const Pair& pair : far_) {
+      const int32_t *c = s.face + 3 * int64_t(pair.face), i = pair.vertex;
+      const T face = std::max({near_allowed[c[0]], near_allowed[c[1]], near_allowed[c[2]]});
+      const T reach = T(1.001) * (h + near_allowed[i] + face);
+      if (pair.distance > reach + moved_[i] + std::max({moved_[c[0]], moved_[c[1]], moved_[c[2]]})) continue;
+      T w[3];
+      const T square = closest(x[i], x[c[0]], x[c[1]], x[c[2]], w);
+      if (square < reach * reach) near_.push_back({std::sqrt(square), i, pair.face});
+    }
   }
 
  private:
-  // Squared distances of points from one triangle: `closest` for a whole vector of points, without the weights.
+  static Wide load(const T* p) {
+    Wide wide;
+    std::memcpy(&wide, p, sizeof wide);
+    return wide;
+  }
+
+  // The lanes of a mask that are set, one bit each.
+  static uint32_t bits(const Mask& mask) {
+#if defined(__AVX512DQ__)
+    if constexpr (sizeof(T) == 4) return _mm512_movepi32_mask((__m512i)mask);
+    else return _mm512_movepi64_mask((__m512i)mask);
+#else
+    Flag flags[W];
+    std::memcpy(flags, &mask, sizeof flags);
+    uint32_t set = 0;
+    for (int k = 0; k < W; ++k) set |= uint32_t(flags[k] & 1) << k;
+    return set;
+#endif
+  }
+
+  static Wide above(const Wide& a, const Wide& b) { return a > b ? a : b; }
+
+  // A face as the search sees it: its distance from points is at least that from the plane and from the three strips
+  // beside its edges, for which a vector of points takes few operations.
   struct Sight {
-    struct Points {
-      Wide x, y, z;
-    };
+    Point<T> corner[3], across, out[3];
 
-    Point<T> e, f, g;
-    T ee, ef, ff, inverse, ie, iff, ig;
-
-    Sight(Point<T> a, Point<T> b, Point<T> c) : e(b - a), f(c - a), g(c - b) {
-      const T tiny = std::numeric_limits<T>::min();
-      ee = dot(e, e), ef = dot(e, f), ff = dot(f, f);
-      inverse = 1 / std::max(ee * ff - ef * ef, tiny);
-      ie = 1 / std::max(ee, tiny), iff = 1 / std::max(ff, tiny), ig = 1 / std::max(dot(g, g), tiny);
+    Sight() = default;
+    Sight(Point<T> a, Point<T> b, Point<T> c) : corner{a, b, c} {
+      const Point<T> normal = cross(b - a, c - a);
+      across = unit(normal);
+      for (int i = 0; i < 3; ++i) out[i] = unit(cross(corner[(i + 1) % 3] - corner[i], normal));
     }
 
-    static Wide along(const Points& r, Point<T> d) { return r.x * d.x + r.y * d.y + r.z * d.z; }
-    static Points less(const Points& r, const Wide& s, Point<T> d) {
-      return {r.x - s * d.x, r.y - s * d.y, r.z - s * d.z};
+    static Point<T> cross(Point<T> a, Point<T> b) {
+      return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
     }
-    static Wide length(const Points& r) { return r.x * r.x + r.y * r.y + r.z * r.z; }
-    static Wide least(const Wide& a, const Wide& b) { return a < b ? a : b; }
-    static Wide side(const Points& r, const Wide& share, Point<T> d) {
-      const Wide zero = Wide{}, one = zero + 1, low = share > 0 ? share : zero;
-      return length(less(r, low < 1 ? low : one, d));
+    static Point<T> unit(Point<T> a) {
+      return (1 / std::sqrt(std::max(dot(a, a), std::numeric_limits<T>::min()))) * a;
+    }
+    static Wide along(const Wide& x, const Wide& y, const Wide& z, Point<T> d, Point<T> from) {
+      return x * d.x + y * d.y + z * d.z - dot(d, from);
     }
 
-    // For points r from the first corner.
-    Wide square(const Points& r) const {
-      const Wide re = along(r, e), rf = along(r, f);
-      const Wide u = (ff * re - ef * rf) * inverse, v = (ee * rf - ef * re) * inverse;
-      const Points q = {r.x - e.x, r.y - e.y, r.z - e.z};
-      const Wide rim = least(side(r, re * ie, e), least(side(r, rf * iff, f), side(q, along(q, g) * ig, g)));
-      return ((u >= 0) & (v >= 0) & (u + v <= 1)) ? length(less(less(r, u, e), v, f)) : rim;
+    Wide square(const Wide& x, const Wide& y, const Wide& z) const {
+      const Wide height = along(x, y, z, across, corner[0]);
+      Wide beside = Wide{};
+      for (int i = 0; i < 3; ++i) beside = above(beside, along(x, y, z, out[i], corner[i]));
+      return height * height + beside * beside;
     }
   };
 
-  template <typename Bin, typename Along>
-  void look(const Settings<T>& s, const Point<T>* x, int64_t f, T reach, Bin bin, Along along);
+  // Makes the far list.
+  void build(const Settings<T>& s, const Point<T>* x) {
+    far_.clear();
+    built_.assign(x, x + s.vertices);
+    moved_.assign(s.vertices, T(0));
+    for (int64_t i = 0; i < s.vertices; ++i)
+      if (!(std::abs(x[i].x) < T(1e4) && std::abs(x[i].y) < T(1e4) && std::abs(x[i].z) < T(1e4))) return;  // diverged
+    const int64_t padded = (s.groups + W - 1) / W * W;
+    constexpr T inf = std::numeric_limits<T>::infinity(), nan = std::numeric_limits<T>::quiet_NaN();
+    for (auto* values : {&x_, &y_, &z_, &a_}) values->resize(s.groups * W);
+    boxes_.assign(6 * padded, inf);  // beyond the last: farther than anything
+    for (int64_t g = 0; g < s.groups; ++g) {
+      T low[3] = {inf, inf, inf}, high[3] = {-inf, -inf, -inf}, most = 0;
+      for (int64_t i = g * W; i < (g + 1) * W; ++i) {
+        const int32_t v = s.group[i];
+        if (v < 0) {
+          x_[i] = y_[i] = z_[i] = nan, a_[i] = 0;
+          continue;
+        }
+        x_[i] = x[v].x, y_[i] = x[v].y, z_[i] = x[v].z, a_[i] = allowed_[v];
+        low[0] = std::min(low[0], x_[i]), low[1] = std::min(low[1], y_[i]), low[2] = std::min(low[2], z_[i]);
+        high[0] = std::max(high[0], x_[i]), high[1] = std::max(high[1], y_[i]), high[2] = std::max(high[2], z_[i]);
+        most = std::max(most, a_[i]);
+      }
+      for (int k = 0; k < 3; ++k) {
+        boxes_[2 * k * padded + g] = low[k] - most;
+        boxes_[(2 * k + 1) * padded + g] = high[k] + most;
+      }
+    }
+    for (int64_t b = 0; b < s.blocks; ++b) look(s, x, s.block + b * W, padded);
+  }
+
+  // Adds the pairs of a block of faces.
+  void look(const Settings<T>& s, const Point<T>* x, const int32_t* faces, int64_t padded) {
+    constexpr T inf = std::numeric_limits<T>::infinity();
+    const T h = T(s.thickness);
+    Point<T> low = {inf, inf, inf}, high = {-inf, -inf, -inf};
+    T most = 0;
+    for (int k = 0; k < W && faces[k] >= 0; ++k)
+      for (int c = 0; c < 3; ++c) {
+        const int32_t i = s.face[3 * faces[k] + c];
+        low = {std::min(low.x, x[i].x), std::min(low.y, x[i].y), std::min(low.z, x[i].z)};
+        high = {std::max(high.x, x[i].x), std::max(high.y, x[i].y), std::max(high.z, x[i].z)};
+        most = std::max(most, allowed_[i]);
+      }
+    const T reach = T(1.001) * (h + most);
+    low = low - Point<T>{reach, reach, reach}, high = high + Point<T>{reach, reach, reach};
+    closest_.clear();
+    for (int64_t g = 0; g < padded; g += W) {
+      const T* box = boxes_.data() + g;
+      uint32_t hit = bits((load(box) <= high.x) & (load(box + padded) >= low.x) & (load(box + 2 * padded) <= high.y) &
+                          (load(box + 3 * padded) >= low.y) & (load(box + 4 * padded) <= high.z) &
+                          (load(box + 5 * padded) >= low.z));
+      for (; hit; hit &= hit - 1) closest_.push_back(int32_t(g + __builtin_ctz(hit)));
+    }
+    const int64_t count = int64_t(closest_.size()), room = (count + W - 1) / W * W;
+    close_.assign(10 * room, std::numeric_limits<T>::quiet_NaN());
+    for (int64_t k = 0; k < count; ++k) {
+      for (int side = 0; side < 6; ++side) close_[side * room + k] = boxes_[side * padded + closest_[k]];
+      for (int side = 0; side < 4; ++side) close_[(6 + side) * room + k] = s.group_box[side * padded + closest_[k]];
+    }
+    // Two at a time: neighbours share most of what is near.
+    for (int k = 0; k < W && faces[k] >= 0; k += 2) look(s, x, {faces[k], faces[k + 1]}, count, room);
+  }
+
+  // A face in the search.
+  struct Seen {
+    int32_t face;
+    Point<T> corner[3];
+    T u, v, apart, reach;
+    Sight sight;
+    bool ready = false;
+
+    Seen(const Settings<T>& s, const Point<T>* x, const std::vector<T>& allowed, int32_t f) : face(f) {
+      const int32_t* c = s.face + 3 * int64_t(f);
+      for (int i = 0; i < 3; ++i) corner[i] = x[c[i]];
+      u = s.centre[2 * f], v = s.centre[2 * f + 1], apart = s.apart[f];
+      reach = T(1.001) * (T(s.thickness) + std::max({allowed[c[0]], allowed[c[1]], allowed[c[2]]}));
+    }
+
+    // Which rest positions at these distances are another layer's.
+    Mask other(const Wide& du, const Wide& dv) const { return du * du + dv * dv >= apart; }
+  };
+
+  // Adds the pairs of two faces, the second of which may be -1, with the groups that are near their block.
+  void look(const Settings<T>& s, const Point<T>* x, std::array<int32_t, 2> faces, int64_t count, int64_t room) {
+    Seen two[2] = {{s, x, allowed_, faces[0]}, {s, x, allowed_, faces[1] < 0 ? faces[0] : faces[1]}};
+    const int many = faces[1] < 0 ? 1 : 2;
+    Point<T> middle = {0, 0, 0};
+    for (const Seen& one : two)
+      for (const Point<T>& corner : one.corner) middle = middle + (T(1) / 6) * corner;
+    T square = 0;
+    for (const Seen& one : two)
+      for (const Point<T>& corner : one.corner) square = std::max(square, dot(corner - middle, corner - middle));
+    const T radius = T(1.001) * std::sqrt(square) + std::max(two[0].reach, two[1].reach);
+    const Wide zero = Wide{};
+    auto outside = [&](const Wide& low, const Wide& high, T value) {
+      return above(above(low - value, value - high), zero);
+    };
+    for (int64_t first = 0; first < count; first += W) {
+      const T* box = close_.data() + first;
+      const Wide dx = outside(load(box), load(box + room), middle.x);
+      const Wide dy = outside(load(box + 2 * room), load(box + 3 * room), middle.y);
+      const Wide dz = outside(load(box + 4 * room), load(box + 5 * room), middle.z);
+      const Wide u0 = load(box + 6 * room), u1 = load(box + 7 * room);
+      const Wide v0 = load(box + 8 * room), v1 = load(box + 9 * room);
+      auto other = [&](const Seen& one) {
+        return one.other(above(one.u - u0, u1 - one.u), above(one.v - v0, v1 - one.v));
+      };
+      uint32_t candidate = bits((dx * dx + dy * dy + dz * dz < radius * radius) & (other(two[0]) | other(two[1])));
+      for (; candidate; candidate &= candidate - 1) {
+        const int64_t i = int64_t(closest_[first + __builtin_ctz(candidate)]) * W;
+        const Wide px = load(x_.data() + i), py = load(y_.data() + i), pz = load(z_.data() + i);
+        const Wide pa = load(a_.data() + i);
+        const Wide ex = px - middle.x, ey = py - middle.y, ez = pz - middle.z, bound = radius + pa;
+        const Mask near = ex * ex + ey * ey + ez * ez < bound * bound;
+        if (!bits(near)) continue;
+        const Wide pu = load(s.group_rest + i), pv = load(s.group_rest + s.groups * W + i);
+        for (int k = 0; k < many; ++k) {
+          Seen& one = two[k];
+          const Mask mine = near & one.other(pu - one.u, pv - one.v);
+          if (!bits(mine)) continue;
+          if (!one.ready) one.sight = Sight(one.corner[0], one.corner[1], one.corner[2]), one.ready = true;
+          const Wide least = one.sight.square(px, py, pz), within = one.reach + pa;
+          for (uint32_t hit = bits(mine & (least < within * within)); hit; hit &= hit - 1) {
+            const int j = __builtin_ctz(hit);
+            far_.push_back({std::sqrt(least[j]), s.group[i + j], one.face});
+          }
+        }
+      }
+    }
+  }
 };
 
-template <typename T>
-template <typename Bin, typename Along>
-void Search<T>::look(const Settings<T>& s, const Point<T>* x, int64_t f, T reach, Bin bin, Along along) {
-  const Point<T> a = x[s.face[3 * f]], b = x[s.face[3 * f + 1]], c = x[s.face[3 * f + 2]];
-  const Point<T> middle = (T(1) / 3) * (a + b + c);
-  const T square = std::max({dot(a - middle, a - middle), dot(b - middle, b - middle), dot(c - middle, c - middle)});
-  const T radius = std::sqrt(square) + reach, bound = radius * radius;
-  const int32_t first = bin_[bin(along(middle) - radius)], last = bin_[bin(along(middle) + radius) + 1];
-  const T u = s.centre[2 * f], v = s.centre[2 * f + 1], apart = s.apart[f];
-  auto load = [](const std::vector<T>& values, int32_t i) {
-    Wide wide;
-    std::memcpy(&wide, values.data() + i, sizeof wide);
-    return wide;
-  };
-  // Any of `hit` set, which is copied to `flags`.
-  auto any = [](const Mask& hit, Flag* flags) {
-    std::memcpy(flags, &hit, sizeof hit);
-    int64_t words[8], set = 0;
-    std::memcpy(words, &hit, sizeof words);
-    for (int64_t word : words) set |= word;
-    return set != 0;
-  };
-  const Sight sight(a, b, c);
-  for (int32_t i = first; i < last; i += kWidth) {
-    const Wide px = load(x_, i), py = load(y_, i), pz = load(z_, i);
-    const Wide dx = px - middle.x, dy = py - middle.y, dz = pz - middle.z, du = load(u_, i) - u, dv = load(v_, i) - v;
-    const Mask near = (dx * dx + dy * dy + dz * dz < bound) & (du * du + dv * dv >= apart);
-    Flag hit[kWidth];
-    if (!any(near, hit)) continue;
-    const Wide distance = sight.square({px - a.x, py - a.y, pz - a.z});
-    if (!any(near & (distance < reach * reach), hit)) continue;
-    for (int k = 0; k < kWidth; ++k)
-      if (hit[k]) pairs_.push_back({std::sqrt(distance[k]), order_[i + k], int32_t(f)});
-  }
-}
+// The candidates of a block, kept from call to call.
+template <typename T, int lanes>
+struct Lists {
+  std::array<Search<T>, lanes> search;
+  std::vector<T> seen;     // (vertices, 3, lanes) positions when each lane's near list was made
+  std::vector<T> moved;    // (vertices, lanes) how far each vertex is from there
+  std::vector<T> allowed;  // and how far it may be
+};
 
 // Adds repulsion and friction to the forces of one lane. Arrays are (vertices, 3, lanes), offset to the lane. `moved`
-// (vertices, lanes) is how far each vertex has moved since the search, `furthest` the most of them.
+// (vertices, lanes) is how far each vertex has moved since the near list was made.
 template <typename T, int lanes>
-void apply(const Settings<T>& s, const Search<T>& search, const T* moved, T furthest, const T* x, const T* v,
-           const T* mass, T damping, T* f) {
+void apply(const Settings<T>& s, const Search<T>& search, const T* moved, const T* x, const T* v, const T* mass,
+           T damping, T* f) {
   struct Hit {
     int32_t vertex, face;
     T distance, w[3];
@@ -233,9 +361,8 @@ void apply(const Settings<T>& s, const Search<T>& search, const T* moved, T furt
   static thread_local std::vector<Hit> hits;
   hits.clear();
   // A little more than needed, against rounding.
-  const T margin = T(1.001) * h, limit = margin + 2 * furthest;
-  for (const auto& pair : search.pairs()) {
-    if (pair.distance > limit) break;
+  const T margin = T(1.001) * h;
+  for (const auto& pair : search.near()) {
     const int32_t* c = s.face + 3 * int64_t(pair.face);
     const T face = std::max({moved[lanes * c[0]], moved[lanes * c[1]], moved[lanes * c[2]]});
     if (pair.distance > margin + moved[lanes * pair.vertex] + face) continue;

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import math
+import weakref
 from dataclasses import dataclass, field
 from typing import Any
-from weakref import WeakKeyDictionary
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.contact import Contact, layers
@@ -27,7 +29,7 @@ _BLOCKED = (
     "tie_stiffness", "tie_slack", "wind", "targets", "rate", "tie_targets", "tie_rate",
 )  # fmt: skip
 
-_CONTACT_POINTERS = ("face", "vertex_area", "rest", "centre", "apart")
+_CONTACT_POINTERS = ("face", "vertex_area", "centre", "apart", "group", "group_rest", "group_box", "block")
 _CONTACT_SCALARS = ("thickness", "stiffness", "friction")
 
 
@@ -35,7 +37,7 @@ class _Contact(ctypes.Structure):
     """Mirrors `contact::Settings` of contact.hpp."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("vertices", "faces")),
+        *((name, ctypes.c_int64) for name in ("vertices", "faces", "groups", "blocks")),
         *((name, ctypes.c_void_p) for name in _CONTACT_POINTERS),
         *((name, ctypes.c_double) for name in _CONTACT_SCALARS),
     ]
@@ -62,9 +64,23 @@ class _Problem(ctypes.Structure):
     ]
 
 
+class _Lists:
+    """What the kernel's contact remembers from call to call of what is near: it saves time and changes no result.
+
+    Attributes:
+        place: in memory.
+    """
+
+    def __init__(self, code: ctypes.CDLL, dtype: torch.dtype, blocks: int) -> None:
+        make, drop = _function(code, "lists", dtype), _function(code, "drop", dtype)
+        make.restype, drop.restype = ctypes.c_void_p, None
+        self.place = ctypes.c_void_p(make(ctypes.c_int64(blocks)))
+        weakref.finalize(self, drop, self.place)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Kernel:
-    """The kernel for one system.
+    """The kernel for one system. One call at a time.
 
     Attributes:
         batch: members.
@@ -73,6 +89,7 @@ class Kernel:
         blocks: how many blocks the batch takes; spare lanes of the last repeat its last member.
         tensors: what the kernel reads, kept alive here.
         tied: (tie, 3, batch) anchors of the springs beside the handles [m].
+        lists: the contact's candidates.
     """
 
     code: ctypes.CDLL
@@ -83,6 +100,7 @@ class Kernel:
     problem: _Problem
     tensors: dict[str, Tensor] = field(repr=False)
     tied: Tensor | None = field(repr=False)
+    lists: _Lists = field(repr=False)
 
     @classmethod
     def of(cls, system: System) -> Kernel | None:
@@ -153,7 +171,7 @@ class Kernel:
         for name, tensor in tensors.items():
             setattr(problem, name, tensor.data_ptr() if tensor.numel() else None)
         if system.contact is not None:
-            tensors |= _set_contact(problem.contact, system, system.contact, tensors["face"])
+            tensors |= _set_contact(problem.contact, system, system.contact, tensors["face"], lanes)
         if system.limits is not None:
             problem.lowest, problem.highest = system.limits.low, system.limits.high
             problem.sweeps = system.limits.sweeps
@@ -162,6 +180,7 @@ class Kernel:
         return cls(
             code=code, batch=cloth.batch, dtype=cloth.dtype, lanes=lanes, blocks=blocks, problem=problem,
             tensors=tensors, tied=torch.cat([t.anchors for t in ties]) if ties else None,
+            lists=_Lists(code, cloth.dtype, blocks),
         )  # fmt: skip
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
@@ -193,7 +212,7 @@ class Kernel:
         problem, alive = self._drive(drive)
         xb, vb = self.pack(x), self.pack(v)
         scratch = torch.empty_like(xb[0])
-        self._call("advance", problem, xb, vb, scratch, ctypes.c_double(h), ctypes.c_int64(steps))
+        self._call("advance", problem, self.lists.place, xb, vb, scratch, ctypes.c_double(h), ctypes.c_int64(steps))
         del alive
         return self.unpack(xb), self.unpack(vb)
 
@@ -202,7 +221,7 @@ class Kernel:
         problem, alive = self._drive(drive)
         xb, vb = self.pack(x), self.pack(v)
         out = torch.empty_like(xb)
-        self._call("forces", problem, xb, vb, out, ctypes.c_double(share))
+        self._call("forces", problem, self.lists.place, xb, vb, out, ctypes.c_double(share))
         del alive
         return self.unpack(out)
 
@@ -226,24 +245,30 @@ class Kernel:
         lost = self.unpack(failed) != 0
         return self.unpack(xb).masked_fill(lost, torch.nan), self.unpack(vb).masked_fill(lost, torch.nan)
 
-    def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes.c_double | ctypes.c_int64) -> None:
+    def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes._SimpleCData[Any]) -> None:
         function = _function(self.code, name, self.dtype)
         function.restype = None
         passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
         function(ctypes.byref(problem), ctypes.c_int64(self.blocks), *passed)
 
 
-def _set_contact(settings: _Contact, system: System, contact: Contact, face: Tensor) -> dict[str, Tensor]:
+def _set_contact(settings: _Contact, system: System, contact: Contact, face: Tensor, width: int) -> dict[str, Tensor]:
     """Fill in the contact's settings; the tensors it points to are returned, to be kept alive."""
     cloth = system.cloth
     centre, apart = layers(cloth.mesh, contact)
-    tensors = {
-        name: torch.tensor(values, dtype=cloth.dtype)
-        for name, values in {
-            "vertex_area": cloth.mesh.vertex_areas, "rest": cloth.mesh.rest, "centre": centre, "apart": apart**2,
-        }.items()
+    group, block = _groups(cloth.mesh.rest, width), _groups(centre, width)
+    rest = np.where(group < 0, np.nan, cloth.mesh.rest.T[:, group])  # (2, group, width)
+    ends = np.stack([np.nanmin(rest, axis=2), np.nanmax(rest, axis=2)], axis=1).reshape(4, -1)
+    box = np.full((4, math.ceil(len(group) / width) * width), np.nan)
+    box[:, : len(group)] = ends
+    real = {
+        "vertex_area": cloth.mesh.vertex_areas, "centre": centre, "apart": apart**2, "group_rest": rest,
+        "group_box": box,
     }  # fmt: skip
+    tensors = {name: torch.tensor(np.ascontiguousarray(values), dtype=cloth.dtype) for name, values in real.items()}
+    tensors |= {name: torch.tensor(values, dtype=torch.int32) for name, values in (("group", group), ("block", block))}
     settings.vertices, settings.faces = cloth.mesh.vertex_count, len(cloth.faces)
+    settings.groups, settings.blocks = len(group), len(block)
     settings.thickness, settings.stiffness = contact.thickness, contact.stiffness
     settings.friction = contact.friction
     settings.face = face.data_ptr()
@@ -252,7 +277,24 @@ def _set_contact(settings: _Contact, system: System, contact: Contact, face: Ten
     return {f"contact_{name}": tensor for name, tensor in tensors.items()}
 
 
-_KERNELS: WeakKeyDictionary[System, Kernel] = WeakKeyDictionary()
+def _groups(points: NDArray[np.float64], width: int) -> NDArray[np.int64]:
+    """Points (n, 2) in groups of `width` that lie close together: (group, width) indices, -1 where there is none.
+
+    Halved across the longer side until few enough are left, always at a multiple of the width.
+    """
+
+    def halved(chosen: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        if len(chosen) <= width:
+            return [np.pad(chosen, (0, width - len(chosen)), constant_values=-1)]
+        longer = int(np.argmax(np.ptp(points[chosen], axis=0)))
+        ordered = chosen[np.argsort(points[chosen, longer], kind="stable")]
+        middle = max(1, round(len(chosen) / (2 * width))) * width
+        return [*halved(ordered[:middle]), *halved(ordered[middle:])]
+
+    return np.stack(halved(np.arange(len(points))))
+
+
+_KERNELS: weakref.WeakKeyDictionary[System, Kernel] = weakref.WeakKeyDictionary()
 
 
 def _function(code: ctypes.CDLL, name: str, dtype: torch.dtype) -> Any:
