@@ -123,7 +123,7 @@ def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
     bases = range(len(cast.simulation.material.bases))
     with one_thread():
         runs = [(_simulated(few, base, device), _simulated(more, base, device)) for base in bases]
-        films = [_filmed(recipe, short, run, device) for short, run in zip((few, more), runs[0], strict=True)]
+        films = [_filmed(recipe, cast, run, device) for run in runs[0]]
     sequences = [_line(a.seconds, b.seconds, whole.total) for a, b in runs]
     return Rates(
         sequence_seconds=sum(sequences) / len(sequences),
@@ -159,7 +159,7 @@ def _simulated(cast: Cast, base: int, device: str) -> _Run:
 
 
 def _filmed(recipe: DatasetRecipe, cast: Cast, run: _Run, device: str) -> tuple[float, float]:
-    """Seconds and bytes of a film."""
+    """Seconds and bytes of a film of few frames, with the whole sequence's anemometer."""
     members = ((cast, run.index, "0" * 32),)
     film = next(Sequences(recipe=recipe, side=cast.side.name, members=members).films())
     jobs.film(recipe, film, run.sequence, device)  # the renderer starts once
