@@ -301,15 +301,13 @@ def _refuse(source: RecordingSource, keys: tuple[str, ...], what: str) -> None:
 
 
 def _take(found: tuple[Observation, ...], source: RecordingSource) -> Observation:
-    if not source.take:
-        if len(found) > 1:
-            raise UsageError(
-                f"the table holds {len(found)} recordings", where=source.source,
-                fix=f"add take, one of {', '.join(seen.name for seen in found)}",
-            )  # fmt: skip
-        return found[0]
+    if not source.take and len(found) > 1:
+        raise UsageError(
+            f"the table holds {len(found)} recordings", where=source.source,
+            fix=f"add take, one of {', '.join(seen.name for seen in found)}",
+        )  # fmt: skip
     for seen in found:
-        if seen.name == source.take:
+        if seen.name == source.take or not source.take:
             return seen
     raise UnknownNameError.of("recording", source.take, [seen.name for seen in found], where=source.source)
 

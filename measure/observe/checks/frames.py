@@ -124,7 +124,7 @@ def without_stuck_markers(seen: Observation) -> Observation:
     resolution = float(np.quantile(units, 0.01)) if len(units) else 0.0
     stuck = np.zeros(seen.positions.shape[:2], dtype=bool)
     stuck[1:] = (step == 0) & (around > _MOVED_ON * resolution)
-    stuck &= stuck.mean(axis=0) < _PINNED
+    stuck &= (step == 0).mean(axis=0) < _PINNED
     tracked = np.isfinite(seen.positions).all(axis=2)
     zero = (seen.positions == 0).all(axis=2)
     other = np.where((tracked & ~zero)[:, :, None], np.linalg.norm(seen.positions, axis=2, keepdims=True), np.inf)

@@ -1,0 +1,162 @@
+"""Experiment recipes: sources of every kind become one checked experiment; what is not known is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.ingest.markers.store import ingest_markers
+from flagdata.ingest.meshes import write_folder
+from flagdata.ingest.meshes.store import ingest_meshes
+from flagdata.lake import Lake
+from flagdata.lake.meshes import MeshSequence
+from measure.observe.recipe import load, read
+from sim.material import named
+from sim.mesh import grid
+from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag, flutter
+
+COMMON = f"""
+[cloth]
+width = {WIDTH}
+height = {HEIGHT}
+[material]
+name = "camel-ponte-roma"
+density = 0.2
+[pins]
+at = "hoist"
+"""
+
+
+def _recipe(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "experiment.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two recordings in one table, in millimetres, the y axis up."""
+    path = tmp_path_factory.mktemp("tracks") / "tracks.csv"
+    lines = ["recording,frame,marker,u,v,x,y,z"]
+    for name, seed in (("calm", 1), ("brisk", 2)):
+        seen = flag(noise=0.5e-3, seed=seed, seconds=2.2)
+        positions = 1e3 * seen.positions[:, :, [0, 2, 1]] * [1, 1, -1]
+        for frame, at in enumerate(positions):
+            for marker, ((u, v), (x, y, z)) in enumerate(zip(1e3 * seen.markers, at, strict=True)):
+                lines.append(f"{name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table: Path, tmp_path: Path):
+    entry = f'[[recording]]\nsource = "{table}"\nrate = {RATE}\nunit = "mm"\nnoise = 0.0005\n'
+    text = f'up = "y"\n{COMMON}' + "".join(
+        f'{entry}take = "{take}"\nwind = {{ speed = {speed}, toward = 0.1 }}\n'
+        for take, speed in (("calm", 4.0), ("brisk", 6.0))
+    )
+    observed = read(load(_recipe(tmp_path, text)))
+    calm, brisk = observed.experiment.recordings
+    assert (calm.name, brisk.name, calm.rate) == ("calm", "brisk", pytest.approx(RATE))
+    truth = flag(noise=0.5e-3, seed=1, seconds=2.2)
+    names = np.argsort([f"m{k}" for k in range(len(truth.markers))])
+    np.testing.assert_allclose(calm.positions, truth.positions[:, names], atol=1e-8)
+    np.testing.assert_allclose(brisk.wind.velocity, [[6 * math.cos(0.1), 6 * math.sin(0.1), 0]])
+    specimen = observed.experiment.specimen
+    assert specimen.material.density == 0.2
+    np.testing.assert_array_equal(specimen.material.bending, named("camel-ponte-roma").bending)
+    np.testing.assert_allclose(specimen.anchors[:, :2], 0.0, atol=1e-3)
+    assert observed.findings == ()
+
+
+def _meshes(seconds: float = 2.2) -> MeshSequence:
+    mesh = grid(width=WIDTH, height=HEIGHT, columns=9, rows=6)
+    times = np.arange(round(seconds * RATE)) / RATE
+    return MeshSequence(
+        time=np.rint(times * 1e9).astype(np.int64), positions=flutter(mesh.rest, times).astype(np.float32),
+        faces=mesh.faces.astype(np.int32), rest=mesh.rest.astype(np.float32),
+    )  # fmt: skip
+
+
+SCENE = {
+    "frame_time": 1 / RATE, "frame_steps": 4, "gravity": [0, 0, -9.81], "wind": {"velocity": [5, 0, 0], "density": 1.2},
+    "cloths": [{"mesh": "flag.obj", "materials": [{"data": "materials/camel-ponte-roma.json", "thicken": 2}]}],
+    "handles": [{"nodes": list(range(7))}], "magic": {"handle_stiffness": 2e3},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An ArcSim output folder whose hoist is held."""
+    path = tmp_path_factory.mktemp("arcsim") / "run"
+    write_folder(path, _meshes(), scene=SCENE)
+    return path
+
+
+def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
+    observed = read(load(_recipe(tmp_path, f'[[recording]]\nsource = "{folder}"\n')))
+    specimen, (recording,) = observed.experiment.specimen, observed.experiment.recordings
+    base = named("camel-ponte-roma")
+    assert specimen.material.density == pytest.approx(2 * base.density)
+    np.testing.assert_allclose(specimen.material.bending, 2 * base.bending)
+    assert (specimen.stiffness, specimen.air.plain.density) == (2e3, 1.2)
+    np.testing.assert_allclose(specimen.mesh.rest[list(specimen.held), 0], 0.0, atol=1e-6)
+    assert len(specimen.held) == 7
+    np.testing.assert_array_equal(recording.wind.velocity, [[5, 0, 0]])
+    assert recording.rate == pytest.approx(RATE, rel=1e-6)
+    assert {f.kind for f in observed.findings} == {
+        "simulated-with-numerical-damping", "simulated-with-other-stages"
+    }  # fmt: skip
+
+
+def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tmp_path: Path):
+    lake = Lake.create(tmp_path / "lake")
+    meshes = ingest_meshes(lake, folder).artifact
+    assert read(load(_recipe(tmp_path, f'[[recording]]\nsource = "{meshes.id}"\n')), lake).experiment.recordings[
+        0
+    ].source == (meshes.id)
+    small = tmp_path / "small.csv"
+    lines = table.read_text().splitlines()
+    small.write_text("\n".join([lines[0], *(line for line in lines if line.startswith("calm,"))]) + "\n")
+    from flagdata.ingest.markers import MarkerOptions
+
+    (markers,) = ingest_markers(lake, small, MarkerOptions(rate=RATE, unit="mm"))
+    text = f'up = "y"\n{COMMON}[[recording]]\nsource = "{markers.artifact.id[:12]}"\nwind = {{ speed = 5.0 }}\n'
+    (recording,) = read(load(_recipe(tmp_path, text)), lake).experiment.recordings
+    assert recording.source == markers.artifact.id
+    assert recording.name == "small calm"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "what"),
+    [
+        ("", InputError, "no recording"),
+        ("[[recording]]\nsorce = 'a'", InputError, "no source"),
+        ("[[recording]]\nsource = 'a'\nnoize = 1", UnknownNameError, "did you mean 'noise'"),
+        ("[[recording]]\nsource = 'a'\nwind = { speed = 1, velocity = [1, 0, 0] }", UsageError, "2 winds"),
+        ("[[recording]]\nsource = 'a'\nwind = { velocity = [1, 0] }", InputError, "2 numbers"),
+        ("[[recording]]\nsource = 'a'\nwind = { log = 'b', speed = 1 }", UsageError, "2 winds"),
+        ("[cloth]\nwidth = 1\n[[recording]]\nsource = 'a'", UsageError, "half a size"),
+        ("[pins]\nat = 'hoist'\npoints = [[0, 0]]\n[[recording]]\nsource = 'a'", UsageError, "both at and points"),
+        ("[pins]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
+        ("[material]\nname = 'camel'\n[[recording]]\nsource = 'a'", UnknownNameError, "camel"),
+        ("up = 'w'\n[[recording]]\nsource = 'a'", UnknownNameError, "unknown up 'w'"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_place(tmp_path: Path, text: str, kind: type[FlagdataError], what: str):
+    with pytest.raises(kind, match=what):
+        load(_recipe(tmp_path, text))
+
+
+def test_a_source_that_is_not_there_is_named(tmp_path: Path):
+    with pytest.raises(NotFoundError, match="nowhere"):
+        read(load(_recipe(tmp_path, "[[recording]]\nsource = 'nowhere'\n")))
+
+
+def test_a_table_of_several_recordings_asks_which(table: Path, tmp_path: Path):
+    text = f'[[recording]]\nsource = "{table}"\nrate = 50\nunit = "mm"\nwind = {{ speed = 5.0 }}\n'
+    with pytest.raises(UsageError, match="one of calm, brisk"):
+        read(load(_recipe(tmp_path, text)))
