@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import InputError
-from sim.render.camera import Camera
 from sim.render.meshes import Meshes
 from sim.render.stage import Stage
 
@@ -69,21 +68,6 @@ class Geometry:
         cloth = positions + positions.new_tensor(self.shift)
         return replace(self, positions=torch.cat([cloth, self.positions[len(cloth) :]]))
 
-    def check(self, camera: Camera) -> None:
-        """Make sure that the cloth is in front of the camera.
-
-        Raises:
-            InputError: part of it is beside or behind the camera.
-        """
-        _, depth = camera.project(self.positions[: int(self.vertex_offset[-1])])
-        behind = torch.nonzero(depth <= NEAR).flatten()
-        if len(behind):
-            frame = int(torch.searchsorted(self.vertex_offset, behind[0], right=True)) - 1
-            raise InputError(
-                f"{len(behind)} vertices of the cloth are behind the camera", where=f"frame {frame}",
-                fix="enlarge camera_radius, or render fewer frames where the cloth travels",
-            )  # fmt: skip
-
     def normals(self) -> Tensor:
         """(vertex, 3) float32 unit normals: the mean of the faces around a vertex, weighted by their areas."""
         a, b, c = (self.positions[self.corners[:, k]].double() for k in range(3))
@@ -92,3 +76,22 @@ class Geometry:
         for k in range(3):
             total.index_add_(0, self.corners[:, k], face)
         return torch.nn.functional.normalize(total, dim=1, eps=1e-30).float()
+
+
+def check_in_front(positions: Tensor, meshes: Meshes, placed: Stage) -> None:
+    """Make sure that the cloth is in front of the camera.
+
+    Args:
+        positions: (all vertices, 3) of the cloth at some instant of each frame, as the meshes have them [m].
+
+    Raises:
+        InputError: part of it is beside or behind the camera.
+    """
+    _, depth = placed.camera.project(positions + positions.new_tensor(placed.shift))
+    behind = torch.nonzero(depth <= NEAR).flatten()
+    if len(behind):
+        frame = sum(offset <= int(behind[0]) for offset in meshes.vertex_offset) - 1
+        raise InputError(
+            f"{len(behind)} vertices of the cloth are behind the camera", where=f"frame {frame}",
+            fix="enlarge camera_radius, or render fewer frames where the cloth travels",
+        )  # fmt: skip

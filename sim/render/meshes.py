@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -117,6 +117,17 @@ class Meshes:
         vertices = slice(self.vertex_offset[i], self.vertex_offset[i + 1])
         faces = slice(self.face_offset[i], self.face_offset[i + 1])
         return Frame(positions=self.positions[vertices], faces=self.faces[faces], uv=self.uv[vertices])
+
+    def part(self, first: int, last: int) -> Meshes:
+        """Frames `first` to `last`, the last not included."""
+        vertices = slice(self.vertex_offset[first], self.vertex_offset[last])
+        vertex_offset, face_offset = (offset[first : last + 1] for offset in (self.vertex_offset, self.face_offset))
+        return replace(
+            self, positions=self.positions[vertices], uv=self.uv[vertices],
+            faces=self.faces[face_offset[0] : face_offset[-1]],
+            vertex_offset=tuple(offset - vertex_offset[0] for offset in vertex_offset),
+            face_offset=tuple(offset - face_offset[0] for offset in face_offset),
+        )  # fmt: skip
 
     @classmethod
     def fixed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass, field
 
 import torch
@@ -10,16 +11,18 @@ from torch import Tensor
 from sim.assets import Assets
 from sim.render import raster_kernel, raster_torch
 from sim.render.develop import develop, plate
-from sim.render.geometry import Geometry
+from sim.render.geometry import Geometry, check_in_front
 from sim.render.light import Light
 from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
 from sim.render.raster_kernel import library
 from sim.render.sampling import Samples
 from sim.render.shutter import Motion
-from sim.render.stage import stage
+from sim.render.stage import Stage, stage
 from sim.render.texture import Pyramid
 from sim.render.view import View
+
+_TOGETHER = 32  # frames; bounds the memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,20 +50,42 @@ class Raster:
         behind = torch.from_numpy(plate(self.assets.background(zeta.background), zeta)).to(device)
         placed = stage(meshes, zeta)
         samples = Samples.of(zeta, to_sun=placed.to_sun)
-        geometry = Geometry.of(meshes, placed)
         motion = Motion.of(meshes) if zeta.exposure_time > 0 else None
-        out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=device)
-        code = library() if device.type == "cpu" else None
-        for index in range(zeta.raster_samples):
-            now = geometry if motion is None else geometry.at(motion.at(float(samples.time[index])))
-            now.check(placed.camera)
-            x, y = samples.jitter[index].tolist()
-            view = View(camera=placed.camera, jitter=(x, y), samples=zeta.raster_samples)
-            light = Light.of(zeta, samples, index)
-            if code is None:
-                raster_torch.add_sample(out, now, view=view, light=light, pyramid=pyramid)
-            else:
-                raster_kernel.add_sample(code, out, now, view=view, light=light, pyramid=pyramid)
+        for instant in (samples.time.min(), samples.time.max()):
+            check_in_front(meshes.positions if motion is None else motion.at(float(instant)), meshes, placed)
+        film = []
+        for first in range(0, len(meshes), _TOGETHER):
+            last = min(first + _TOGETHER, len(meshes))
+            moving = motion and motion.part(meshes.vertex_offset[first], meshes.vertex_offset[last])
+            scene = _exposed(meshes.part(first, last), moving, placed, samples, zeta, pyramid)
+            film.append(_developed(scene, behind, gain=zeta.gain))
+        return torch.cat(film)
+
+
+def _exposed(
+    meshes: Meshes, motion: Motion | None, placed: Stage, samples: Samples, zeta: RenderParameters, pyramid: Pyramid
+) -> Tensor:
+    """(frame, height, width, 4) linear radiance times coverage, and coverage."""
+    out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=meshes.device)
+    geometry = Geometry.of(meshes, placed)
+    code = _code(meshes.device)
+    for index in range(zeta.raster_samples):
+        now = geometry if motion is None else geometry.at(motion.at(float(samples.time[index])))
+        x, y = samples.jitter[index].tolist()
+        view = View(camera=placed.camera, jitter=(x, y), samples=zeta.raster_samples)
+        light = Light.of(zeta, samples, index)
         if code is None:
-            return develop(out, behind, gain=zeta.gain)
-        return raster_kernel.develop(code, out, behind, gain=zeta.gain)
+            raster_torch.add_sample(out, now, view=view, light=light, pyramid=pyramid)
+        else:
+            raster_kernel.add_sample(code, out, now, view=view, light=light, pyramid=pyramid)
+    return out
+
+
+def _developed(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
+    code = _code(scene.device)
+    return develop(scene, behind, gain=gain) if code is None else raster_kernel.develop(code, scene, behind, gain=gain)
+
+
+def _code(device: torch.device) -> ctypes.CDLL | None:
+    """The kernel, which is for CPUs."""
+    return library() if device.type == "cpu" else None

@@ -51,6 +51,11 @@ class Motion:
             back = torch.cat([_step(meshes, i, i - 1 if i > 0 else 1) for i in range(n)])
         return cls(positions=x, rate=meshes.rate, forth=forth, back=back)
 
+    def part(self, first: int, last: int) -> Motion:
+        """The motion of some vertices, by their place among all."""
+        rows = slice(first, last)
+        return replace(self, positions=self.positions[rows], forth=self.forth[rows], back=self.back[rows])
+
     def at(self, offset: float) -> Tensor:
         """(all vertices, 3) positions `offset` seconds after each frame's instant, within a frame's time of it."""
         share = offset * self.rate

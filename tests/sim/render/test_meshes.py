@@ -51,6 +51,16 @@ def test_a_ragged_sequence_keeps_its_frames() -> None:
     assert torch.equal(a.faces, b.faces)
 
 
+def test_a_part_of_a_sequence_has_its_frames() -> None:
+    whole = Meshes.flag(stored(5), heading=0.3)
+    part = whole.part(1, 4)
+    assert len(part) == 3
+    for index in range(3):
+        assert torch.equal(part.frame(index).positions, whole.frame(index + 1).positions)
+        assert torch.equal(part.frame(index).faces, whole.frame(index + 1).faces)
+    assert (part.anchor, part.heading, part.rate) == (whole.anchor, whole.heading, whole.rate)
+
+
 def test_a_single_frame_has_a_rate_too() -> None:
     assert Meshes.flag(stored(1), heading=0.0).rate == 25.0
 

@@ -93,3 +93,10 @@ def test_cloth_that_the_next_frame_does_not_have_is_an_error_not_a_guess() -> No
     )  # fmt: skip
     with pytest.raises(InputError, match="in no face of the other"):
         moved(torn, 0.01)
+
+
+def test_frames_are_the_same_however_many_are_worked_on_together(camera_of, look, monkeypatch) -> None:
+    scene, zeta = meshes(sheet(side=1.0), moves=STEADY, rate=RATE), look(exposure_time=0.02, raster_samples=2)
+    together = camera_of().render(scene, zeta)
+    monkeypatch.setattr("sim.render.raster._TOGETHER", 2)
+    assert torch.equal(camera_of().render(scene, zeta), together)
