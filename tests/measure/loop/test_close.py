@@ -1,0 +1,108 @@
+"""The whole loop at small size: nulls stand, a strong effect is named, the same seed says the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, UsageError
+from measure.loop import bank as banks
+from measure.loop.close import Options, close_loop
+from measure.loop.columns import Calibration
+from measure.loop.nulls import NullBatch
+from measure.loop.verdict import Conclusion, Verdict
+from measure.observe.trajectory import Experiment, Specimen, Trajectory
+from sim.effects import EFFECTS, Effect
+
+DURATION, NOISE, SPEEDS = 4.6, 5e-4, (3.5, 6.0)
+
+
+@pytest.fixture(scope="module")
+def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """64 nulls of four kinds of numerics."""
+    folder = tmp_path_factory.mktemp("bank")
+    batches = [
+        banks.prior_batch(
+            specimen,
+            markers=specimen.mesh.rest,
+            rate=25.0,
+            duration=DURATION,
+            noise=NOISE,
+            speeds=(3.0, 6.5),
+            seed=seed,
+        )
+        for seed in range(4)
+    ]
+    banks.build(folder, batches, workers=2)
+    return folder
+
+
+def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
+    """Two winds, by a mesh and steps of their own."""
+    batch = NullBatch(
+        specimen=specimen, markers=specimen.mesh.rest, rate=25.0, duration=DURATION, noise=NOISE, speeds=SPEEDS,
+        calibrations=(Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS), seed=seed, effects=effects,
+    )  # fmt: skip
+    return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))
+
+
+@pytest.fixture(scope="module")
+def lifted(specimen: Specimen, bank: Path) -> Verdict:
+    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+    return close_loop(data, Options(bank=bank))
+
+
+def test_a_null_needs_no_effect(specimen: Specimen, bank: Path) -> None:
+    verdict = close_loop(recorded(specimen, seed=5), Options(bank=bank))
+    assert verdict.conclusion is Conclusion.SUFFICIENT
+    assert not verdict.named
+    assert not verdict.comparisons
+
+
+def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(lifted: Verdict) -> None:
+    assert lifted.conclusion is not Conclusion.SUFFICIENT
+    assert lifted.named[:1] == ("full-hoist",)
+    assert len(lifted.comparisons) == 3
+    for comparison in lifted.comparisons:
+        assert comparison.after.value < comparison.before.value
+        assert comparison.control is None or comparison.after.value < comparison.control.value
+
+
+def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: Path, lifted: Verdict) -> None:
+    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+    again = close_loop(data, Options(bank=bank))
+    assert replace(again, seconds=0.0) == replace(lifted, seconds=0.0)
+
+
+def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifted: Verdict) -> None:
+    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+    c, s = np.cos(2.0), np.sin(2.0)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def turned(recording: Trajectory) -> Trajectory:
+        wind = replace(recording.wind, velocity=recording.wind.velocity @ turn)
+        return replace(recording, positions=recording.positions @ turn, wind=wind)
+
+    moved = Experiment(
+        specimen=replace(specimen, anchors=specimen.anchors @ turn), recordings=tuple(map(turned, data.recordings))
+    )
+    verdict = close_loop(moved, Options(bank=bank))
+    assert verdict.named == lifted.named
+    # Single precision: the statistic to a few digits.
+    assert verdict.test.statistic == pytest.approx(lifted.test.statistic, rel=0.05)
+
+
+def test_a_bank_of_other_segments_is_refused(specimen: Specimen, bank: Path) -> None:
+    data = recorded(specimen, seed=5)
+    short = tuple(replace(r, positions=r.positions[:60]) for r in data.recordings)
+    with pytest.raises(InputError, match="segments last"):
+        close_loop(Experiment(specimen=specimen, recordings=short), Options(bank=bank))
+
+
+@pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"nulls": 10}, {"workers": 0}])
+def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(UsageError):
+        Options(**wrong)  # pyright: ignore[reportArgumentType]
