@@ -257,40 +257,20 @@ class Search {
       for (int side = 0; side < 6; ++side) close_[side * room + k] = boxes_[side * padded + closest_[k]];
       for (int side = 0; side < 4; ++side) close_[(6 + side) * room + k] = s.group_box[side * padded + closest_[k]];
     }
-    // Two at a time: neighbours share most of what is near.
-    for (int k = 0; k < W && faces[k] >= 0; k += 2) look(s, x, {faces[k], faces[k + 1]}, count, room);
+    for (int k = 0; k < W && faces[k] >= 0; ++k) look(s, x, faces[k], count, room);
   }
 
-  // A face in the search.
-  struct Seen {
-    int32_t face;
-    Point<T> corner[3];
-    T u, v, apart, reach;
+  // Adds the pairs of a face with the groups that are near its block.
+  void look(const Settings<T>& s, const Point<T>* x, int32_t f, int64_t count, int64_t room) {
+    const int32_t* corner = s.face + 3 * int64_t(f);
+    const Point<T> a = x[corner[0]], b = x[corner[1]], c = x[corner[2]];
+    const Point<T> middle = (T(1) / 3) * (a + b + c);
+    const T square = std::max({dot(a - middle, a - middle), dot(b - middle, b - middle), dot(c - middle, c - middle)});
+    const T face = std::max({allowed_[corner[0]], allowed_[corner[1]], allowed_[corner[2]]});
+    const T reach = T(1.001) * (T(s.thickness) + face), radius = T(1.001) * std::sqrt(square) + reach;
+    const T u = s.centre[2 * f], v = s.centre[2 * f + 1], apart = s.apart[f];
     Sight sight;
     bool ready = false;
-
-    Seen(const Settings<T>& s, const Point<T>* x, const std::vector<T>& allowed, int32_t f) : face(f) {
-      const int32_t* c = s.face + 3 * int64_t(f);
-      for (int i = 0; i < 3; ++i) corner[i] = x[c[i]];
-      u = s.centre[2 * f], v = s.centre[2 * f + 1], apart = s.apart[f];
-      reach = T(1.001) * (T(s.thickness) + std::max({allowed[c[0]], allowed[c[1]], allowed[c[2]]}));
-    }
-
-    // Which rest positions at these distances are another layer's.
-    Mask other(const Wide& du, const Wide& dv) const { return du * du + dv * dv >= apart; }
-  };
-
-  // Adds the pairs of two faces, the second of which may be -1, with the groups that are near their block.
-  void look(const Settings<T>& s, const Point<T>* x, std::array<int32_t, 2> faces, int64_t count, int64_t room) {
-    Seen two[2] = {{s, x, allowed_, faces[0]}, {s, x, allowed_, faces[1] < 0 ? faces[0] : faces[1]}};
-    const int many = faces[1] < 0 ? 1 : 2;
-    Point<T> middle = {0, 0, 0};
-    for (const Seen& one : two)
-      for (const Point<T>& corner : one.corner) middle = middle + (T(1) / 6) * corner;
-    T square = 0;
-    for (const Seen& one : two)
-      for (const Point<T>& corner : one.corner) square = std::max(square, dot(corner - middle, corner - middle));
-    const T radius = T(1.001) * std::sqrt(square) + std::max(two[0].reach, two[1].reach);
     const Wide zero = Wide{};
     auto outside = [&](const Wide& low, const Wide& high, T value) {
       return above(above(low - value, value - high), zero);
@@ -300,30 +280,22 @@ class Search {
       const Wide dx = outside(load(box), load(box + room), middle.x);
       const Wide dy = outside(load(box + 2 * room), load(box + 3 * room), middle.y);
       const Wide dz = outside(load(box + 4 * room), load(box + 5 * room), middle.z);
-      const Wide u0 = load(box + 6 * room), u1 = load(box + 7 * room);
-      const Wide v0 = load(box + 8 * room), v1 = load(box + 9 * room);
-      auto other = [&](const Seen& one) {
-        return one.other(above(one.u - u0, u1 - one.u), above(one.v - v0, v1 - one.v));
-      };
-      uint32_t candidate = bits((dx * dx + dy * dy + dz * dz < radius * radius) & (other(two[0]) | other(two[1])));
+      const Wide du = above(u - load(box + 6 * room), load(box + 7 * room) - u);
+      const Wide dv = above(v - load(box + 8 * room), load(box + 9 * room) - v);
+      uint32_t candidate = bits((dx * dx + dy * dy + dz * dz < radius * radius) & (du * du + dv * dv >= apart));
       for (; candidate; candidate &= candidate - 1) {
         const int64_t i = int64_t(closest_[first + __builtin_ctz(candidate)]) * W;
         const Wide px = load(x_.data() + i), py = load(y_.data() + i), pz = load(z_.data() + i);
         const Wide pa = load(a_.data() + i);
         const Wide ex = px - middle.x, ey = py - middle.y, ez = pz - middle.z, bound = radius + pa;
-        const Mask near = ex * ex + ey * ey + ez * ez < bound * bound;
+        const Wide eu = load(s.group_rest + i) - u, ev = load(s.group_rest + s.groups * W + i) - v;
+        const Mask near = (ex * ex + ey * ey + ez * ez < bound * bound) & (eu * eu + ev * ev >= apart);
         if (!bits(near)) continue;
-        const Wide pu = load(s.group_rest + i), pv = load(s.group_rest + s.groups * W + i);
-        for (int k = 0; k < many; ++k) {
-          Seen& one = two[k];
-          const Mask mine = near & one.other(pu - one.u, pv - one.v);
-          if (!bits(mine)) continue;
-          if (!one.ready) one.sight = Sight(one.corner[0], one.corner[1], one.corner[2]), one.ready = true;
-          const Wide least = one.sight.square(px, py, pz), within = one.reach + pa;
-          for (uint32_t hit = bits(mine & (least < within * within)); hit; hit &= hit - 1) {
-            const int j = __builtin_ctz(hit);
-            far_.push_back({std::sqrt(least[j]), s.group[i + j], one.face});
-          }
+        if (!ready) sight = Sight(a, b, c), ready = true;
+        const Wide least = sight.square(px, py, pz), within = reach + pa;
+        for (uint32_t hit = bits(near & (least < within * within)); hit; hit &= hit - 1) {
+          const int j = __builtin_ctz(hit);
+          far_.push_back({std::sqrt(least[j]), s.group[i + j], f});
         }
       }
     }

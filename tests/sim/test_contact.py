@@ -90,6 +90,21 @@ def test_kernel_finds_and_pushes_what_the_definition_does(folded) -> None:
     torch.testing.assert_close(results[1], results[0], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(make_system, dtype) -> None:
+    mesh = grid(width=0.8, height=0.3, columns=16, rows=6)
+    system, state = make_system(mesh, [named("camel-ponte-roma")] * 3, dtype=dtype)
+    used, fresh = replace(system, contact=Contact()), replace(system, contact=Contact())
+    start = pleated(used, state)
+    for other in (start, state, pleated(used, state, noise=5e-3), replace(start, position=start.position * torch.nan)):
+        advance(used, other, 6e-3, steps=40)
+    first, second = (advance(chosen, start, 6e-3, steps=40) for chosen in (used, fresh))
+    assert torch.equal(first.position, second.position)
+    assert torch.equal(first.velocity, second.velocity)
+    apart = advance(replace(system, contact=None), start, 6e-3, steps=40)
+    assert float((apart.position - first.position).abs().max()) > 1e-4
+
+
 def test_flat_cloth_and_its_neighbouring_faces_do_not_touch(make_system) -> None:
     mesh = grid(width=0.4, height=0.2, columns=16, rows=8)
     system, state = make_system(mesh, [named("gray-interlock")])
