@@ -25,7 +25,7 @@ from measure.loop import bank as banks
 from measure.loop.alignment import aligned
 from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
-from measure.loop.comparison import compare, folds, predict
+from measure.loop.comparison import Predictions, compare, folds, predict
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
@@ -260,8 +260,8 @@ def _verdict(
     solved: Solved, bank: NullBank, comparisons: tuple[Comparison, ...], options: Options, began: float
 ) -> Verdict:
     setting, judgement = solved.setting, solved.judgement
-    before = predict(setting.forecaster, setting.segments, solved.base.model)
-    after = None if solved.larger is None else predict(setting.forecaster, setting.segments, solved.larger.model)
+    before = _unseen(setting, solved.base)
+    after = None if solved.larger is None else _unseen(setting, solved.larger)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
@@ -269,7 +269,7 @@ def _verdict(
             p_value=judgement.p_value, level=options.level, nulls=bank.words,
         ),
         parameters=_parameters(solved), ranking=_ranking(solved), comparisons=comparisons,
-        residuals=residuals(setting.experiment, setting.segments, before, after),
+        residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         assumptions=assumptions(setting.experiment),
         provenance={
             "seed": options.seed, "code": code_version(),
@@ -281,6 +281,21 @@ def _verdict(
         verdict, words=sentence(verdict), separating=separating(verdict),
         proposal=proposal(verdict, solved.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _unseen(setting: Setting, refined: Refined) -> Predictions:
+    """Of all segments, each by the model fitted to the other recordings; of a single recording by that fitted to it."""
+    if len(setting.speeds) < 2:
+        return predict(setting.forecaster, setting.segments, refined.model)
+    parts: list[Predictions] = []
+    for index in range(len(setting.speeds)):
+        own = setting.recording == index
+        parts.append(predict(setting.forecaster, setting.segments.select(np.flatnonzero(own)), refined.without(own)))
+    # Segments are in the order of their recordings.
+    return Predictions(
+        errors=np.concatenate([p.errors for p in parts], axis=-1),
+        predicted=np.concatenate([p.predicted for p in parts], axis=-1),
+    )
 
 
 def _ranking(solved: Solved) -> tuple[Candidate, ...]:

@@ -17,9 +17,13 @@ _SHOWN = 50
 
 
 def residuals(
-    experiment: Experiment, segments: Segments, before: Predictions, after: Predictions | None
+    experiment: Experiment, segments: Segments, before: Predictions, after: Predictions | None, *, held_out: bool
 ) -> tuple[Residual, ...]:
-    """One a recording, from predictions of all segments by models fitted to all."""
+    """One a recording, from predictions of all segments.
+
+    Args:
+        held_out: whether each recording's were made by models that were not fitted to it.
+    """
     recording = np.array([s.recording for s in segments.items])
     made: list[Residual] = []
     for index, own in enumerate(experiment.recordings):
@@ -33,7 +37,7 @@ def residuals(
         predicted = _joined(before.predicted, places)[shown]
         made.append(
             Residual(
-                recording=own.name, speed=own.wind.speed, held_out=False, times=_list(times),
+                recording=own.name, speed=own.wind.speed, held_out=held_out, times=_list(times),
                 in_time=_list(_over(first, (1,))), in_time_after=[] if second is None else _list(_over(second, (1,))),
                 markers=segments.markers.tolist(), in_space=_list(_over(first, (0,))),
                 in_space_after=[] if second is None else _list(_over(second, (0,))), mean=first.mean(axis=0).tolist(),

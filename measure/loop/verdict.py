@@ -139,7 +139,8 @@ class NullTest:
     Attributes:
         statistic: observed.
         null: the same of every simulated null.
-        p_value: (1 + nulls at least as large) / (1 + nulls).
+        p_value: of the whole test: Bonferroni's of the largest statistic, at 4/5 of the level, and of what the base
+            model leaves altogether, at 1/5; each (1 + nulls at least as large) / (1 + nulls).
         level: at which it was judged.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
     """
