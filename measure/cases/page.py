@@ -86,12 +86,12 @@ def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> d
              "tip_travel": {f"{speed:g}": _number(tip) for speed, tip in c.tips.items()}}
             for c in study.declared
         ],
-        "controls": {k.value: {"load": str(load), "tip_travel": tip} for k, (load, tip) in study.controls.items()},
+        "controls": {k.value: {"load": str(load), "tip_travel": _number(tip)} for k, (load, tip) in study.controls.items()},
         "linear": [_outcome(o) for o in study.linear],
         "crossed": [_outcome(o) for o in study.crossed],
         "in_time": [_outcome(o) for o in study.in_time],
-        "floor": {kind.value: value for kind, value in study.floor.items()},
-        "tolerance": {kind.value: value for kind, value in verdict.tolerance.items()},
+        "floor": {kind.value: _number(value) for kind, value in study.floor.items()},
+        "tolerance": {kind.value: _number(value) for kind, value in verdict.tolerance.items()},
         "insufficient": {kind.value: value for kind, value in verdict.insufficient.items()},
         "remaining": [model_name(o) for o in verdict.remaining],
         "remaining_by_what_was_fitted": [model_name(o) for o in verdict.remaining_fitted],

@@ -274,7 +274,10 @@ def _floor(case: Case, best: Outcome, simulated: _Simulated) -> dict[Kind, float
     loads = [best.load] * len(speeds)
     pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, finer), strict=True))
     names = {Kind.FREQUENCY: "frequency", Kind.WAVE: "wave", Kind.AMPLITUDE: "amplitude"}
-    return {
-        kind: float(max(abs(math.log(getattr(a, name) / getattr(b, name))) for a, b in pairs))
-        for kind, name in names.items()
-    }
+    return {kind: max(_apart(getattr(a, name), getattr(b, name)) for a, b in pairs) for kind, name in names.items()}
+
+
+def _apart(one: float, other: float) -> float:
+    """|log| of their ratio; infinite where one of them does not flutter in a way that can be read off."""
+    ratio = one / other
+    return abs(math.log(ratio)) if math.isfinite(ratio) and ratio > 0 else math.inf
