@@ -110,7 +110,7 @@ class Build:
             advance(total - sum(len(pending) for _, pending in todo))
             while any(pending for _, pending in todo):
                 self._simulate_once([entry for entry in todo if entry[1]], advance)
-                todo = [(roll, roll.pending(())) for roll, _ in todo]
+                todo = [(roll, roll.pending(known)) for roll, _ in todo]
         return rolls
 
     def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:

@@ -17,7 +17,6 @@ from flagdata.errors import FlagdataError, NotFoundError, UsageError
 
 _CONNECT_TIMEOUT = 30.0  # s
 _AHEAD = 2  # jobs a thread, so that none waits for the next
-_RETRIES = 3  # of a job whose workers died, before it is given up
 
 Job = tuple[Callable[..., Any], Sequence[Any]]
 """A function of this package and its arguments."""
@@ -111,32 +110,33 @@ def threads(client: Client) -> int:
 def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
     """The jobs' results as they come; a few wait beside those that run, so that memory stays bounded.
 
-    A job whose worker dies is done again by another one. Leaving the iteration early cancels what still runs.
+    A job whose worker dies is done again by another one, as often as Dask allows failures (three times). Leaving the
+    iteration early cancels what still runs.
 
     Raises:
         WorkerError: workers kept dying over one job.
         FlagdataError: a job failed; its own error.
     """
-    ahead = threads(client) * _AHEAD
     waiting = iter(jobs)
     running = as_completed(loop=client.loop)
 
-    def submit(count: int) -> None:
-        for function, arguments in islice(waiting, count):
-            running.add(client.submit(function, *arguments, pure=False, retries=_RETRIES))
+    def fill() -> None:
+        """Workers may come and go meanwhile."""
+        for function, arguments in islice(waiting, max(0, threads(client) * _AHEAD - running.count())):
+            running.add(client.submit(function, *arguments, pure=False))
 
     try:
-        submit(ahead)
+        fill()
         for future in running:
             try:
                 result = future.result()
             except KilledWorker as error:
                 raise WorkerError(
-                    f"workers died {_RETRIES} times over the same job: {error}", where="dask",
+                    f"workers kept dying over the same job: {error}", where="dask",
                     fix="look at the workers' logs; they may lack memory",
                 ) from None  # fmt: skip
             future.release()
             yield result
-            submit(1)
+            fill()
     finally:
         running.clear()

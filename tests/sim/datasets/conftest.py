@@ -106,7 +106,7 @@ class Cluster:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"}
         start = [sys.executable, "-m", "dask"]
         options = ["--scheduler-file", str(file), "--no-dashboard"]
-        command = [*start, "scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "300", *options]
+        command = [*start, "scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "3600", *options]
         self.scheduler = subprocess.Popen(command, env=environment, **quiet)
         worker = [*start, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard"]
         worker += ["--death-timeout", "60"]  # nothing stays behind a test run that is killed
