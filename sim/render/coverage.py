@@ -61,7 +61,7 @@ class Fragments:
 
 
 def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragments]:
-    """What the triangles cover of the samples at the middles of an image's pixels."""
+    """What the triangles cover of the samples at the middles of an image's pixels: one part or more, maybe empty."""
     low, high = triangles.places.amin(dim=1), triangles.places.amax(dim=1)
     half, size = GRID // 2, triangles.places.new_tensor([width, height])
     first = torch.div(low - half + GRID - 1, GRID, rounding_mode="floor").clamp_min(0)
@@ -71,9 +71,9 @@ def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragment
     ends = counts.cumsum(0)
     found: list[Fragments] = []
     begin = 0
-    while begin < len(counts):
+    while begin < len(counts) or not found:
         done = int(ends[begin - 1]) if begin else 0
-        end = max(begin + 1, int(torch.searchsorted(ends, done + _FRAGMENTS, right=True)))
+        end = min(len(counts), max(begin + 1, int(torch.searchsorted(ends, done + _FRAGMENTS, right=True))))
         found.append(_covered(triangles, begin, end, first, span, counts, width=width))
         begin = end
     return found

@@ -85,6 +85,15 @@ def test_turning_the_world_about_the_vertical_changes_nothing(camera_of, look) -
     assert float(((first - other).abs() > 2).float().mean()) < 2e-3
 
 
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize(("turn", "offset"), [(math.pi / 2, 0.0), (0.0, 0.9)], ids=["edge-on", "out of frame"])
+def test_what_shows_no_surface_leaves_the_background(camera_of, look, monkeypatch, turn, offset, compiled) -> None:
+    if not compiled:
+        monkeypatch.setattr("sim.render.raster.library", lambda: None)
+    zeta = look(background="white", texture="black", frame_offset_x=offset, raster_samples=2)
+    assert int(camera_of().render(meshes(sheet(turn=turn)), zeta).min()) == 255
+
+
 def test_cloth_before_the_camera_is_refused_only_when_it_is_not_in_front(camera_of, look) -> None:
     from flagdata.errors import InputError
 
