@@ -1,6 +1,7 @@
 """Experiments as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
     title, up           "z", "-y", …: the axis of the recordings that points up; all else is said with z up
+    [test]              level of the global test, nulls: how many null recordings
     [cloth]             width, height, or mesh (an OBJ with texture coordinates in metres); vertices of the model mesh
     [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); thicken, density, damping,
                         stretching-factor, bending-factor
@@ -84,8 +85,10 @@ class ExperimentRecipe:
         title: of the report.
         up: axis of the recordings that points up.
         setup: of the cloth.
-        recordings: at least one.
+        recordings: that it names; none where they are given beside it.
         folder: that paths are relative to.
+        level: of the global test; None for the usual one.
+        nulls: how many null recordings; None for as many as usual.
     """
 
     title: str
@@ -93,10 +96,25 @@ class ExperimentRecipe:
     setup: Setup
     recordings: tuple[RecordingSource, ...]
     folder: Path
+    level: float | None = None
+    nulls: int | None = None
 
 
 def load(path: Path) -> ExperimentRecipe:
-    """The recipe in a file.
+    """The recipe in a file, of a whole experiment.
+
+    Raises:
+        InputError: it names no recording.
+        FlagdataError: as `parse`.
+    """
+    recipe = parse(path)
+    if not recipe.recordings:
+        raise InputError("no recording is named", where=str(path), fix="add a table [[recording]]")
+    return recipe
+
+
+def parse(path: Path) -> ExperimentRecipe:
+    """The recipe in a file, which may leave the recordings out.
 
     Raises:
         NotFoundError: no such file, or one that it names.
@@ -111,13 +129,14 @@ def load(path: Path) -> ExperimentRecipe:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
     folder = path.parent
-    recordings = tuple(_recording(table) for table in top.tables("recording"))
-    if not recordings:
-        raise InputError("no recording is named", where=str(path), fix="add a table [[recording]]")
+    test = top.table("test")
     recipe = ExperimentRecipe(
         title=top.text("title", path.stem) or path.stem, up=top.choice("up", Up.Z), folder=folder,
-        setup=_setup(top, folder), recordings=recordings,
+        setup=_setup(top, folder), recordings=tuple(_recording(table) for table in top.tables("recording")),
+        level=test.number("level", 0.0, above=0.0) if "level" in test else None,
+        nulls=test.whole("nulls", 0, least=1) if "nulls" in test else None,
     )  # fmt: skip
+    test.done()
     top.done()
     return recipe
 
@@ -263,24 +282,42 @@ def _triple(table: Table, key: str, values: tuple[float, ...]) -> tuple[float, f
 
 
 def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:
-    seen = _opened(source, recipe.folder, lake).turned(recipe.up)
-    found: tuple[Finding, ...] = ()
-    track = None
-    if source.wind is not None:
-        track, found = _track(source.wind, recipe.folder, lake)
-    return replace(
-        seen, name=source.name or seen.name, wind=track, noise=source.noise, findings=(*seen.findings, *found)
-    )
+    seen = _take(opened(source, recipe.folder, lake), source)
+    return blown(replace(seen.turned(recipe.up), name=source.name or seen.name), source.wind, recipe.folder, lake)
 
 
-def _opened(source: RecordingSource, folder: Path, lake: Lake | None) -> Observation:
+def blown(seen: Observation, source: WindSource | None, folder: Path, lake: Lake | None) -> Observation:
+    """A recording with its wind, if there is a source of it, and what was found on reading that.
+
+    Raises:
+        NotFoundError: a log that is neither a path nor an artifact.
+        FlagdataError: as its reader.
+    """
+    if source is None:
+        return seen
+    track, found = _track(source, folder, lake)
+    return replace(seen, wind=track, findings=(*seen.findings, *found))
+
+
+def opened(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
+    """All recordings of a source, as they are: neither turned, nor with the wind beside them.
+
+    Raises:
+        NotFoundError: neither a path nor an artifact.
+        UsageError: options that say nothing of such a source.
+        FlagdataError: as its reader.
+    """
+    return tuple(replace(seen, noise=source.noise) for seen in _read(source, folder, lake))
+
+
+def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
     path = folder / source.source
     if path.is_dir():
         _refuse(source, ("take", "rest_unit"), "a folder of meshes")
-        return meshes.from_folder(path, rate=source.rate, unit=source.unit)
+        return (meshes.from_folder(path, rate=source.rate, unit=source.unit),)
     if path.is_file():
         options = MarkerOptions(rate=source.rate, unit=source.unit, rest_unit=source.rest_unit)
-        return _take(markers.from_table(path, options), source)
+        return markers.from_table(path, options)
     if lake is None:
         raise NotFoundError("no such file or folder", where=source.source, fix="check the path, or open a lake for ids")
     _refuse(source, ("take", "rate", "rest_unit"), "an artifact")
@@ -288,8 +325,8 @@ def _opened(source: RecordingSource, folder: Path, lake: Lake | None) -> Observa
         raise UsageError("an artifact is in metres", where=source.source, fix="leave the unit out")
     artifact = lake.artifact(source.source)
     if artifact.kind is Kind.MARKERS:
-        return markers.from_artifact(lake, artifact)
-    return meshes.from_artifact(lake, artifact)
+        return (markers.from_artifact(lake, artifact),)
+    return (meshes.from_artifact(lake, artifact),)
 
 
 def _refuse(source: RecordingSource, keys: tuple[str, ...], what: str) -> None:

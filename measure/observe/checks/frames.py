@@ -128,7 +128,8 @@ def without_stuck_markers(seen: Observation) -> Observation:
     tracked = np.isfinite(seen.positions).all(axis=2)
     zero = (seen.positions == 0).all(axis=2)
     other = np.where((tracked & ~zero)[:, :, None], np.linalg.norm(seen.positions, axis=2, keepdims=True), np.inf)
-    stuck |= zero & (other[:, :, 0].min(axis=0) > _FAR * float(np.ptp(seen.markers, axis=0).max()))
+    nearest = other[:, :, 0].min(axis=0)  # to the origin, when not at it; infinite for one that always is
+    stuck |= zero & np.isfinite(nearest) & (nearest > _FAR * float(np.ptp(seen.markers, axis=0).max()))
     count = int(stuck.sum())
     if not count:
         return seen

@@ -17,7 +17,8 @@ from measure.observe.trajectory import Floats
 
 FEWEST = 30
 """Markers that a recording must have."""
-_TAUT = 0.9  # quantile over the frames of a length: as long as it gets, noise and fluttering apart
+_TAUT = 0.9  # quantile over the frames of a length: as long as it gets, fluttering apart
+_NORMAL = 1.2816  # that quantile of a normal distribution
 # Median of these lengths over those at rest. In the reference runs, 0 to 8 m/s and 30 to 651 markers: 1.00 to 1.03.
 _SHORT, _LONG, _TOO_LONG = 0.95, 1.05, 1.08
 _UNEVEN = 0.08  # the same along u and along v differ by less than 0.05 there
@@ -78,8 +79,6 @@ class Edges:
 
 def check_scale(seen: Observation, edges: Edges, sigma: float) -> tuple[Finding, ...]:
     """Refuse positions that are not of this rest shape in metres.
-
-    Noise of σ a coordinate makes the mean square of a distance longer by 6 σ².
 
     Raises:
         InputError: lengths that are off by a factor, or differently along u and v; or nothing to measure them by.
@@ -169,13 +168,19 @@ def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Findin
 
 
 def _taut(lengths: Floats, sigma: float) -> tuple[Floats, NDArray[np.bool_]]:
-    """(edge,) upper decile of each length over its frames without the noise's part, and where there is one."""
+    """(edge,) upper decile of each length over its frames without the noise's part, and where there is one.
+
+    Noise of σ a coordinate lies along the edge with variance 2 σ², which widens the upper half of a distribution as of
+    a normal one, and across it with 4 σ², which adds as much to the mean square.
+    """
     tracked = np.isfinite(lengths)
     there = tracked.sum(axis=0) >= 10
     taut = np.zeros(lengths.shape[1])
     if there.any():
-        taut[there] = np.nanquantile(lengths[:, there], _TAUT, axis=0)
-    return np.sqrt(np.maximum(taut**2 - 6 * sigma**2, 0.0)), there
+        middle, upper = np.nanquantile(lengths[:, there], [0.5, _TAUT], axis=0)
+        wide = np.maximum((upper - middle) ** 2 - (_NORMAL * np.sqrt(2) * sigma) ** 2, 0.0)
+        taut[there] = np.sqrt(np.maximum(middle**2 - 4 * sigma**2, 0.0)) + np.sqrt(wide)
+    return taut, there
 
 
 def _advice(ratio: float) -> str:
