@@ -24,6 +24,7 @@ from measure.observe.sampling import sample
 
 MARKERS = 1000
 """A mesh of more vertices is sampled at fixed points instead: neighbours would say the same twice."""
+_SAME_RATE = 1e-3
 
 
 def from_folder(
@@ -41,7 +42,17 @@ def from_folder(
         FlagdataError: as `read_folder` and `from_sequence`.
     """
     sequence = read_folder(path, rate=rate, metre=float(length_unit(unit, where=str(path)).to_si(1.0)))
-    return from_sequence(sequence, name=name or path.name, markers=markers)
+    seen = from_sequence(sequence, name=name or path.name, markers=markers)
+    scene = sequence.attributes.get("scene")
+    stated = scene.get("frame_time") if isinstance(scene, Mapping) else None
+    if rate is None or not isinstance(stated, int | float) or abs(rate * stated - 1) < _SAME_RATE:
+        return seen
+    found = Finding(
+        kind="rate-not-as-described", severity=Severity.WARNING, where=f"recording {seen.name!r}", value=1 / stated,
+        what=f"frames are taken at {rate:.6g} Hz, conf.json says {1 / stated:.6g} Hz",
+        fix="leave the rate out, if conf.json is right",
+    )  # fmt: skip
+    return replace(seen, findings=(*seen.findings, found))
 
 
 def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, markers: int = VERTICES) -> Observation:

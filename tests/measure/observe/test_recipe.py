@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.markers.store import ingest_markers
 from flagdata.ingest.meshes import write_folder
 from flagdata.ingest.meshes.store import ingest_meshes
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence
+from measure.observe.meshes import from_folder
 from measure.observe.recipe import load, read
 from sim.material import named
 from sim.mesh import grid
@@ -112,6 +114,11 @@ def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
     }  # fmt: skip
 
 
+def test_a_rate_other_than_the_folders_own_is_told(folder: Path):
+    assert "rate-not-as-described" not in {f.kind for f in from_folder(folder, rate=RATE).findings}
+    assert "rate-not-as-described" in {f.kind for f in from_folder(folder, rate=25.0).findings}
+
+
 def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tmp_path: Path):
     lake = Lake.create(tmp_path / "lake")
     meshes = ingest_meshes(lake, folder).artifact
@@ -121,8 +128,6 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
     small = tmp_path / "small.csv"
     lines = table.read_text().splitlines()
     small.write_text("\n".join([lines[0], *(line for line in lines if line.startswith("calm,"))]) + "\n")
-    from flagdata.ingest.markers import MarkerOptions
-
     (markers,) = ingest_markers(lake, small, MarkerOptions(rate=RATE, unit="mm"))
     text = f'up = "y"\n{COMMON}[[recording]]\nsource = "{markers.artifact.id[:12]}"\nwind = {{ speed = 5.0 }}\n'
     (recording,) = read(load(_recipe(tmp_path, text)), lake).experiment.recordings
