@@ -86,7 +86,9 @@ def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> d
              "tip_travel": {f"{speed:g}": _number(tip) for speed, tip in c.tips.items()}}
             for c in study.declared
         ],
-        "controls": {k.value: {"load": str(load), "tip_travel": _number(tip)} for k, (load, tip) in study.controls.items()},
+        "controls": {
+            k.value: {"load": str(load), "tip_travel": _number(tip)} for k, (load, tip) in study.controls.items()
+        },
         "linear": [_outcome(o) for o in study.linear],
         "crossed": [_outcome(o) for o in study.crossed],
         "in_time": [_outcome(o) for o in study.in_time],
