@@ -89,18 +89,27 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @_FOLDER
 @_ONLY
 @click.option("--out", type=click.Path(path_type=Path), help="Also write the sheet here: .json, .md and .png.")
+@click.option(
+    "--against", type=click.Choice(["oracle", "floor"]), default="oracle", show_default=True,
+    help="What E_red is measured against: the true model's error, which is computed anew, or the verdict's floor.",
+)  # fmt: skip
 @json_option
 @click.pass_context
-def score(context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, as_json: bool) -> None:
+def score(
+    context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, against: str, as_json: bool
+) -> None:
     """Open the keys and grade; ends with 3 where a gate is not met.
 
     From then on no verdict can be filed on these sets.
     """
     from measure.challenge import sheet as sheets
     from measure.challenge.folder import ChallengeFolder
+    from measure.challenge.oracle import true_model
     from measure.challenge.score import score as score_challenge
 
-    sheet = score_challenge(ChallengeFolder(folder), only=only)
+    target, oracle = ChallengeFolder(folder), true_model if against == "oracle" else None
+    with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
+        sheet = score_challenge(target, only=only, oracle=oracle, progress=advance)
     if out is not None:
         for path in sheets.write(sheet, out):
             say(f"wrote {path}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import fmean, median
 from typing import Any
 
@@ -28,6 +28,7 @@ class Outcome:
         ranking: candidates as in the verdict.
         comparisons: as in the verdict.
         seconds: it took.
+        oracle: comparison → error of the true model [m], where it is known.
     """
 
     key: Key
@@ -36,6 +37,7 @@ class Outcome:
     ranking: tuple[Mapping[str, Any], ...]
     comparisons: tuple[Mapping[str, Any], ...]
     seconds: float
+    oracle: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, key: Key, filing: Filing) -> Outcome:
@@ -109,9 +111,17 @@ class Outcome:
 
     @property
     def reduction(self) -> float | None:
-        """E_red: the median over the comparisons on unseen data."""
-        shares = [entry["share"] for entry in self.comparisons if entry["share"] is not None]
+        """E_red: the median over the comparisons on unseen data, against the true model's error where that is known,
+        else as the verdict states it."""
+        shares = [share for share in map(self._share, self.comparisons) if share is not None]
         return median(shares) if shares and self.named else None
+
+    def _share(self, entry: Mapping[str, Any]) -> float | None:
+        before, after = entry["before"]["value"], entry["after"]["value"]
+        least = self.oracle.get(entry["what"])
+        if least is None:
+            return entry["share"]
+        return (before - after) / (before - least) if before > least else None
 
     @property
     def control_gap(self) -> float | None:

@@ -8,6 +8,8 @@ Definitions, in the words of the sheet:
 - *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its class did.
 - *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a single claim.
 - *None of the library*: the verdict says so, or that the library explains only a part.
+- *E_red*: (before − after)/(before − oracle), the oracle being the true model with the fitter's numerics; the median
+  over a set's comparisons, where an effect was named.
 - *Control separated*: where one effect was named, the same freedom spent on the best wrong effect leaves an error that
   is larger by more than half the width of the reduction's interval.
 """
@@ -15,7 +17,7 @@ Definitions, in the words of the sheet:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,7 @@ from measure.challenge import filing
 from measure.challenge.classes import class_of
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.key import opened
+from measure.challenge.oracle import Oracle
 from measure.challenge.outcome import Outcome
 from measure.challenge.rates import Power, Share
 from measure.challenge.recipe import Kind
@@ -211,11 +214,20 @@ class Sheet:
         }
 
 
-def score(folder: ChallengeFolder, *, only: Sequence[str] = ()) -> Sheet:
+def score(
+    folder: ChallengeFolder,
+    *,
+    only: Sequence[str] = (),
+    oracle: Oracle | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Sheet:
     """Open the keys and grade. What had been filed by then is kept on record, and no verdict can be filed afterwards.
 
     Args:
         only: names of sets; none for all.
+        oracle: what E_red is measured against where an effect of the library was named; None for the verdict's own
+            floor.
+        progress: called with 1 for each set.
 
     Raises:
         RefusedError: sets without a verdict.
@@ -237,7 +249,13 @@ def score(folder: ChallengeFolder, *, only: Sequence[str] = ()) -> Sheet:
     outcomes: list[Outcome] = []
     for name in names:
         content, where = folder.seal(name), str(folder.sealed(name))
-        outcomes.append(Outcome.of(opened(content, manifest["sets"][name]["commitment"], where=where), filed[name]))
+        key = opened(content, manifest["sets"][name]["commitment"], where=where)
+        outcome = Outcome.of(key, filed[name])
+        if oracle is not None and outcome.named and outcome.true:
+            outcome = replace(outcome, oracle=oracle(folder, key))
+        outcomes.append(outcome)
+        if progress is not None:
+            progress(1)
     return graded(manifest["title"], outcomes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -200,6 +201,15 @@ def test_reduction_is_the_median_over_unseen_data_and_only_where_an_effect_was_n
     assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said)).reduction == pytest.approx(0.8)
     nothing = verdict(Conclusion.OUTSIDE, comparisons=(comparison(),))
     assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", nothing)).reduction is None
+
+
+def test_reduction_is_measured_against_the_true_model_where_it_is_known() -> None:
+    """From 5 mm to 2 mm where the true model has 1 mm: 3/4. None where the base model is no worse than the true one."""
+    said = verdict(Conclusion.EFFECT, "lift", comparisons=(comparison(share=0.1, after=2e-3),))
+    outcome = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
+    assert replace(outcome, oracle={"unseen": 1e-3}).reduction == pytest.approx(0.75)
+    assert replace(outcome, oracle={"another": 1e-3}).reduction == pytest.approx(0.1)
+    assert replace(outcome, oracle={"unseen": 6e-3}).reduction is None
 
 
 @pytest.mark.parametrize(
