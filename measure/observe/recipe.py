@@ -188,7 +188,7 @@ def _setup(top: Table, folder: Path) -> Setup:
 
 
 def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, float | None]:
-    points = table.points("points")
+    points = tuple((u, v) for u, v in table.points("points"))
     at = table.choice("at", Hold.HOIST_CORNERS) if "at" in table else None
     if points and at is not None:
         raise UsageError("both at and points are given", where=table.where, fix="keep one of them")
