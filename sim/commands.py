@@ -38,8 +38,8 @@ def simulate(
 ) -> None:
     """Simulate cloth in the wind: mesh sequences, with their parameters, seeds and energies.
 
-    RECIPE is a TOML file, a recipe of the catalog by name, or an ArcSim scene (.json), which is run with ArcSim's own
-    steps.
+    RECIPE is a TOML file, a recipe of the catalog by name, an ArcSim scene (.json), which is run with ArcSim's own
+    steps, or a model of the lake by its name or id, as closing the loop leaves them.
 
     Each batch is one commit: a run that is stopped goes on with what is missing when the command is given again. On
     one machine the same recipe, seed and index give the same bits, whatever runs beside. A member that diverges or
@@ -50,12 +50,12 @@ def simulate(
       flagdata simulate my-flag.toml --lake lake --batch 64 --device cuda
     """
     from flagdata.lake import Lake
-    from sim.run import load
     from sim.run import simulate as run
+    from sim.run.models import load
 
-    loaded = load(recipe)
-    loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
     lake = Lake.open(lake_path)
+    loaded = load(recipe, lake, branch=branch)
+    loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
     with progress(loaded.count, label=loaded.name, unit="flag") as advance:
         report = run(lake, loaded, branch=branch, device=device, workers=workers or _cores(device), progress=advance)
     if as_json:

@@ -1,8 +1,9 @@
-"""`flagdata close-loop`: recordings in, a verdict and its report out."""
+"""`flagdata close-loop`: recordings in; a verdict, its report and the models out."""
 
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable
 from dataclasses import replace
@@ -10,123 +11,238 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from flagdata.console import document, json_option, say
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
-    from measure.loop.close import Stage
-    from measure.loop.verdict import Verdict
-    from measure.observe import Setup
+    from measure.loop.artifacts import Closed, Kept
+    from measure.loop.close import Options, Stage
+    from measure.observe import Setup, Up
+    from measure.observe.recipe import ExperimentRecipe
+
+_OF_SOURCES = ("winds", "axis", "north", "offset", "rate", "unit", "noise", "up")
+"""Options that say how sources of the command line are read."""
 
 
 @click.command("close-loop")
-@click.argument("sources", metavar="SOURCE...", nargs=-1, required=True)
+@click.argument("sources", metavar="SOURCE...", nargs=-1)
+@click.option("--recipe", "recipe_path", type=click.Path(path_type=Path), metavar="FILE.toml",
+              help="Cloth, pins, wind, test; may name the recordings too.")  # fmt: skip
 @click.option("--wind", "winds", multiple=True, metavar="M/S|LOG|ID", help="One for all recordings, or one for each.")
 @click.option("--axis", default="1,0,0", show_default=True, metavar="X,Y,Z", help="Where the air of a speed goes.")
-@click.option("--offset", type=float, default=0.0, show_default=True, help="From a log's first sample to frame 1 [s].")
+@click.option("--north", type=float, metavar="DEG", help="From +x towards +y; with a log that has directions.")
+@click.option("--offset", type=float, help="From a log's first sample to frame 1 [s].")
 @click.option("--material", help="Nominal cloth, of the catalog; by default the source's own.")
 @click.option("--size", metavar="WxH", help="Of the flat cloth [m]; by default the markers' outline.")
 @click.option("--pins", help="hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default the source's own.")
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), help="Frames a second, if the source is silent.")
 @click.option("--unit", default="m", show_default=True, help="Of positions.")
+@click.option("--up", default="z", show_default=True, help="Axis that points up: z, y, x, -z, -y or -x.")
 @click.option("--noise", type=click.FloatRange(min=0), help="Of a marker's coordinate [m]; estimated by default.")
-@click.option("--nulls", type=click.IntRange(min=64), default=192, show_default=True, help="Null recordings.")
+@click.option("--nulls", type=click.IntRange(min=64), help="Null recordings; 192 by default.")
 @click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
-@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.03, show_default=True,
-              help="Of the global test.")  # fmt: skip
+@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
+              help="Of the global test; 0.03 by default.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes; by default one for each core.")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path), help="Where artifacts are.")
+@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+              help="Where artifacts are, and where verdict and models go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option("--branch", default="main", show_default=True, help="Of the lake, to commit on.")
+@click.option("--name", help="Of the measurement and its models; by default the first source's.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
-              help="Folder for report.html and verdict.json.")  # fmt: skip
+              help="Folder for report.html, verdict.json and the models.")  # fmt: skip
 @json_option
+@click.pass_context
 def close_loop(
+    context: click.Context,
     sources: tuple[str, ...],
+    recipe_path: Path | None,
     winds: tuple[str, ...],
     axis: str,
-    offset: float,
+    north: float | None,
+    offset: float | None,
     material: str | None,
     size: str | None,
     pins: str | None,
     rate: float | None,
     unit: str,
+    up: str,
     noise: float | None,
-    nulls: int,
+    nulls: int | None,
     bank: Path | None,
-    level: float,
+    level: float | None,
     seed: int,
     workers: int | None,
     lake_path: Path | None,
+    branch: str,
+    name: str | None,
     out: Path,
     as_json: bool,
 ) -> None:
     """Find what the model of a cloth lacks, name it, and say what adding it changes on unseen data.
 
     SOURCE is the output folder of an ArcSim run, a table of tracked markers (CSV or Parquet with the columns frame or
-    time, marker, u, v, x, y, z, and recording if there are several), or a mesh sequence of --lake by its id. Several
-    are recordings of one cloth, best in different winds.
+    time, marker, u, v, x, y, z, and recording if there are several), or a mesh sequence or markers of --lake by id.
+    Several are recordings of one cloth, best in different winds. With --lake the verdict and both models become
+    artifacts; `flagdata simulate` runs a model by its name.
 
     \b
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
       flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --pins hoist-corners
+      flagdata close-loop --recipe flag.toml --lake lake
     """
+    from flagdata.lake import Lake
+    from measure.loop.artifacts import Closed, keep
     from measure.loop.close import Options
     from measure.loop.close import close_loop as close
+    from measure.loop.named import models
     from measure.loop.sources import Reading, read
-    from measure.observe import observe
-    from measure.report.document import as_document
-    from measure.report.page import write_page
-    from measure.report.words import words
+    from measure.observe import Setup, observe
+    from measure.observe import recipe as recipes
 
-    reading = Reading(lake=lake_path, rate=rate, unit=unit, noise=noise, axis=_vector(axis), offset=offset)
-    observed = observe(read(sources, winds, reading), _setup(material, size, pins))
+    recipe = None if recipe_path is None else recipes.parse(recipe_path)
+    if recipe is not None and recipe.recordings:
+        _refuse_beside(context, sources)
+    elif not sources:
+        raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
+    lake = None if lake_path is None else Lake.open(lake_path)
+    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)))
+    if recipe is not None:
+        options = _said(options, level=recipe.level, nulls=recipe.nulls)
+    options = _said(options, level=level, nulls=nulls)
+    setup = _setup(Setup() if recipe is None else recipe.setup, material, size, pins)
+    if recipe is not None and recipe.recordings:
+        observed = recipes.read(replace(recipe, setup=setup), lake)
+    else:
+        reading = Reading(
+            rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
+            axis=_axis(context, axis, north), north=None if north is None else math.radians(north),
+        )  # fmt: skip
+        observed = observe(read(sources, winds, reading, lake), setup)
     _refuse(observed.findings)
-    options = Options(seed=seed, level=level, nulls=nulls, bank=bank, workers=workers or len(os.sched_getaffinity(0)))
     verdict = close(observed.experiment, options, stage=_stage())
     verdict = replace(verdict, findings=tuple((f.kind, f.what) for f in observed.findings))
-    out.mkdir(parents=True, exist_ok=True)
-    write_page(verdict, out / "report.html")
-    (out / "verdict.json").write_text(json.dumps(as_document(verdict), indent=1) + "\n", encoding="utf-8")
-    _tell(verdict, out, as_json=as_json, words=words(verdict))
+    called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
+    closed = Closed(
+        name=called, experiment=observed.experiment, findings=observed.findings, options=options, verdict=verdict,
+        models=models(verdict, observed.experiment, name=called, seed=seed),
+    )  # fmt: skip
+    _write(out, closed)
+    kept = None if lake is None else keep(lake, closed, branch=branch)
+    _tell(closed, kept, out, as_json=as_json)
 
 
-def _tell(verdict: Verdict, out: Path, *, as_json: bool, words: str) -> None:
+def _write(out: Path, closed: Closed) -> None:
+    from measure.loop import toml
     from measure.report.document import as_document
+    from measure.report.page import write_page
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_page(closed.verdict, out / "report.html")
+    content = json.dumps(as_document(closed.verdict), indent=1, allow_nan=False)
+    (out / "verdict.json").write_text(content + "\n", encoding="utf-8")
+    for file, model in zip(("base.toml", "model.toml"), closed.models, strict=False):
+        (out / file).write_text(toml.dumps(model.content), encoding="utf-8")
+
+
+def _tell(closed: Closed, kept: Kept | None, out: Path, *, as_json: bool) -> None:
+    from measure.report.document import as_document
+    from measure.report.words import words
 
     if as_json:
-        content = as_document(verdict)
+        content = as_document(closed.verdict)
         content.pop("schema")
+        if kept is not None:
+            content["artifacts"] = {
+                "measurement": kept.measurement, "models": list(kept.models), "existing": kept.existing
+            }  # fmt: skip
         document("verdict", content)
     else:
-        click.echo(words)
-    say(f"wrote {out / 'report.html'} and {out / 'verdict.json'}")
+        click.echo(words(closed.verdict))
+    if kept is not None and kept.existing:
+        say(f"the lake has this measurement already: {kept.measurement}")
+    elif kept is not None:
+        say(f"measurement {kept.measurement}")
+        for model, identity in zip(closed.models, kept.models, strict=True):
+            say(f"model {identity} {model.name}")
+    files = ["report.html", "verdict.json", "base.toml", "model.toml"][: 2 + len(closed.models)]
+    say(f"wrote {', '.join(str(out / file) for file in files)}")
 
 
-def _vector(text: str) -> tuple[float, float, float]:
+def _refuse_beside(context: click.Context, sources: tuple[str, ...]) -> None:
+    """Options that would be ignored beside a recipe that names its recordings."""
+    if sources:
+        raise UsageError("the recipe names its recordings", where="SOURCE", fix="leave SOURCE or [[recording]] out")
+    for option in _OF_SOURCES:
+        if context.get_parameter_source(option) is ParameterSource.COMMANDLINE:
+            spelled = "wind" if option == "winds" else option
+            raise UsageError(
+                "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
+            )
+
+
+def _said(options: Options, *, level: float | None, nulls: int | None) -> Options:
+    """Options with what is said of the test."""
+    return replace(
+        options, level=options.level if level is None else level, nulls=options.nulls if nulls is None else nulls
+    )
+
+
+def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:
+    """Of the first source that is a file, of the recipe, or of the first recording."""
+    if sources and Path(sources[0]).exists():
+        return Path(sources[0]).resolve().stem
+    return recording if recipe is None or sources else recipe.title
+
+
+def _axis(context: click.Context, text: str, north: float | None) -> tuple[float, float, float] | None:
+    """Where the air goes; None where north is given."""
+    if north is not None:
+        if context.get_parameter_source("axis") is ParameterSource.COMMANDLINE:
+            raise UsageError("both --axis and --north are given", where="--north", fix="keep one of them")
+        return None
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError as error:
         raise UsageError(f"{text!r} is not three numbers", where="--axis", fix="give x,y,z") from error
+    if not 0 < math.hypot(x, y, z) < math.inf:
+        raise UsageError(f"{text!r} has no direction", where="--axis", fix="give x,y,z, not all of them 0")
     return x, y, z
 
 
-def _setup(material: str | None, size: str | None, pins: str | None) -> Setup:
-    from measure.observe import Hold, Setup, sheet
-    from sim.material import named
+def _up(context: click.Context, text: str, recipe: ExperimentRecipe | None) -> Up:
+    from measure.observe import Up
 
-    outline = None
+    if recipe is not None and context.get_parameter_source("up") is not ParameterSource.COMMANDLINE:
+        return recipe.up
+    if text not in list(Up):
+        raise UnknownNameError.of("axis", text, list(Up), where="--up")
+    return Up(text)
+
+
+def _setup(setup: Setup, material: str | None, size: str | None, pins: str | None) -> Setup:
+    """A setup with what the command line says instead."""
+    from measure.observe import Hold, sheet
+    from sim.material import named, names
+
+    if material is not None:
+        if material not in names():
+            raise UnknownNameError.of("material", material, names(), where="--material")
+        setup = replace(setup, material=named(material))
     if size is not None:
         try:
             width, height = (float(part) for part in size.lower().split("x"))
         except ValueError as error:
             raise UsageError(f"{size!r} is not a size", where="--size", fix="give 1.5x1.0, in metres") from error
-        outline = sheet(width, height)
-    held: Hold | tuple[tuple[float, float], ...] | None = None
+        setup = replace(setup, outline=sheet(width, height))
     if pins is not None:
+        held: Hold | tuple[tuple[float, float], ...]
         held = Hold(pins) if pins in {h.value for h in Hold} else _places(pins)
-    return Setup(material=None if material is None else named(material), outline=outline, pins=held)
+        setup = replace(setup, pins=held)
+    return setup
 
 
 def _places(text: str) -> tuple[tuple[float, float], ...]:
@@ -151,14 +267,17 @@ def _refuse(findings: Iterable[Finding]) -> None:
 
 
 def _stage() -> Stage:
-    """Stages as lines, nulls as a bar: they take most of the time."""
+    """A bar for each stage; the nulls take most of the time."""
+    import sys
+
     from tqdm import tqdm
 
     bars: dict[str, tqdm] = {}
+    interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
 
     def tell(what: str, done: int, total: int) -> None:
         if what not in bars:
-            bars[what] = tqdm(total=total, desc=what, ncols=100, mininterval=1.0)
+            bars[what] = tqdm(total=total, desc=what, unit="part", ncols=100, mininterval=interval, file=sys.stderr)
         bars[what].update(done - bars[what].n)
         if done >= total:
             bars[what].close()

@@ -1,4 +1,4 @@
-"""What `close-loop` is given, as observations: ArcSim folders, marker tables, artifacts of a lake; wind beside them."""
+"""What `close-loop` is given on its command line, as observations: sources, and winds beside them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.errors import NotFoundError, UsageError
-from flagdata.findings import Finding
-from flagdata.ingest.markers.table import MarkerOptions, is_marker_table, read_table
+from flagdata.errors import UsageError
 from flagdata.lake import Lake
-from flagdata.lake.markers import MarkerSequence
-from measure.observe import Observation, WindTrack, from_arrays
-from measure.observe import meshes as seen_meshes
-from measure.observe import wind as seen_wind
+from measure.observe import Observation, Up
+from measure.observe.recipe import RecordingSource, WindSource, blown, opened
 from measure.observe.wind import LogPlacement
+
+_HERE = Path()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,23 +22,25 @@ class Reading:
     """How sources are to be read.
 
     Attributes:
-        lake: where artifacts are looked up; None if only files are given.
         rate: frames a second [Hz]; None for what the source says.
         unit: of positions.
         noise: standard deviation of a coordinate [m]; None to estimate it.
-        axis: along which the air goes.
-        offset: from a log's first sample to the first frame [s].
+        up: axis of the recordings that points up; all else is said with z up.
+        axis: along which the air goes; None for what a log's directions and `north` say.
+        north: where north lies, from +x towards +y [rad].
+        offset: from a log's first sample to the first frame [s]; None if nothing is said.
     """
 
-    lake: Path | None = None
     rate: float | None = None
     unit: str = "m"
     noise: float | None = None
-    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    offset: float = 0.0
+    up: Up = Up.Z
+    axis: tuple[float, float, float] | None = (1.0, 0.0, 0.0)
+    north: float | None = None
+    offset: float | None = None
 
 
-def read(sources: Sequence[str], winds: Sequence[str], reading: Reading) -> list[Observation]:
+def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None) -> list[Observation]:
     """The recordings of some sources.
 
     Args:
@@ -52,70 +52,33 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading) -> list
         UsageError: winds that do not fit the recordings.
         FlagdataError: as the readers.
     """
-    found = [observation for source in sources for observation in _recordings(source, reading)]
+    found = [
+        seen.turned(reading.up)
+        for source in sources
+        for seen in opened(
+            RecordingSource(source=source, rate=reading.rate, unit=reading.unit, noise=reading.noise), _HERE, lake
+        )
+    ]
     if len(winds) not in (0, 1, len(found)):
         raise UsageError(
             f"{len(winds)} winds for {len(found)} recordings", where="--wind", fix="give one, or one for each recording"
         )
-    if winds:
-        each = winds if len(winds) == len(found) else [winds[0]] * len(found)
-        found = [_blown(seen, wind, reading) for seen, wind in zip(found, each, strict=True)]
-    return _distinct(found)
+    each = [_wind(wind, reading) for wind in (winds if len(winds) == len(found) else [*winds[:1]] * len(found))]
+    return _distinct(
+        [blown(seen, wind, _HERE, lake) for seen, wind in zip(found, each or [None] * len(found), strict=True)]
+    )
 
 
-def _recordings(source: str, reading: Reading) -> list[Observation]:
-    path = Path(source)
-    if path.is_dir():
-        seen = seen_meshes.from_folder(path, rate=reading.rate, unit=reading.unit)
-        return [replace(seen, noise=reading.noise)]
-    if path.is_file():
-        if not is_marker_table(path):
-            raise UsageError(
-                "not a table of tracked markers", where=source,
-                fix="give columns frame or time, marker, u, v, x, y, z; or the folder of an ArcSim run",
-            )  # fmt: skip
-        table = read_table(path, MarkerOptions(rate=reading.rate, unit=reading.unit))
-        return [_tracked(name or path.stem, sequence, reading) for name, sequence in table.items()]
-    if reading.lake is None:
-        raise NotFoundError(
-            "no such file or folder", where=source, fix="check the path, or give --lake for an artifact"
-        )
-    lake = Lake.open(reading.lake)
-    seen = seen_meshes.from_artifact(lake, lake.artifact(source))
-    return [replace(seen, noise=reading.noise)]
-
-
-def _tracked(name: str, sequence: MarkerSequence, reading: Reading) -> Observation:
-    times = np.asarray(sequence.time, dtype=np.float64) * 1e-9
-    rate = reading.rate or float((len(times) - 1) / (times[-1] - times[0]))
-    return from_arrays(
-        name=name, positions=np.asarray(sequence.positions, dtype=np.float64),
-        rest=np.asarray(sequence.rest, dtype=np.float64), rate=rate, noise=reading.noise,
-    )  # fmt: skip
-
-
-def _blown(seen: Observation, wind: str, reading: Reading) -> Observation:
-    track, found = _wind(wind, reading)
-    return replace(seen, wind=track, findings=(*seen.findings, *found))
-
-
-def _wind(wind: str, reading: Reading) -> tuple[WindTrack, tuple[Finding, ...]]:
-    axis = np.array(reading.axis) / float(np.linalg.norm(reading.axis))
+def _wind(text: str, reading: Reading) -> WindSource:
     try:
-        speed = float(wind)
+        speed = float(text)
     except ValueError:
-        pass
-    else:
-        along = axis * speed
-        return WindTrack.constant((float(along[0]), float(along[1]), float(along[2]))), ()
-    placement = LogPlacement(axis=reading.axis, offset=reading.offset)
-    path = Path(wind)
-    if path.is_file():
-        return seen_wind.from_log(path, placement)
-    if reading.lake is None:
-        raise NotFoundError("neither a speed nor a file", where=f"--wind {wind}", fix="give m/s, or a log's path")
-    lake = Lake.open(reading.lake)
-    return seen_wind.from_artifact(lake, lake.artifact(wind), placement)
+        placement = LogPlacement(axis=reading.axis, north=reading.north, offset=reading.offset)
+        return WindSource(log=text, placement=placement)
+    if reading.axis is None:
+        raise UsageError("a speed without a direction", where=f"--wind {text}", fix="give --axis, not --north")
+    x, y, z = (speed * np.array(reading.axis) / float(np.linalg.norm(reading.axis))).tolist()
+    return WindSource(velocity=(x, y, z))
 
 
 def _distinct(found: Sequence[Observation]) -> list[Observation]:

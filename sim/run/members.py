@@ -67,6 +67,8 @@ class Crew:
         spec = self.recipe.scene
         if spec.arcsim is not None:
             return spec.arcsim.scene.mesh
+        if spec.given is not None:
+            return Mesh(rest=np.array(spec.given.rest), faces=np.array(spec.given.faces))
         rows = max(1, round(spec.columns * spec.height / spec.width))
         return grid(width=spec.width, height=spec.height, columns=spec.columns, rows=rows)
 
@@ -75,10 +77,15 @@ class Crew:
         spec = self.recipe.scene
         if spec.arcsim is not None:
             return spec.arcsim.scene.handles
+        return Handles(vertices=self._held(spec), stiffness=spec.stiffness)
+
+    def _held(self, spec: SceneSpec) -> tuple[int, ...]:
+        if spec.given is not None:
+            return spec.given.held
         if spec.shape is Shape.HANGING_CLOTH:
-            return Handles(vertices=held.top_corners(self.mesh.rest))
+            return held.top_corners(self.mesh.rest)
         hoist = spec.attachment is Attachment.HOIST
-        return Handles(vertices=held.full_hoist(self.mesh.rest) if hoist else held.corners(self.mesh.rest))
+        return held.full_hoist(self.mesh.rest) if hoist else held.corners(self.mesh.rest)
 
     def seed(self, index: int) -> int:
         """The seed of a member."""
@@ -170,12 +177,25 @@ class Crew:
 
     def _start(self, seed: int) -> NDArray[np.float64]:
         spec = self.recipe.scene
-        flat = spec.arcsim.scene.position if spec.arcsim is not None else upright(self.mesh)
+        flat = self._flat(spec)
         if not spec.start_noise:
             return flat
         noise = stream(seed, "start").normal(0.0, spec.start_noise, flat.shape)
         noise[list(self.handles.vertices)] = 0.0
         return flat + noise
+
+    def _flat(self, spec: SceneSpec) -> NDArray[np.float64]:
+        """(vertex, 3) where the cloth starts, before its noise [m]."""
+        if spec.arcsim is not None:
+            return spec.arcsim.scene.position
+        if spec.given is None:
+            return upright(self.mesh)
+        anchors, vertices = np.array(spec.given.anchors), list(spec.given.held)
+        lowest = int(anchors[:, 2].argmin())
+        along = self.mesh.rest - self.mesh.rest[vertices[lowest]]
+        flat = anchors[lowest] + np.stack([along[:, 0], 0 * along[:, 0], along[:, 1]], axis=1)
+        flat[vertices] = anchors
+        return flat
 
     def _effect(self, name: str, members: Sequence[Member]) -> Effect:
         values = {

@@ -186,7 +186,7 @@ def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, see
     """The member's row without its result; its identity is complete."""
     return Artifact(
         kind=Kind.MESHES, name=f"{recipe.name}-{index:05d}", recipe=identity, seed=seed,
-        frame_count=recipe.time.frames, rate=recipe.time.rate,
+        frame_count=recipe.time.frames, rate=recipe.time.rate, parents=(recipe.model,) if recipe.model else (),
     )  # fmt: skip
 
 

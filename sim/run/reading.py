@@ -4,11 +4,13 @@ All values are SI. A *quantity* is a number, or `{ low = …, high = …, scale 
 member draws its own value.
 
     title, seed, count, batch, precision
-    [scene]      shape = "flag" | "hanging-cloth" | "arcsim"; width, height, columns, attachment, start-noise;
-                 file, root, accept (of an ArcSim scene); evaluation = "arcsim" | "corrected"; gravity
-    [material]   name (of catalogs/materials), names (of which each member draws one) or file (TOML, or ArcSim
-                 JSON); density, stretching-factor, bending-factor, damping: quantities; bending-factors: a
-                 quantity drawn for each of the 15 coefficients
+    [scene]      shape = "flag" | "hanging-cloth" | "arcsim" | "mesh"; width, height, columns, attachment;
+                 start-noise; file, root, accept (of an ArcSim scene); rest = [[u, v], …], faces, held, anchors =
+                 [[x, y, z], …] (of a mesh); stiffness (of the handles), or rigid = true; evaluation = "arcsim" |
+                 "corrected"; gravity
+    [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML, or ArcSim JSON) or
+                 table (what such a TOML file holds); density, stretching-factor, bending-factor, damping:
+                 quantities; bending-factors: a quantity drawn for each of the 15 coefficients
     [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
@@ -24,9 +26,11 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
@@ -35,6 +39,7 @@ from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
 from sim.contact import Contact
 from sim.effects import EFFECTS
+from sim.handles import ARCSIM_STIFFNESS
 from sim.integrate import INTEGRATORS
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
@@ -43,6 +48,7 @@ from sim.run.recipe import (
     DTYPES,
     Attachment,
     EffectSpec,
+    GivenCloth,
     IntegratorSpec,
     MaterialSpec,
     Recipe,
@@ -95,9 +101,19 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
         UnknownNameError, InputError: as `load`.
     """
     try:
-        top = Table(tomllib.loads(text), where=where)
+        content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    return of_content(content, name=name, folder=folder, where=where)
+
+
+def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str) -> Recipe:
+    """A recipe from what its TOML holds.
+
+    Raises:
+        UnknownNameError, InputError: as `load`.
+    """
+    top = Table(content, where=where)
     scene = _scene(top.table("scene"), folder)
     precision = top.text("precision", "float32") or ""
     if precision not in DTYPES:
@@ -130,6 +146,9 @@ def _scene(table: Table, folder: Path) -> SceneSpec:
             raise InputError("no file is named", where=table.where, fix='add file = "scene.json"')
         content = read_scene(folder / file, root=None if root is None else folder / root, accept=accept)
         return _arcsim(content, noise=noise, evaluation=evaluation)
+    stiffness = _stiffness(table)
+    if shape is Shape.MESH:
+        return _given(table, noise=noise, evaluation=evaluation, stiffness=stiffness)
     square = shape is Shape.HANGING_CLOTH
     width = table.number("width", 1.0 if square else 1.5, above=0.0)
     height = table.number("height", width if square else width * 2 / 3, above=0.0)
@@ -141,7 +160,42 @@ def _scene(table: Table, folder: Path) -> SceneSpec:
         raise UsageError("a hanging cloth has no hoist", where=table.where, fix='take attachment = "corners"')
     return SceneSpec(
         shape=shape, width=width, height=height, columns=columns, attachment=attachment, start_noise=noise,
-        evaluation=evaluation, gravity=gravity,
+        evaluation=evaluation, gravity=gravity, stiffness=stiffness,
+    )  # fmt: skip
+
+
+def _stiffness(table: Table) -> float:
+    """Of the handles [N/m]."""
+    rigid, given = table.flag("rigid"), "stiffness" in table
+    if rigid and given:
+        raise UsageError("both rigid and a stiffness are given", where=table.where, fix="keep one of them")
+    return math.inf if rigid else table.number("stiffness", ARCSIM_STIFFNESS, above=0.0)
+
+
+def _given(table: Table, *, noise: float, evaluation: Evaluation, stiffness: float) -> SceneSpec:
+    cloth = GivenCloth(
+        rest=tuple((u, v) for u, v in table.points("rest")),
+        faces=tuple((a, b, c) for a, b, c in table.indices("faces", 3)),
+        held=tuple(vertex for (vertex,) in table.indices("held", 1)),
+        anchors=tuple((x, y, z) for x, y, z in table.points("anchors", 3)),
+    )  # fmt: skip
+    gravity = table.number("gravity", -GRAVITY[2])
+    table.done()
+    used = [vertex for face in cloth.faces for vertex in face]
+    if not cloth.rest or not cloth.faces or not cloth.held or len(cloth.held) != len(cloth.anchors):
+        raise InputError(
+            f"a mesh of {len(cloth.rest)} vertices and {len(cloth.faces)} faces, {len(cloth.held)} of them held at "
+            f"{len(cloth.anchors)} anchors", where=table.where, fix="give rest, faces, held, an anchor for each held",
+        )  # fmt: skip
+    if max(*used, *cloth.held) >= len(cloth.rest):
+        raise InputError(
+            f"a vertex {max(*used, *cloth.held)} of {len(cloth.rest)}", where=table.where, fix="number them from 0"
+        )
+    width, height = (max(axis) - min(axis) for axis in zip(*cloth.rest, strict=True))
+    return SceneSpec(
+        shape=Shape.MESH, width=width, height=height, columns=0, attachment=Attachment.CORNERS, start_noise=noise,
+        evaluation=evaluation, gravity=gravity, stiffness=stiffness, given=cloth,
+        content=digest(canonical(vars(cloth).copy())),
     )  # fmt: skip
 
 
@@ -176,8 +230,13 @@ def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
 
 def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]:
     name, names_, file = table.text("name", None), table.texts("names"), table.text("file", None)
-    if sum(bool(given) for given in (name, names_, file)) > 1:
-        raise UsageError("more than one of name, names and file is given", where=table.where, fix="keep one of them")
+    inline = table.mapping("table")
+    if sum(bool(given) for given in (name, names_, file, inline)) > 1:
+        raise UsageError(
+            "more than one of name, names, file and table is given", where=table.where, fix="keep one of them"
+        )
+    if inline:
+        return (Material.from_mapping(inline, name=str(inline.get("title", "material"))),)
     chosen = (name,) if name is not None else names_
     for each in chosen:
         if each not in material.names():

@@ -17,6 +17,7 @@ from flagdata.provenance import canonical, digest
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import ArcsimScene
 from sim.contact import Contact
+from sim.handles import ARCSIM_STIFFNESS
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
@@ -32,6 +33,8 @@ class Shape(StrEnum):
     FLAG = "flag"
     HANGING_CLOTH = "hanging-cloth"
     ARCSIM = "arcsim"
+    MESH = "mesh"
+    """A cloth of any outline, held anywhere: its mesh is in the recipe."""
 
 
 class Attachment(StrEnum):
@@ -41,6 +44,24 @@ class Attachment(StrEnum):
     """A flag's two hoist corners, a hanging cloth's two top corners."""
     HOIST = "hoist"
     """All of a flag's hoist."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenCloth:
+    """A mesh, where it is held and where it starts.
+
+    Attributes:
+        rest: (u, v) of each vertex on the flat cloth [m].
+        faces: three vertices each, counter-clockwise.
+        held: vertices that are held.
+        anchors: (x, y, z) of each of them [m]; the others start flat in the x–z plane, u along x, as the lowest
+            anchor has it.
+    """
+
+    rest: tuple[tuple[float, float], ...]
+    faces: tuple[tuple[int, int, int], ...]
+    held: tuple[int, ...]
+    anchors: tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,8 +75,10 @@ class SceneSpec:
         start_noise: standard deviation of the free vertices' start about the flat shape [m].
         evaluation: how the material's tables are read.
         gravity: downward [m/s²].
+        stiffness: of the handles on each axis [N/m]; infinite for rigid. An ArcSim scene has its own.
         arcsim: the scene file, where the shape is that.
-        content: SHA-256 of its mesh, start, handles and gravity, where it was read from a scene file.
+        given: the cloth, where the shape is a mesh.
+        content: SHA-256 of its mesh, start, handles and gravity, where it was read from a scene file or is given.
     """
 
     shape: Shape
@@ -66,7 +89,9 @@ class SceneSpec:
     start_noise: float
     evaluation: Evaluation
     gravity: float
+    stiffness: float = ARCSIM_STIFFNESS
     arcsim: ArcsimScene | None = None
+    given: GivenCloth | None = None
     content: str = ""
 
 
@@ -155,6 +180,7 @@ class Recipe:
         contact: as of `sim.scene.Scene`.
         limits: as of `sim.scene.Scene`.
         precision: of the arithmetic, a name of `DTYPES`.
+        model: artifact of the lake that the recipe was read from; empty for none.
     """
 
     name: str
@@ -171,6 +197,7 @@ class Recipe:
     integrator: IntegratorSpec
     time: TimeSpec
     effects: Mapping[str, EffectSpec]
+    model: str = ""
 
     @property
     def dtype(self) -> torch.dtype:
@@ -187,7 +214,7 @@ class Recipe:
                 "shape": scene.shape.value, "width": scene.width, "height": scene.height, "columns": scene.columns,
                 "attachment": scene.attachment.value, "start_noise": scene.start_noise,
                 "evaluation": scene.evaluation.value, "gravity": scene.gravity, "content": scene.content,
-                "left_out": list(scene.arcsim.left_out) if scene.arcsim else [],
+                "left_out": list(scene.arcsim.left_out) if scene.arcsim else [], **_held(scene),
             },
             "material": {
                 "bases": [_base(base) for base in material.bases], "density": plain(material.density),
@@ -214,6 +241,13 @@ class Recipe:
                 for name, effect in self.effects.items()
             },
         }  # fmt: skip
+
+
+def _held(scene: SceneSpec) -> dict[str, Any]:
+    """The handles' stiffness, where it is not the usual one."""
+    if scene.stiffness == ARCSIM_STIFFNESS:
+        return {}
+    return {"stiffness": "rigid" if math.isinf(scene.stiffness) else scene.stiffness}
 
 
 def _base(base: Material) -> dict[str, Any]:

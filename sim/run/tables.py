@@ -139,13 +139,29 @@ class Table:
             raise self._wrong(key, value, "a list of finite numbers")
         return tuple(float(item) for item in value)
 
-    def points(self, key: str) -> tuple[tuple[float, float], ...]:
-        """A list of pairs of finite numbers; empty if it is not there."""
+    def points(self, key: str, size: int = 2) -> tuple[tuple[float, ...], ...]:
+        """A list of points with `size` finite coordinates; empty if it is not there."""
         value = self._take(key, [])
-        pairs = isinstance(value, list) and all(isinstance(item, list) and len(item) == 2 for item in value)
-        if not pairs or not all(_finite(number) for item in value for number in item):
-            raise self._wrong(key, value, "a list of pairs, [[0.0, 0.0], [0.0, 1.0]]")
-        return tuple((float(first), float(second)) for first, second in value)
+        points = isinstance(value, list) and all(isinstance(item, list) and len(item) == size for item in value)
+        if not points or not all(_finite(number) for item in value for number in item):
+            zeros = ", ".join(["0.0"] * size)
+            raise self._wrong(key, value, f"a list of points, [[{zeros}], …]")
+        return tuple(tuple(float(number) for number in item) for item in value)
+
+    def indices(self, key: str, size: int) -> tuple[tuple[int, ...], ...]:
+        """A list of groups of `size` whole numbers from 0 (of plain numbers, if it is 1); empty if it is not there."""
+        value = self._take(key, [])
+        groups = [item if isinstance(item, list) else [item] for item in value] if isinstance(value, list) else [[]]
+        if not all(len(group) == size and all(_index(number) for number in group) for group in groups):
+            raise self._wrong(key, value, f"a list of whole numbers from 0, {size} each")
+        return tuple(tuple(group) for group in groups)
+
+    def mapping(self, key: str) -> Mapping[str, Any]:
+        """The content of a table inside, for who reads it by rules of its own; empty if it is not there."""
+        value = self._take(key, {})
+        if not isinstance(value, Mapping):
+            raise self._wrong(key, value, "a table")
+        return value
 
     def tables(self, key: str) -> tuple[Table, ...]:
         """A list of tables inside; empty if it is not there."""
@@ -195,6 +211,10 @@ class Table:
 
     def _wrong(self, key: str, value: Any, wanted: str) -> InputError:
         return InputError(f"{key} is {value!r}", where=self.where, fix=f"give {wanted}")
+
+
+def _index(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def _finite(value: Any) -> bool:

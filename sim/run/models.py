@@ -1,0 +1,60 @@
+"""Models of a lake as recipes: a row of kind "model" holds in its parameters what a recipe's TOML holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import CorruptError, NotFoundError, UnknownNameError
+from flagdata.lake import Artifact, Lake
+from flagdata.schema import Kind
+from sim.run import reading
+from sim.run.recipe import Recipe
+
+_SHORTEST = 6
+"""Characters of an id that are taken for one."""
+
+
+def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
+    """A recipe from a file or the catalog, as `sim.run.reading.load`, or a model of the lake by its name or id.
+
+    Raises:
+        UnknownNameError: neither a recipe nor a model has that name.
+        NotFoundError: several models have it.
+        FlagdataError: as `sim.run.reading.load`.
+    """
+    if Path(source).suffix in (".toml", ".json") or source in reading.names():
+        return reading.load(source)
+    rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "name"]).to_pylist()
+    found = [row["artifact"] for row in rows if _means(source, row)]
+    if len(found) > 1:
+        raise NotFoundError(f"{len(found)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(found))
+    if not found:
+        names = [*reading.names(), *(row["name"] for row in rows)]
+        raise UnknownNameError.of("recipe or model", source, names)
+    return of_artifact(lake.artifact(found[0], at=branch))
+
+
+def of_artifact(artifact: Artifact) -> Recipe:
+    """The recipe of a model.
+
+    Raises:
+        CorruptError: a row of another kind, or without parameters.
+        FlagdataError: as `sim.run.reading.load`.
+    """
+    where = f"artifact {artifact.id}"
+    if artifact.kind is not Kind.MODEL or artifact.parameters is None:
+        raise CorruptError("no model that can be simulated", where=where, fix="close the loop again")
+    recipe = reading.of_content(json.loads(artifact.parameters), name=artifact.name, folder=Path(), where=where)
+    return replace(recipe, model=artifact.id)
+
+
+def _means(source: str, row: Mapping[str, Any]) -> bool:
+    return row["name"] == source or (len(source) >= _SHORTEST and row["artifact"].startswith(source))
+
+
+def _one_of(found: Iterable[str]) -> str:
+    return f"give one's id: {', '.join(identity[:12] for identity in found)}"
