@@ -173,7 +173,9 @@ class Solved:
     def _refined(self, chosen: Sequence[int]) -> Refined:
         setting = self.setting
         speeds = setting.speeds[setting.recording]
-        return refine(setting.forecaster, setting.segments, self.evidence, self.null, speeds, chosen)
+        return refine(
+            setting.forecaster, setting.segments, self.evidence, self.null, speeds, chosen, weighed=banks.columns()
+        )
 
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:

@@ -18,7 +18,7 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.cloth import Cloth
-from sim.effects import EFFECTS, apply
+from sim.effects import EFFECTS, Effect, apply
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import Parameter
 from sim.material import Material
@@ -118,8 +118,11 @@ class EffectColumn(Column):
 
     def strengthened(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
         """The batch with the effect at a strength `coefficient` beyond its null value."""
-        effect = EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
-        return apply([effect], system, state)
+        return apply([self.at(coefficient)], system, state)
+
+    def at(self, coefficient: float) -> Effect:
+        """The effect at that strength."""
+        return EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from measure.loop.columns import Calibration, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
-from sim.effects import EFFECTS, Effect, apply
+from sim.effects import Effect, apply
 from sim.state import State
 from sim.system import System
 
@@ -28,7 +28,7 @@ class Model:
     @property
     def acting(self) -> tuple[Effect, ...]:
         """The effects, their strengths kept to what is admissible."""
-        return tuple(_strengthened(column, coefficient) for column, coefficient in self.effects)
+        return tuple(column.at(_kept(column, coefficient)) for column, coefficient in self.effects)
 
     def system(self, forecaster: Forecaster, segments: Segments) -> tuple[System, State]:
         """The batch of segments by this model."""
@@ -42,10 +42,6 @@ class Model:
             for (column, value), step in zip(self.effects, steps[own:], strict=True)
         )
         return replace(self, calibration=self.calibration.moved(steps[:own]), effects=effects)
-
-
-def _strengthened(column: EffectColumn, coefficient: float) -> Effect:
-    return EFFECTS[column.effect](**{column.parameter: column.described.null + _kept(column, coefficient)})
 
 
 def _kept(column: EffectColumn, coefficient: float) -> float:

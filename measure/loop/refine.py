@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.loop.bank import columns
-from measure.loop.columns import PRIOR, THETA, Calibration, EffectColumn
+from measure.loop.columns import PRIOR, THETA, Calibration, Column, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
@@ -59,6 +58,8 @@ def refine(
     null: NullModel,
     speeds: Floats,
     chosen: Sequence[int],
+    *,
+    weighed: Sequence[Column],
 ) -> Refined:
     """Fit the calibrated parameters and chosen columns to segments, from the linear fit on.
 
@@ -66,9 +67,10 @@ def refine(
 
     Args:
         speeds: (segment,) of the wind [m/s].
+        weighed: the evidence's columns, but for the calibrated parameters.
     """
     fit = evidence.fit(chosen)
-    own = [columns()[c - len(THETA)] for c in chosen]
+    own = [weighed[c - len(THETA)] for c in chosen]
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=Calibration(), effects=effects).moved(_cut(np.array(values, dtype=np.float64)))
