@@ -63,9 +63,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             brightness.append(float((shown[0][both] - shown[1][both]).mean()))
             difference.append(float(np.abs(shown[0][both] - shown[1][both]).mean()))
             pairs.append(np.concatenate(shown[:2]).astype(np.uint8))
-    picture = out / "validate-renderers.png"
+    picture = out / "validate-renderers.jpg"
     rows = [np.concatenate(pairs[i : i + 4], axis=1) for i in range(0, SHEET, 4)]
-    Image.fromarray(np.concatenate(rows)).save(picture, optimize=True)
+    Image.fromarray(np.concatenate(rows)).save(picture, quality=85, optimize=True)
     places = np.array(misplaced).reshape(SCENES, 2, 4)
     return {
         "scenes": SCENES,
