@@ -75,13 +75,14 @@ def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(math.log(span[0]), math.log(span[1]))))
 
 
-def evaluate(batch: NullBatch, numerics: int) -> tuple[Nulls, float]:
-    """Simulate a batch and take its statistics, from the nominal calibration; with the duration of a segment [s]."""
+def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tuple[Nulls, float]:
+    """Simulate a batch and take its statistics along columns, from the nominal calibration; with the duration of a
+    segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings)
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     nominal = Calibration()
-    found = statistics(forecaster, segments, [nominal] * len(segments), columns())
+    found = statistics(forecaster, segments, [nominal] * len(segments), weighed)
     offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
@@ -112,7 +113,7 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
 
 
 def _keep(folder: Path, batch: NullBatch, index: int) -> None:
-    nulls, duration = evaluate(batch, index)
+    nulls, duration = evaluate(batch, index, columns())
     own = nulls.statistics
     buffer = BytesIO()
     np.savez(

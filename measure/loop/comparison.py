@@ -92,7 +92,7 @@ def compare(
     gained = float(before.mean() - after.mean())
     room = float(before.mean()) - low
     return Comparison(
-        what=fold.words, frames=frames, before=root(before), after=root(after), reduction=_difference(before, after),
+        what=fold.words, frames=frames, before=root(before), after=root(after), reduction=paired(before, after),
         floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(before.mean()) else None,
         control=None if control is None else root(control), control_name=control_name,
     )  # fmt: skip
@@ -108,7 +108,7 @@ def root(squared: Floats) -> Estimate:
     )  # fmt: skip
 
 
-def _difference(before: Floats, after: Floats) -> Estimate:
+def paired(before: Floats, after: Floats) -> Estimate:
     """Of roots of means, paired by segment: linear in the squares, whose difference Student's interval is of."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)

@@ -39,8 +39,10 @@ EFFECTS = Registry(
         "slack": "sim.effects.slack:Slack",
         "tilted-pole": "sim.effects.tilted_pole:TiltedPole",
     },
+    group="flagdata.effects",
 )
-"""On the cloth: kinds of `sim.effects.effect`."""
+"""On the cloth: kinds of `sim.effects.effect`; also those of installed packages, from the entry points
+`flagdata.effects`. Of files, see `sim.effects.files`."""
 
 SENSOR_EFFECTS = Registry(
     "sensor effect",

@@ -1,0 +1,120 @@
+"""Which terms: forward selection, each by a calibrated statistic and by what it predicts of recordings left out.
+
+A term is looked at only if its statistic is beyond those of nulls at the level, the largest of *all* terms compared
+with the largest of all (so that trying many costs power, not false positives). Of those that are, the one that predicts
+best is taken, if it does so beyond chance; the next is sought in what is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from measure.loop.inference import Evidence, gains
+from measure.loop.reference import Reference
+
+MOST = 3
+_FAR = 2.0
+"""Standard errors of held-out gain by which a further term must improve on those before; the first must improve."""
+_TIED = 1.0
+"""Standard errors within which held-out gains say nothing, and the larger statistic leads."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One more term that was looked at.
+
+    Attributes:
+        name: of its column.
+        column: place among the evidence's columns.
+        statistic: calibrated, 1 in the mean of nulls.
+        p_family: share of nulls in which any term's statistic is as large.
+        gain: in log likelihood of left-out recordings, over the terms before.
+        gain_error: its standard error.
+        taken: whether it is one of the proposal's.
+        reason: why it was not; empty where it was.
+    """
+
+    name: str
+    column: int
+    statistic: float
+    p_family: float
+    gain: float
+    gain_error: float
+    taken: bool
+    reason: str
+
+
+def search(
+    evidence: Evidence,
+    reference: Reference,
+    names: tuple[str, ...],
+    candidates: Sequence[int],
+    *,
+    beside: Sequence[int] = (),
+    level: float,
+) -> tuple[Step, ...]:
+    """The terms looked at, in order: those taken, and the one at which it ended.
+
+    Args:
+        names: of the evidence's columns.
+        candidates: columns of the terms.
+        beside: columns of effects that are known to act.
+        level: of each step's test.
+    """
+    steps: list[Step] = []
+    chosen = list(beside)
+    while len(steps) < MOST:
+        pool = [column for column in candidates if column not in chosen]
+        if not pool:
+            break
+        step = _best(evidence, reference, names, pool, chosen, level=level, first=not steps)
+        steps.append(step)
+        if not step.taken:
+            break
+        chosen.append(step.column)
+    return tuple(steps)
+
+
+def _best(
+    evidence: Evidence,
+    reference: Reference,
+    names: tuple[str, ...],
+    pool: Sequence[int],
+    chosen: Sequence[int],
+    *,
+    level: float,
+    first: bool,
+) -> Step:
+    statistics = reference.statistics(evidence, names, chosen)
+    significant = [column for column in pool if reference.p_family(float(statistics[column])) <= level]
+    looked = significant or [max(pool, key=lambda column: float(statistics[column]))]
+    held_out = gains(evidence, [list(chosen), *([*chosen, column] for column in looked)])
+    increments = held_out[1:] - held_out[0]
+    leader = int(np.argmax(increments.sum(axis=1)))
+    tied = [
+        place
+        for place in range(len(looked))
+        if (increments[leader] - increments[place]).sum() <= _TIED * _error(increments[leader] - increments[place])
+    ]
+    place = max(tied, key=lambda p: float(statistics[looked[p]]))
+    gain, error = float(increments[place].sum()), _error(increments[place])
+    reason = ""
+    if not significant:
+        reason = "nulls show as much"
+    elif gain <= (0.0 if first else _FAR * error):
+        reason = "it does not predict what was left out better than the model before"
+    column = looked[place]
+    return Step(
+        name=names[column], column=column, statistic=float(statistics[column]),
+        p_family=reference.p_family(float(statistics[column])), gain=gain, gain_error=error, taken=not reason,
+        reason=reason,
+    )  # fmt: skip
+
+
+def _error(values: np.ndarray) -> float:
+    """Standard error of a sum over segments."""
+    return float(np.std(values, ddof=1) * math.sqrt(len(values))) if len(values) > 1 else math.inf

@@ -1,0 +1,65 @@
+"""What a proposal may see and what it is tested on: divided before anything is fitted."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from measure.loop.forecast import Segments
+
+_LEAST = 3
+"""Segments on each side: an interval of a mean wants three."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Split:
+    """Segments for choosing and fitting, and segments for the test.
+
+    Attributes:
+        seen: (segment,) whether a proposal is made from it; the others are for its test.
+        words: what the test is on.
+    """
+
+    seen: NDArray[np.bool_]
+    words: str
+
+
+def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
+    """The last third of every recording is for the test; of three or more, also the whole one of the middle wind.
+
+    Args:
+        speeds: (recording,) of the wind [m/s].
+
+    Raises:
+        InputError: too few segments.
+    """
+    recording = np.array([s.recording for s in segments.items])
+    seen = np.ones(len(recording), dtype=bool)
+    words = "the last third of each recording"
+    for index in np.unique(recording):
+        own = np.flatnonzero(recording == index)
+        seen[own[-max(1, len(own) // 3) :]] = False
+    if len(speeds) > 2:
+        middle = int(np.argsort(speeds, kind="stable")[len(speeds) // 2])
+        seen[recording == middle] = False
+        words = f"all of the recording at {speeds[middle]:.1f} m/s and the last third of the others"
+    if min(int(seen.sum()), int((~seen).sum())) < _LEAST:
+        raise InputError(
+            f"{int(seen.sum())} segments to propose from and {int((~seen).sum())} to test on", where="propose",
+            fix=f"record for longer, or more recordings: {_LEAST} of each are needed, of up to 2 s",
+        )  # fmt: skip
+    return Split(seen=seen, words=words)
+
+
+def data_hash(segments: Segments) -> str:
+    """SHA-256 of the markers, positions and wind of segments, hex."""
+    digest = hashlib.sha256(np.ascontiguousarray(segments.markers, dtype="<f8").tobytes())
+    for item in segments.items:
+        times = item.start + np.arange(len(item.positions)) * segments.period
+        for values in (item.positions, item.wind.at(times)):
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()

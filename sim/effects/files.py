@@ -1,0 +1,54 @@
+"""Effects from files: `FILE.py:Class`, asked for by name and loaded nowhere else."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import is_dataclass
+from pathlib import Path
+
+from flagdata.errors import NotFoundError, UsageError
+from flagdata.provenance import file_hash
+from sim.effects.effect import Effect
+
+
+def load(spec: str) -> type[Effect]:
+    """The effect class that `FILE.py:Class` names. The file is run as a module named after its content.
+
+    Raises:
+        UsageError: not of that form, a file that cannot be run, or a class that is no effect.
+        NotFoundError: no such file or class.
+    """
+    text, _, attribute = spec.rpartition(":")
+    if not text or not attribute.isidentifier():
+        raise UsageError(f"{spec!r} names no effect", where="effect file", fix="give FILE.py:Class")
+    path = Path(text)
+    if not path.is_file():
+        raise NotFoundError("no such file", where=text, fix="check the path")
+    module = _module(path)
+    effect = getattr(module, attribute, None)
+    if effect is None:
+        raise NotFoundError(f"no class {attribute!r}", where=text, fix="give the name of the effect's class")
+    if not (isinstance(effect, type) and issubclass(effect, Effect) and is_dataclass(effect) and effect.strengths()):
+        raise UsageError(
+            f"{attribute!r} is no effect with a strength", where=text,
+            fix="derive a frozen dataclass from a kind of sim.effects.effect, with an annotated strength",
+        )  # fmt: skip
+    return effect
+
+
+def _module(path: Path) -> object:
+    name = f"flagdata_effect_file_{file_hash(path)}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise UsageError("not a Python file", where=str(path), fix="give FILE.py:Class")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise UsageError(f"it cannot be run: {error}", where=str(path), fix="correct the file") from error
+    return module
