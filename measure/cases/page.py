@@ -41,10 +41,6 @@ def write_page(folder: Path, *, case: Case, seen: Observations, study: Study, ve
         "clips": [_clip_row(clip, case) for clip in seen.clips],
         "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None], "far": _far(case, seen),
         "declared": [_declared_row(cell) for cell in study.declared],
-        "controls": "; ".join(
-            f"{candidate.value} ({load}) moves the tip by {100 * tip:.1f} % of the length at most"
-            for candidate, (load, tip) in study.controls.items()
-        ),
         "fit_speeds": _listed(c.speed for c in case.of(Group.FIT)),
         "held_speeds": _listed(c.speed for c in case.of(Group.HELD_OUT)),
         "fit_lengths": _listed(1e3 * h for h in case.fit_lengths),
@@ -86,9 +82,6 @@ def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> d
              "tip_travel": {f"{speed:g}": _number(tip) for speed, tip in c.tips.items()}}
             for c in study.declared
         ],
-        "controls": {
-            k.value: {"load": str(load), "tip_travel": _number(tip)} for k, (load, tip) in study.controls.items()
-        },
         "linear": [_outcome(o) for o in study.linear],
         "crossed": [_outcome(o) for o in study.crossed],
         "in_time": [_outcome(o) for o in study.in_time],

@@ -27,8 +27,6 @@ from measure.cases.observe import Observations
 from measure.cases.recipe import Case, Group
 from measure.cases.simulated import Flutter, SimulatedTable, flutters
 
-CONTROLS = (Candidate.ADDED_MASS, Candidate.DAMPING, Candidate.FRICTION)
-"""Candidates that are also simulated, at their strongest, to see whether they flutter at large amplitude."""
 IN_TIME = (Candidate.REACTIVE, Candidate.LIFT, Candidate.REACTIVE_AND_LIFT)
 _FITTED = (Kind.FREQUENCY, Kind.STOP)
 _JUDGED = (Kind.WAVE, Kind.AMPLITUDE)
@@ -88,13 +86,11 @@ class Study:
     """Everything the report tells.
 
     Attributes:
-        controls: candidate → its strongest load, and the widest travel of its tip over the length.
         shapes: candidate → the motion of its model in time with a free factor, at the first whole clip held out.
-        floor: kind → largest |log| by which a finer mesh moves the best model in time.
+        floor: kind → largest |log| by which a coarser mesh moves the best model in time.
     """
 
     declared: tuple[Cell, ...]
-    controls: Mapping[Candidate, tuple[Load, float]]
     linear: tuple[Outcome, ...]
     crossed: tuple[Outcome, ...]
     in_time: tuple[Outcome, ...]
@@ -185,15 +181,14 @@ def study(
     ]
     best = min(in_time, key=lambda outcome: outcome.score)
     return Study(
-        declared=_declared(case, evidence, linear_table, simulated), controls=_controls(case, simulated),
-        linear=tuple(linear), crossed=tuple(crossed), in_time=tuple(in_time), linear_tables=linear_tables,
+        declared=_declared(case, evidence, linear_table, simulated), linear=tuple(linear), crossed=tuple(crossed), in_time=tuple(in_time), linear_tables=linear_tables,
         tables=tables, shapes=_shapes(case, in_time), floor=_floor(case, best, simulated),
     )  # fmt: skip
 
 
 def strips(case: Case) -> int:
     """How many strips a study simulates."""
-    candidates = len(case.shares) + len(case.lifts) + len(case.pair_shares) * len(case.pair_lifts) + len(CONTROLS)
+    candidates = len(case.shares) + len(case.lifts) + len(case.pair_shares) * len(case.pair_lifts)
     clips = len(case.of(Group.FIT)) + len(case.of(Group.HELD_OUT))
     return candidates * len(case.speeds) + 4 * clips + 2 * len(case.of(Group.HELD_OUT))
 
@@ -243,15 +238,6 @@ def _declared(
     )  # fmt: skip
 
 
-def _controls(case: Case, simulated: _Simulated) -> dict[Candidate, tuple[Load, float]]:
-    loads = {candidate: tried(candidate)[-1] for candidate in CONTROLS}
-    rows = _over(list(loads.values()), case.speeds, simulated)
-    return {
-        candidate: (load, max(one.tip for one in row))
-        for (candidate, load), row in zip(loads.items(), rows, strict=True)
-    }
-
-
 def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMotion]:
     """What the models in time with a free factor do at the speed of a whole clip that is held out."""
     models = [outcome for outcome in in_time if outcome.shear is Shear.FREE]
@@ -268,11 +254,14 @@ def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMoti
 
 
 def _floor(case: Case, best: Outcome, simulated: _Simulated) -> dict[Kind, float]:
-    """Largest |log| by which half the cells and twice the in-plane stiffness move the best model, by kind."""
+    """Largest |log| by which half as many cells and half the in-plane stiffness move the best model, by kind.
+
+    More than what still finer cells would: errors of a mesh shrink at least in proportion to its cells.
+    """
     speeds = [best.factor * clip.speed for clip in case.of(Group.HELD_OUT)]
-    finer = replace(case, run=replace(case.run, columns=2 * case.run.columns, stretching=2 * case.run.stretching))
+    coarse = replace(case, run=replace(case.run, columns=case.run.columns // 2, stretching=case.run.stretching / 2))
     loads = [best.load] * len(speeds)
-    pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, finer), strict=True))
+    pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, coarse), strict=True))
     names = {Kind.FREQUENCY: "frequency", Kind.WAVE: "wave", Kind.AMPLITUDE: "amplitude"}
     return {kind: max(_apart(getattr(a, name), getattr(b, name)) for a, b in pairs) for kind, name in names.items()}
 

@@ -79,9 +79,7 @@ def ledger(study: Study, verdict: Verdict) -> list[tuple[str, str, str]]:
             )
             rows.append((candidate.value, judged, f"in time, s = {model.factor:.2f}, {model.load}: {_kinds(model)}"))
         elif all((values == NEVER).all() for values in linear.held_out.values()):
-            tip = study.controls.get(candidate)
-            simulated = f"; simulated at {tip[0]}: the tip moves by {100 * tip[1]:.1f} % of the length" if tip else ""
-            rows.append((candidate.value, "rejected", f"no strength and no s make the sheet flutter{simulated}"))
+            rows.append((candidate.value, "rejected", "linear: no strength and no s make the sheet flutter"))
         else:
             rows.append((candidate.value, "rejected", f"linear: {_kinds(linear)}"))
     return rows

@@ -161,5 +161,5 @@ def test_the_verdict_and_its_page_tell_what_the_numbers_are(
 
 
 def test_strips_are_counted_before_they_are_simulated(case: Case) -> None:
-    # (2 + 1 + 1 + 3 controls) loads × 5 speeds; 4 cells × 4 clips; 2 meshes × 2 held-out clips.
-    assert studied.strips(case) == 7 * 5 + 16 + 4
+    # (2 + 1 + 1) loads × 5 speeds; 4 cells × 4 clips; 2 meshes × 2 held-out clips.
+    assert studied.strips(case) == 4 * 5 + 16 + 4
