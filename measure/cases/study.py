@@ -181,8 +181,9 @@ def study(
     ]
     best = min(in_time, key=lambda outcome: outcome.score)
     return Study(
-        declared=_declared(case, evidence, linear_table, simulated), linear=tuple(linear), crossed=tuple(crossed), in_time=tuple(in_time), linear_tables=linear_tables,
-        tables=tables, shapes=_shapes(case, in_time), floor=_floor(case, best, simulated),
+        declared=_declared(case, evidence, linear_table, simulated), linear=tuple(linear), crossed=tuple(crossed),
+        in_time=tuple(in_time), linear_tables=linear_tables, tables=tables, shapes=_shapes(case, in_time),
+        floor=_floor(case, best, simulated),
     )  # fmt: skip
 
 
