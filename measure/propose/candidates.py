@@ -1,0 +1,59 @@
+"""Effects from files as directions of the model: what is tested when a proposal meets new recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from flagdata.errors import UnknownNameError
+from measure.loop.columns import EffectColumn, library
+from sim.effects import Effect
+from sim.effects.files import load
+from sim.effects.parameter import Parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileColumn(EffectColumn):
+    """A strength of an effect of a file.
+
+    Attributes:
+        spec: `FILE.py:Class`.
+    """
+
+    spec: str
+
+    @cached_property
+    def described(self) -> Parameter:
+        return load(self.spec).parameters()[self.parameter]
+
+    def at(self, coefficient: float) -> Effect:
+        return load(self.spec)(**{self.parameter: self.described.null + coefficient})
+
+
+def from_file(spec: str) -> tuple[FileColumn, ...]:
+    """The strengths of the effect that `FILE.py:Class` names, with steps of half their expected range.
+
+    Raises:
+        FlagdataError: as `sim.effects.files.load`.
+    """
+    effect = load(spec)
+    described = effect.parameters()
+    return tuple(
+        FileColumn(
+            effect=effect.__name__, parameter=name, spec=spec,
+            step=max(described[name].prior, key=lambda end: abs(end - described[name].null)) / 2,
+        )
+        for name in effect.strengths()
+    )  # fmt: skip
+
+
+def weighed(name: str) -> EffectColumn:
+    """The column of a strength of the library, by "effect.parameter".
+
+    Raises:
+        UnknownNameError: none of that name is weighed.
+    """
+    known = {column.name: column for column in library()}
+    if name not in known:
+        raise UnknownNameError.of("weighed strength", name, known)
+    return known[name]

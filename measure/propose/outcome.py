@@ -1,0 +1,115 @@
+"""What became of a search for terms. Plain values only: it becomes JSON."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from measure.loop.verdict import Estimate
+from measure.propose.search import Step
+
+
+class Decision(StrEnum):
+    """About what was tried."""
+
+    KEPT = "kept"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """How the amplitude of a term behaves: fitted to each stretch of time, with the rest of the model as it is.
+
+    Attributes:
+        bin: duration of a stretch [s].
+        times: of the middles of the stretches, of each recording from its first frame [s].
+        amplitudes: of each recording, in the unit of the strength.
+        by_recording: mean amplitude of each, with its interval.
+        speeds: of the wind, of each recording [m/s].
+        fluctuation: standard deviation of the amplitudes about their recording's mean beyond what their errors explain.
+        frequency: at which the spectrum of the amplitude is largest [Hz].
+        peak_share: of the variance, at that frequency.
+        words: the same in words.
+    """
+
+    bin: float
+    times: list[list[float]]
+    amplitudes: list[list[float]]
+    by_recording: list[Estimate]
+    speeds: list[float]
+    fluctuation: float
+    frequency: float
+    peak_share: float
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strength:
+    """A strength of the proposal.
+
+    Attributes:
+        name: of the term, a Python name; or "Class.parameter" of an effect from a file.
+        words: what it is.
+        estimate: fitted to what was seen.
+        course: in time.
+    """
+
+    name: str
+    words: str
+    estimate: Estimate
+    course: Course
+
+
+@dataclass(frozen=True, kw_only=True)
+class Retest:
+    """Models before and after on segments that neither choice nor fit has seen: root mean square error [m].
+
+    Attributes:
+        what: which data.
+        segments: how many.
+        before, after: of each model.
+        reduction: paired, before − after.
+    """
+
+    what: str
+    segments: int
+    before: Estimate
+    after: Estimate
+    reduction: Estimate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """The whole of it.
+
+    Attributes:
+        decision: whether the proposal is kept.
+        reason: why.
+        steps: terms looked at, in order.
+        tried: how many terms were candidates.
+        strengths: of the proposal; empty where no term was taken.
+        retest: on untouched data; None where there was nothing to test.
+        level: of the search's tests.
+        nulls: how they were made.
+        proposed_from, tested_on: SHA-256 of the data.
+        known: effects that both models have.
+        seed: of the nulls.
+    """
+
+    decision: Decision
+    reason: str
+    steps: tuple[Step, ...]
+    tried: int
+    strengths: tuple[Strength, ...]
+    retest: Retest | None
+    level: float
+    nulls: str
+    proposed_from: str
+    tested_on: str
+    known: tuple[str, ...]
+    seed: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values: an entry of a ledger."""
+        return asdict(self)
