@@ -65,7 +65,7 @@ class Options:
     """
 
     seed: int = 0
-    level: float = 0.03
+    level: float = 0.05
     nulls: int = 192
     bank: Path | None = None
     workers: int = 1
