@@ -40,7 +40,8 @@ class Clip:
         tip: (5 %, 50 %, 95 %) of the last column seen.
         waves: in metres where the scale is known (whole sheets), in columns elsewhere.
         stretch: of whole sheets.
-        lines: (line, column) heights over one cycle, at the columns of `waves`: to be drawn; NaN where not seen.
+        lines: (line, column) heights over one cycle, at the columns of `waves`, above the clamp where it is in view:
+            to be drawn; NaN where not seen.
         still: scatter of the height beside the clamp, over time [px]: an upper bound of the error that neighbouring
             columns share; None where it is not in view.
     """
@@ -129,6 +130,8 @@ def measure_clip(track: EdgeTrack, spec: ClipSpec, case: Case) -> Clip:
     start = len(track.time) // 2
     one_cycle = start + np.arange(_DRAWN) / _DRAWN * track.rate / found.frequency.value
     drawn = heights[np.minimum(one_cycle.round().astype(int), len(heights) - 1)] * scale
+    if clamp is not None:
+        drawn = drawn + np.nanmedian(track.height[:, clamp]) * ratio * scale
     shown = np.isin((columns - (clamp or 0)) * scale, found.columns)
     return Clip(
         spec=spec, frames=len(track.time), shares={what: track.share(what) for what in Seen},

@@ -135,14 +135,13 @@ def _model_row(o: Outcome) -> dict[str, Any]:
     factor = "1" if o.shear is Shear.LOGGED else f"{o.factor:.2f} [{low:.2f}, {high:.2f}]"
     flutters = not all((values == NEVER).all() for values in o.fit.values())
     gains = {
-        kind.value: f"{kind.value} {_times(gain.mean)} [{_times(gain.low)}, {_times(gain.high)}]"
-        for kind, gain in o.gains.items()
+        kind.value: f"{_times(gain.mean)} [{_times(gain.low)}, {_times(gain.high)}]" for kind, gain in o.gains.items()
     }
     return {
         "name": model_name(o), "load": str(o.load) if flutters else "any", "factor": factor if flutters else "any",
         "mean": {kind.value: _mean(values) for kind, values in o.held_out.items()},
         "each": {kind.value: [_percent(float(v)) for v in values] for kind, values in o.held_out.items()},
-        "gain": gains if flutters else dict.fromkeys(gains, "–"), "others": _mean(o.others),
+        "gain": gains, "flutters": flutters, "others": _mean(o.others),
     }  # fmt: skip
 
 

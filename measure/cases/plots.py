@@ -167,14 +167,15 @@ def _published(axes: Axes, case: Case, curves: Mapping[str, Sequence[tuple[float
     for name, pairs in curves.items():
         if name == "experiments":
             continue
-        ratio, reduced = np.array(sorted(pairs)).T
-        length = ratio * sheet.mass / density
+        points = np.log(np.array(sorted(pairs)).T)
+        length = np.geomspace(0.055, 0.165, 60)
+        ratio = np.log(density * length / sheet.mass)
+        reduced = np.exp(np.interp(ratio, points[0], points[1], left=np.nan, right=np.nan))
         speed = reduced * np.sqrt(sheet.rigidity / (density * length**3))
-        shown = (length > 0.055) & (length < 0.165)
         first = name.endswith("00")
-        axes.plot(1e3 * length[shown], speed[shown], "-", color="#3b7d6b", lw=1,
+        axes.plot(1e3 * length, speed, "-", color="#3b7d6b", lw=1,
                   label="their curves, logged speed" if first else None)  # fmt: skip
-        axes.plot(1e3 * length[shown], speed[shown] / case.shear_factor, ":", color="#3b7d6b", lw=1.2,
+        axes.plot(1e3 * length, speed / case.shear_factor, ":", color="#3b7d6b", lw=1.2,
                   label=f"their curves, {case.shear_factor:g} of it at the sheet" if first else None)  # fmt: skip
 
 
