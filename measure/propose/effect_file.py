@@ -1,0 +1,85 @@
+"""A proposal as an effect: a module like those of the library, its contract tests, and what is needed to install it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from flagdata.errors import UsageError
+from measure.propose.outcome import Outcome, Strength
+from measure.propose.terms import FIELDS, SHAPES
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectFile:
+    """Where a proposal was written.
+
+    Attributes:
+        path: of the module.
+        class_name: of the effect.
+    """
+
+    path: Path
+    class_name: str
+
+    @property
+    def spec(self) -> str:
+        """As `sim.effects.files.load` takes it."""
+        return f"{self.path}:{self.class_name}"
+
+
+def write(outcome: Outcome, folder: Path) -> EffectFile:
+    """The effect file, its contract tests and its pyproject.toml, into a folder.
+
+    Raises:
+        UsageError: an outcome without terms of the dictionary.
+    """
+    parts = [_part(strength) for strength in outcome.strengths]
+    if not parts:
+        raise UsageError("no term was taken", where="proposal", fix="write only what was proposed")
+    short = outcome.proposed_from[:12]
+    class_name = "".join(word.capitalize() for part in parts for word in part["name"].split("_"))
+    module = f"proposed_{short}"
+    values: Mapping[str, Any] = {
+        "title": _sentence([s.words for s in outcome.strengths]), "data": outcome.proposed_from, "strengths": parts,
+        "class_name": class_name, "module": module, "name": f"proposed-{short}",
+        "formula": " + ".join(f"{p['name']} × {p['shape']} × {p['field']}" for p in parts),
+        "source": f"zero and the fit with twice its error; fitted to data {short}",
+    }  # fmt: skip
+    environment = Environment(
+        loader=PackageLoader("measure.propose", "templates"), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
+    )  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    for template, name in (
+        ("effect.py.j2", f"{module}.py"), ("test_effect.py.j2", f"test_{module}.py"),
+        ("pyproject.toml.j2", "pyproject.toml"),
+    ):  # fmt: skip
+        (folder / name).write_text(environment.get_template(template).render(**values), encoding="utf-8")
+    return EffectFile(path=folder / f"{module}.py", class_name=class_name)
+
+
+def _part(strength: Strength) -> dict[str, Any]:
+    """What the template needs of a strength whose name is `field_shape`."""
+    found = [(f, s) for f in FIELDS for s in SHAPES if f"{f}_{s}" == strength.name]
+    if not found:
+        raise UsageError(
+            f"{strength.name!r} is no term of the dictionary", where="proposal", fix="write proposals of terms only"
+        )
+    (field, shape), estimate = found[0], strength.estimate
+    reach = abs(estimate.high - estimate.low)
+    prior = (min(0.0, estimate.value - reach), max(0.0, estimate.value + reach))
+    return {
+        "name": strength.name, "field": field, "shape": shape, "unit": estimate.unit, "words": strength.words,
+        "value": f"{estimate.value:.6g}", "low": f"{estimate.low:.3g}", "high": f"{estimate.high:.3g}",
+        "level": f"{100 * estimate.level:.0f} %", "prior": tuple(f"{v:#.4g}" for v in prior),
+    }  # fmt: skip
+
+
+def _sentence(words: Sequence[str]) -> str:
+    text = "; ".join(words)
+    return f"{text[0].upper()}{text[1:]}."

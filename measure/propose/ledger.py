@@ -1,0 +1,46 @@
+"""The ledger of proposals: what was tried on which data, errors before and after, and whether it was kept."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import CorruptError
+from measure.propose.outcome import Outcome
+
+SCHEMA = "flagdata.ledger/1"
+
+
+def entries(path: Path) -> list[dict[str, Any]]:
+    """What a ledger holds; nothing where there is none.
+
+    Raises:
+        CorruptError: a file that is no ledger.
+    """
+    if not path.exists():
+        return []
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise CorruptError(f"not JSON: {error}", where=str(path), fix="move it away") from error
+    if not isinstance(content, dict) or content.get("schema") != SCHEMA or not isinstance(content.get("entries"), list):
+        raise CorruptError(f"not a ledger of schema {SCHEMA}", where=str(path), fix="move it away")
+    return content["entries"]
+
+
+def add(path: Path, outcome: Outcome, *, effect: str) -> None:
+    """One more entry, after those that are there. Entries are never changed.
+
+    Args:
+        effect: name of the effect's file and class; empty where no term was taken.
+
+    Raises:
+        CorruptError: a file that is no ledger.
+    """
+    made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)
+    partial = path.with_suffix(".partial")
+    partial.write_text(text + "\n", encoding="utf-8")
+    partial.replace(path)
