@@ -87,7 +87,7 @@ class Study:
 
     Attributes:
         shapes: candidate → the motion of its model in time with a free factor, at the first whole clip held out.
-        floor: kind → largest |log| by which a finer mesh moves the best model in time.
+        floor: kind → largest |log| by which a coarser mesh moves the best model in time.
     """
 
     declared: tuple[Cell, ...]
@@ -255,14 +255,14 @@ def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMoti
 
 
 def _floor(case: Case, best: Outcome, simulated: _Simulated) -> dict[Kind, float]:
-    """Largest |log| by which twice the cells and twice the in-plane stiffness move the best model, by kind.
+    """Largest |log| by which half as many cells and half the in-plane stiffness move the best model, by kind.
 
-    Over the held-out speeds at which both can be read off; a kind without any is left out.
+    More than what still finer cells would, since a mesh's errors shrink with its cells. Over the held-out speeds at which both can be read off; a kind without any is left out.
     """
     speeds = [best.factor * clip.speed for clip in case.of(Group.HELD_OUT)]
-    finer = replace(case, run=replace(case.run, columns=2 * case.run.columns, stretching=2 * case.run.stretching))
+    coarse = replace(case, run=replace(case.run, columns=case.run.columns // 2, stretching=case.run.stretching / 2))
     loads = [best.load] * len(speeds)
-    pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, finer), strict=True))
+    pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, coarse), strict=True))
     names = {Kind.FREQUENCY: "frequency", Kind.WAVE: "wave", Kind.AMPLITUDE: "amplitude"}
     moved = {kind: [getattr(a, name) / getattr(b, name) for a, b in pairs] for kind, name in names.items()}
     known = {kind: [abs(math.log(r)) for r in ratios if math.isfinite(r) and r > 0] for kind, ratios in moved.items()}
