@@ -257,7 +257,8 @@ def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMoti
 def _floor(case: Case, best: Outcome, simulated: _Simulated) -> dict[Kind, float]:
     """Largest |log| by which half as many cells and half the in-plane stiffness move the best model, by kind.
 
-    More than what still finer cells would, since a mesh's errors shrink with its cells. Over the held-out speeds at which both can be read off; a kind without any is left out.
+    More than what still finer cells would, since a mesh's errors shrink with its cells. Over the held-out speeds at
+    which both can be read off; a kind without any is left out.
     """
     speeds = [best.factor * clip.speed for clip in case.of(Group.HELD_OUT)]
     coarse = replace(case, run=replace(case.run, columns=case.run.columns // 2, stretching=case.run.stretching / 2))
