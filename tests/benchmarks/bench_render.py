@@ -28,7 +28,9 @@ from sim.render.raster import Raster
 from sim.scene import assemble, flag
 
 FRAME = 0.04  # s
-SETTLE, KEPT = 12, 12  # frames
+SETTLE, KEPT = 12, 12  # frames that are simulated
+PEER_FRAMES = 6
+CLIP = 60  # frames; those kept are played to and fro
 DRAWS = 6
 EXACT = 512  # samples of a pixel taken as the truth
 
@@ -67,8 +69,10 @@ def _flag() -> Meshes:
             state = Symplectic().advance(system, state, FRAME)
             if frame >= SETTLE:
                 kept.append(state.position[..., 0].numpy().copy())
+    kept += kept[-2:0:-1]
     sequence = MeshSequence(
-        time=np.arange(KEPT, dtype=np.int64) * round(FRAME * NANOSECONDS), positions=np.stack(kept),
+        time=np.arange(CLIP, dtype=np.int64) * round(FRAME * NANOSECONDS),
+        positions=np.stack([kept[frame % len(kept)] for frame in range(CLIP)]),
         faces=scene.mesh.faces.astype(np.int32), rest=scene.mesh.rest.astype(np.float32),
     )  # fmt: skip
     return Meshes.flag(sequence, heading=0.0)
@@ -102,7 +106,7 @@ def _exact(meshes: Meshes, zetas: list[RenderParameters]) -> list[torch.Tensor]:
 
 def _peer(name: str, meshes: Meshes, zeta: RenderParameters) -> dict[str, Any]:
     """A renderer of Blender, on all cores that there are, its start not counted."""
-    zeta = replace(zeta, exposure_time=0.0)
+    zeta, meshes = replace(zeta, exposure_time=0.0), meshes.part(0, PEER_FRAMES)
     try:
         with RENDERERS[name](Assets()) as renderer:
             renderer.render(meshes, replace(zeta, cycles_samples=1))
