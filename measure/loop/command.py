@@ -122,8 +122,8 @@ def close_loop(
             axis=_axis(context, axis, north), north=None if north is None else math.radians(north),
         )  # fmt: skip
         observed = observe(read(sources, winds, reading, lake), setup)
-    _refuse(observed.findings)
-    verdict = close(observed.experiment, options, stage=_stage())
+    refuse(observed.findings)
+    verdict = close(observed.experiment, options, stage=stage_bars())
     verdict = replace(verdict, findings=tuple((f.kind, f.what) for f in observed.findings))
     called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
     closed = Closed(
@@ -258,7 +258,7 @@ def _places(text: str) -> tuple[tuple[float, float], ...]:
     return tuple(places)
 
 
-def _refuse(findings: Iterable[Finding]) -> None:
+def refuse(findings: Iterable[Finding]) -> None:
     """Errors end it here: what is wrong with the data must not come out as an effect."""
     for finding in findings:
         if finding.severity is Severity.ERROR:
@@ -266,7 +266,7 @@ def _refuse(findings: Iterable[Finding]) -> None:
         say(f"{finding.severity.value}: {finding.what}")
 
 
-def _stage() -> Stage:
+def stage_bars() -> Stage:
     """A bar for each stage; the nulls take most of the time."""
     import sys
 

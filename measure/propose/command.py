@@ -1,0 +1,92 @@
+"""`flagdata propose`: recordings that the library does not explain in; an effect file, kept or rejected, out."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.console import document, json_option, say
+
+if TYPE_CHECKING:
+    from measure.propose.outcome import Outcome
+
+
+@click.command()
+@click.argument("recipe_path", metavar="RECIPE.toml", type=click.Path(path_type=Path))
+@click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings; seek no other.")
+@click.option("--known", multiple=True, metavar="EFFECT.STRENGTH", help="What the model has already; may be repeated.")
+@click.option("--nulls", type=click.IntRange(min=64), help="Null recordings; 192 by default.")
+@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
+              help="Of the test of every term; 0.03 by default.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
+@click.option("--workers", type=click.IntRange(min=1), help="Processes; by default one for each core.")
+@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+              help="Where artifacts are; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
+              help="Folder for proposal/: the effect file, its tests, ledger.json.")  # fmt: skip
+@json_option
+def propose(
+    recipe_path: Path,
+    effect: str | None,
+    known: tuple[str, ...],
+    nulls: int | None,
+    level: float | None,
+    seed: int,
+    workers: int | None,
+    lake_path: Path | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
+
+    RECIPE.toml is one of `flagdata close-loop --recipe` that names its recordings. Terms are sought in a part of them;
+    up to three become an effect, written as a module with its contract tests; the rest of the recordings decide. What
+    was tried goes into proposal/ledger.json. Run it where close-loop says "none of the library"; where it says "partly
+    explained", name what it found with --known. --effect tests such a file on other recordings.
+
+    \b
+      flagdata propose flag.toml
+      flagdata propose flag.toml --known lift.coefficient
+      flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
+    """
+    from flagdata.lake import Lake
+    from measure.loop.command import refuse, stage_bars
+    from measure.observe import recipe as recipes
+    from measure.propose import candidates, ledger
+    from measure.propose.effect_file import write
+    from measure.propose.propose import Options
+    from measure.propose.propose import propose as seek
+    from measure.propose.terms import dictionary
+    from measure.propose.words import words
+
+    recipe = recipes.load(recipe_path)
+    options = Options(seed=seed, workers=workers or len(os.sched_getaffinity(0)))
+    level, nulls = level or recipe.level, nulls or recipe.nulls
+    options = replace(options, level=level or options.level, nulls=nulls or options.nulls)
+    tried = dictionary() if effect is None else candidates.from_file(effect)
+    observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))
+    refuse(observed.findings)
+    outcome = seek(
+        observed.experiment, tried, known=[candidates.weighed(name) for name in known], options=options,
+        stage=stage_bars(),
+    )  # fmt: skip
+    folder = out / "proposal"
+    spec = effect or ""
+    if effect is None and outcome.strengths:
+        spec = write(outcome, folder).spec
+    ledger.add(folder / "ledger.json", outcome, effect=spec)
+    _tell(outcome, spec, folder, as_json=as_json, text=words(outcome))
+
+
+def _tell(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:
+    if as_json:
+        document("proposal", {"effect": spec, **outcome.as_dict()})
+    else:
+        click.echo(text)
+    if spec:
+        say(f"effect {spec}")
+    say(f"wrote {folder / 'ledger.json'}")

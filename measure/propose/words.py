@@ -1,0 +1,35 @@
+"""A proposal in sentences."""
+
+from __future__ import annotations
+
+from measure.loop.verdict import Estimate
+from measure.propose.outcome import Outcome
+
+
+def words(outcome: Outcome) -> str:
+    """What was tried, what was found, what became of it."""
+    lines = [f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms tried; nulls: {outcome.nulls})"]
+    for step in outcome.steps:
+        verb = "taken" if step.taken else f"not taken: {step.reason}"
+        lines.append(
+            f"  {step.name}: p = {step.p_family:.2g} of all terms, "
+            f"held-out gain {step.gain:.1f} ± {step.gain_error:.1f}, {verb}"
+        )
+    for strength in outcome.strengths:
+        lines.append(f"{strength.name} {interval(strength.estimate)}: {strength.words}")
+        lines.append(f"  {strength.course.words}")
+    if outcome.retest is not None:
+        tested = outcome.retest
+        lines.append(
+            f"on {tested.what}, unseen, n = {tested.segments} segments: error {interval(tested.before)} before, "
+            f"{interval(tested.after)} after, reduction {interval(tested.reduction)}"
+        )
+    return "\n".join(lines)
+
+
+def interval(estimate: Estimate) -> str:
+    """`value [low, high] unit level`; metres as millimetres."""
+    factor, unit = (1e3, "mm") if estimate.unit == "m" else (1.0, estimate.unit)
+    value, low, high = (factor * v for v in (estimate.value, estimate.low, estimate.high))
+    shown = "" if unit == "1" else f" {unit}"
+    return f"{value:.3g} [{low:.3g}, {high:.3g}]{shown} {100 * estimate.level:.0f} %"
