@@ -1,0 +1,179 @@
+"""A tracked flag as a user would bring it: a table of markers from two winds, and a recipe that says what is known.
+
+What acts on the cloth beside the base model is drawn here and written nowhere but into the returned `Tracks`, so that
+closing the loop can be held against it. Mesh, step and method are none of those that the fit uses.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from measure.observe.interpolation import onto
+from sim import handles
+from sim.effects import EFFECTS, apply
+from sim.handles import Handles
+from sim.integrate.symplectic import Symplectic
+from sim.material import named
+from sim.mesh import Diagonals, Mesh, grid
+from sim.scene import Scene, assemble
+
+MATERIAL = "camel-ponte-roma"
+RECIPE = """\
+title = "tracked"
+
+[cloth]
+width = {width}
+height = {height}
+vertices = {vertices}
+
+[material]
+name = "{material}"
+
+[pins]
+at = "hoist-corners"
+
+[test]
+nulls = {nulls}
+{recordings}"""
+_RECORDING = """
+[[recording]]
+source = "tracks.csv"
+take = "{name}"
+rate = {rate:g}
+noise = {noise:g}
+wind = {{ speed = {speed:g} }}
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackedRecipe:
+    """What to make.
+
+    Attributes:
+        seed: root of all random streams.
+        effect, parameter, strength: what acts and nobody declares.
+        speeds: of the wind, one a recording [m/s].
+        duration: of each recording [s], after `settle` [s] that are not kept.
+        rate: of the cameras [Hz].
+        noise: standard deviation of a marker's coordinate [m].
+        width, height: of the flag [m].
+        density, bending: of the cloth, as factors on the catalog's; nobody is told.
+        damping: of the cloth [s].
+        vertices: of the mesh that the fit is told to use.
+        nulls: recordings that the test is told to simulate.
+    """
+
+    seed: int
+    effect: str = "lift"
+    parameter: str = "coefficient"
+    strength: float = 2.0
+    speeds: tuple[float, ...] = (4.0, 7.0)
+    duration: float = 6.0
+    settle: float = 3.0
+    rate: float = 25.0
+    noise: float = 5e-4
+    width: float = 0.9
+    height: float = 0.6
+    density: float = 1.1
+    bending: float = 0.8
+    damping: float = 8e-4
+    vertices: int = 90
+    nulls: int = 96
+
+    def __post_init__(self) -> None:
+        if self.duration < 5 or not self.speeds or min(self.speeds) <= 0:
+            raise InputError(
+                f"recordings of {self.duration} s at {self.speeds} m/s", where="demonstration",
+                fix="make them at least 5 s long, in some wind",
+            )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tracks:
+    """Where the files are, and the truth about them.
+
+    Attributes:
+        table: of the markers.
+        recipe: of the experiment.
+        effect, parameter, strength: what acted.
+        unit: of the strength.
+    """
+
+    table: Path
+    recipe: Path
+    effect: str
+    parameter: str
+    strength: float
+    unit: str
+
+
+def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int], object]) -> Tracks:
+    """Write `tracks.csv` and `tracked.toml` into `folder`.
+
+    Args:
+        advance: called with the number of frames done.
+    """
+    flat = grid(width=recipe.width, height=recipe.height, columns=17, rows=11, diagonals=Diagonals.FORWARD)
+    markers = grid(width=recipe.width, height=recipe.height, columns=9, rows=6).rest
+    seen = np.einsum("mv,fvcb->bfmc", onto(flat.rest, markers), _flight(recipe, flat, advance))
+    seen = seen + recipe.noise * stream(recipe.seed, "tracked", "noise").standard_normal(seen.shape)
+    names = [f"{speed:g} m-s" for speed in recipe.speeds]
+    table, told = folder / "tracks.csv", folder / "tracked.toml"
+    with table.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["recording", "frame", "marker", "u", "v", "x", "y", "z"])
+        for name, positions in zip(names, seen, strict=True):
+            for frame, at in enumerate(positions):
+                for marker, ((u, v), (x, y, z)) in enumerate(zip(markers, at, strict=True)):
+                    writer.writerow(
+                        [name, frame, f"m{marker:02d}", f"{u:.4f}", f"{v:.4f}", f"{x:.5f}", f"{y:.5f}", f"{z:.5f}"]
+                    )
+    recordings = "".join(
+        _RECORDING.format(name=name, rate=recipe.rate, noise=recipe.noise, speed=speed)
+        for name, speed in zip(names, recipe.speeds, strict=True)
+    )
+    told.write_text(
+        RECIPE.format(
+            width=recipe.width, height=recipe.height, vertices=recipe.vertices, material=MATERIAL, nulls=recipe.nulls,
+            recordings=recordings,
+        ),
+        encoding="utf-8",
+    )  # fmt: skip
+    unit = EFFECTS[recipe.effect].parameters()[recipe.parameter].unit
+    return Tracks(
+        table=table, recipe=told, effect=recipe.effect, parameter=recipe.parameter, strength=recipe.strength, unit=unit
+    )
+
+
+def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> NDArray[np.float64]:
+    """(frame, vertex, 3, recording) [m]."""
+    nominal = named(MATERIAL)
+    material = replace(nominal.scaled(density=recipe.density, bending=recipe.bending), damping=recipe.damping)
+    held = Handles(vertices=handles.corners(flat.rest))
+    scenes = []
+    for index, speed in enumerate(recipe.speeds):
+        start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
+        rough = stream(recipe.seed, "tracked", "start", index).normal(0.0, 2e-3, start.shape)
+        rough[list(held.vertices)] = 0.0
+        scenes.append(Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0)))
+    effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
+    method = Symplectic()
+    settle, count = round(recipe.settle * recipe.rate), round(recipe.duration * recipe.rate)
+    frames: list[NDArray[np.float64]] = []
+    with torch.no_grad():
+        system, state = apply([effect], *assemble(scenes))
+        for frame in range(settle + count):
+            state = method.advance(system, state, 1 / recipe.rate)
+            advance(1)
+            if frame >= settle:
+                frames.append(state.position.double().numpy().copy())
+    return np.stack(frames)
