@@ -25,7 +25,7 @@ class Seen:
     """What the vertices see.
 
     Shapes are (vertex, 1, 1), without unit, of the place on the flat cloth alone; u grows from hoist to fly, v from
-    bottom to top. Fields are (vertex, 3, batch), or broadcast to it.
+    bottom to top. Fields are (vertex, 3, batch), or broadcast to it. Normals are the mean normals of `sim.inertia`.
 
     Attributes:
         cloth: constants.

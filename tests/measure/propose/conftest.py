@@ -1,0 +1,113 @@
+"""A small flag, its null recordings seen along a few terms, and recordings with a force the library does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from flagdata.rng import stream
+from measure.loop.bank import evaluate
+from measure.loop.columns import Calibration, EffectColumn
+from measure.loop.nulls import NullBatch
+from measure.loop.reference import NullBank
+from measure.observe.trajectory import Experiment, Specimen
+from measure.propose import nulls
+from measure.propose.propose import considered
+from measure.propose.terms import Term, TermColumn
+from sim import handles
+from sim.cloth import Cloth
+from sim.effects.effect import Effect, ForceEffect
+from sim.effects.parameter import Value, strength
+from sim.material import named
+from sim.mesh import grid
+
+RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)
+KINDS, RECORDINGS = 6, 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Updraft(ForceEffect):
+    """A steady push upward below the middle of the cloth, of another shape than any term has.
+
+    Attributes:
+        acceleration: well below the middle.
+    """
+
+    acceleration: Annotated[Value, strength(unit="m/s²", prior=(0.0, 2.0), source="made up for a test")] = 0.0
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        up = torch.zeros_like(position)
+        up[:, 2] = cloth.mass * rising(cloth.mesh.rest)[:, None] * self.acceleration
+        return up
+
+
+def rising(rest: np.ndarray) -> Tensor:
+    """(vertex,) share of the updraft."""
+    return torch.sigmoid(torch.as_tensor((0.25 - rest[:, 1]) / 0.06))
+
+
+@pytest.fixture(scope="session")
+def specimen() -> Specimen:
+    """0.75 m × 0.5 m of a knit on 9 × 7 vertices, held at the corners of its hoist."""
+    mesh = grid(width=0.75, height=0.5, columns=8, rows=6)
+    return Specimen(
+        mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
+        anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def columns() -> tuple[EffectColumn, ...]:
+    terms = (
+        ("upward", "everywhere"), ("upward", "lower"), ("downwind", "fly"), ("leftward", "everywhere"),
+        ("toward_pole", "lower_fly"), ("against_motion", "everywhere"),
+    )  # fmt: skip
+    return considered([TermColumn.of(Term(field=field, shape=shape)) for field, shape in terms], ())
+
+
+def simulated(
+    specimen: Specimen,
+    calibrations: Sequence[Calibration],
+    speeds: Sequence[float],
+    effects: tuple[Effect, ...],
+    seed: int,
+) -> NullBatch:
+    return NullBatch(
+        specimen=specimen, markers=specimen.mesh.rest, rate=RATE, duration=DURATION, noise=NOISE, seed=seed,
+        calibrations=tuple(calibrations), speeds=tuple(speeds), effects=effects,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def bank(specimen: Specimen, columns: tuple[EffectColumn, ...]) -> NullBank:
+    """48 recordings of six meshes and methods."""
+    parts = []
+    duration = 0.0
+    for seed in range(KINDS):
+        rng = stream(seed, "test", "nulls")
+        # Damping beyond 1 ms: the implicit method, which is the cheaper one here.
+        calibrations = [
+            Calibration(
+                density=float(rng.uniform(0.8, 1.25)), bending=float(rng.uniform(0.4, 2.5)),
+                damping=float(rng.uniform(1.1e-3, 4e-3)),
+            )
+            for _ in range(RECORDINGS)
+        ]  # fmt: skip
+        speeds = [float(u) for u in rng.uniform(3.2, 6.5, RECORDINGS)]
+        made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, columns)
+        parts.append(made)
+    return NullBank(nulls=nulls.joined(parts), columns=nulls.names(columns), duration=duration, words="of the tests")
+
+
+@pytest.fixture(scope="session")
+def rising_air(specimen: Specimen) -> Experiment:
+    """Four winds with an updraft of 1 m/s²."""
+    calibrations = (Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS)
+    batch = simulated(specimen, calibrations, SPEEDS, (Updraft(acceleration=1.0),), 91)
+    return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))

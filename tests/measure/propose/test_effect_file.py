@@ -1,0 +1,118 @@
+"""A proposal's file is an effect like those of the library: it is loaded, and holds to the whole contract."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from flagdata.errors import NotFoundError, UsageError
+from measure.loop.verdict import Estimate
+from measure.propose.candidates import from_file
+from measure.propose.effect_file import write
+from measure.propose.outcome import Course, Decision, Outcome, Strength
+from measure.propose.terms import Term, TermEffect
+from sim.effects import apply
+from sim.effects.files import load
+from sim.material import named
+from sim.scene import assemble, flag
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def proposal(**fitted: tuple[float, str]) -> Outcome:
+    course = Course(
+        bin=0.2, times=[], amplitudes=[], by_recording=[], speeds=[], fluctuation=0.0, frequency=1.0, peak_share=0.0,
+        words="",
+    )  # fmt: skip
+    strengths = tuple(
+        Strength(
+            name=name, words="a push", course=course,
+            estimate=Estimate(value=value, low=value - 0.1, high=value + 0.1, unit=unit),
+        )
+        for name, (value, unit) in fitted.items()
+    )  # fmt: skip
+    return Outcome(
+        decision=Decision.KEPT, reason="", steps=(), tried=6, strengths=strengths, retest=None, level=0.03, nulls="",
+        proposed_from="ab12" * 16, tested_on="cd34" * 16, known=(), seed=0,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def two() -> Outcome:
+    return proposal(upward_lower=(0.8, "m/s²"), toward_pole_lower_fly=(-1.5, "1/s²"))
+
+
+def test_the_file_is_the_sum_of_its_terms(two: Outcome, tmp_path: Path) -> None:
+    made = load(write(two, tmp_path).spec)
+    assert made.strengths() == ("upward_lower", "toward_pole_lower_fly")
+    assert made.parameters()["toward_pole_lower_fly"].unit == "1/s²"
+    batch = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    terms = [
+        TermEffect(term=Term(shape="lower", field="upward"), coefficient=0.8),
+        TermEffect(term=Term(shape="lower_fly", field="toward_pole"), coefficient=-1.5),
+    ]
+
+    def force(system, state) -> np.ndarray:
+        wind = system.wind.velocity(0.0)
+        args = (system.cloth, 0.0, state.position, state.velocity, wind)
+        return sum(effect.force(*args) for effect in system.effects).numpy()
+
+    one = force(*apply([made(upward_lower=0.8, toward_pole_lower_fly=-1.5)], *batch))
+    np.testing.assert_allclose(one, force(*apply(terms, *batch)), rtol=1e-12, atol=1e-15)
+
+
+def test_its_strengths_can_be_tested_on_other_recordings(two: Outcome, tmp_path: Path) -> None:
+    columns = from_file(write(two, tmp_path).spec)
+    assert [column.parameter for column in columns] == ["upward_lower", "toward_pole_lower_fly"]
+    # Half of the end of the prior farther from zero: the fit with the width of its interval.
+    assert [column.step for column in columns] == pytest.approx([0.5, -0.85])
+    assert columns[0].at(0.3).upward_lower == 0.3  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_its_own_contract_tests_and_the_librarys_pass(two: Outcome, tmp_path: Path) -> None:
+    """As if it were installed: an entry point makes it one of the library's effects."""
+    made = write(two, tmp_path)
+    info = tmp_path / "proposed-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: proposed\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[flagdata.effects]\nproposed-ab = {made.path.stem}:{made.class_name}\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]), "OMP_NUM_THREADS": "1"}
+    files = [made.path.with_name(f"test_{made.path.name}"), ROOT / "tests/contract/test_effects.py"]
+    options = ["-q", "-p", "no:cacheprovider", "-k", f"proposed-ab or test_{made.path.stem}"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *options, *map(str, files)],
+        cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
+    passed = int(done.stdout.rsplit(" passed", 1)[0].split()[-1])
+    # Seven of the file's own (a gradient for each strength), and one for each law of the library's contract.
+    assert passed >= 7 + 14
+
+
+@pytest.mark.parametrize(
+    ("content", "named_class", "error"),
+    [("X = 1", "X", UsageError), ("X = 1", "Y", NotFoundError), ("raise ValueError('no')", "X", UsageError)],
+)
+def test_what_is_no_effect_is_refused(content: str, named_class: str, error: type[Exception], tmp_path: Path) -> None:
+    path = tmp_path / "file.py"
+    path.write_text(content)
+    with pytest.raises(error):
+        load(f"{path}:{named_class}")
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match="no such file"):
+        load(f"{tmp_path / 'none.py'}:X")
+    with pytest.raises(UsageError, match=r"FILE\.py:Class"):
+        load("file.py")
+
+
+def test_an_outcome_without_terms_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no term"):
+        write(proposal(), tmp_path)

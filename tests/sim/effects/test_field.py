@@ -1,0 +1,111 @@
+"""The pieces of force fields: at the corners of a flag, and in winds where they can be worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from sim.effects.field import Seen
+from sim.material import named
+from sim.scene import assemble, flag
+
+SHAPES = ("everywhere", "fly", "upper", "lower", "upper_fly", "lower_fly")
+FIELDS = (
+    "downwind", "leftward", "upward", "downwind_squared", "leftward_squared", "upward_squared", "toward_pole",
+    "toward_height", "against_motion", "against_normal_motion", "across", "across_squared", "along", "along_squared",
+)  # fmt: skip
+
+
+def seen(
+    *,
+    wind: tuple[float, float, float],
+    velocity: tuple[float, float, float] = (0, 0, 0),
+    turn: float = 0.0,
+    bulge: float = 0.1,
+) -> Seen:
+    """A flag near the plane of x and z, turned about z with its wind and its velocity."""
+    system, _ = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    rest = torch.tensor(system.cloth.mesh.rest)
+    c, s = np.cos(turn), np.sin(turn)
+    about = torch.tensor([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    x = torch.stack([rest[:, 0], bulge * torch.sin(5 * rest[:, 0]), rest[:, 1]], 1) @ about.T
+    moving = (torch.tensor(velocity, dtype=torch.float64) * torch.cos(3 * rest[:, :1])) @ about.T
+    air = about @ torch.tensor(wind, dtype=torch.float64)
+    return Seen(
+        cloth=system.cloth, position=x[..., None], offset=x[..., None] - torch.tensor([0.0, 0.0, 0.5])[:, None],
+        velocity=moving[..., None], wind=air[:, None],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "corners"),
+    [
+        ("everywhere", (1, 1, 1, 1)), ("fly", (0, 1, 0, 1)), ("upper", (0, 0, 1, 1)), ("lower", (1, 1, 0, 0)),
+        ("upper_fly", (0, 0, 0, 1)), ("lower_fly", (0, 1, 0, 0)),
+    ],
+)  # fmt: skip
+def test_shapes_are_0_or_1_at_the_corners(name: str, corners: tuple[int, ...]) -> None:
+    own = seen(wind=(4, 0, 0))
+    rest = own.cloth.mesh.rest
+    places = [(0.0, 0.0), (rest[:, 0].max(), 0.0), (0.0, rest[:, 1].max()), tuple(rest.max(axis=0))]
+    values = getattr(own, name)[:, 0, 0].numpy()
+    for place, expected in zip(places, corners, strict=True):
+        vertex = int(np.argmin(np.linalg.norm(rest - place, axis=1)))
+        assert values[vertex] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("downwind", (0.6, 0.8, 0)), ("leftward", (-0.8, 0.6, 0)), ("upward", (0, 0, 1)),
+        ("downwind_squared", (15, 20, 0)), ("leftward_squared", (-20, 15, 0)), ("upward_squared", (0, 0, 25)),
+    ],
+)  # fmt: skip
+def test_pushes_follow_the_horizontal_wind(name: str, expected: tuple[float, ...]) -> None:
+    """A wind of (3, 4, 1) m/s: 5 m/s horizontally."""
+    np.testing.assert_allclose(getattr(seen(wind=(3, 4, 1)), name)[0, :, 0].numpy(), expected, atol=1e-12)
+
+
+def test_springs_pull_to_the_axis_and_to_the_height_of_the_attachments() -> None:
+    own = seen(wind=(4, 0, 0))
+    total = own.toward_pole + own.toward_height
+    torch.testing.assert_close(total, -own.offset)
+    assert not own.toward_pole[:, 2].any()
+    assert not own.toward_height[:, :2].any()
+
+
+def test_across_and_along_a_flat_flag_are_the_wind_across_and_along_its_plane() -> None:
+    """In the plane of x and z, in a relative wind of (3, 2, 4) m/s."""
+    own = seen(wind=(3, 2, 4), bulge=0.0)
+    for name, expected in {
+        "across": (0, 2, 0), "across_squared": (0, 4, 0), "along": (3, 0, 4), "along_squared": (15, 0, 20),
+    }.items():  # fmt: skip
+        values = getattr(own, name)[:, :, 0].numpy()
+        np.testing.assert_allclose(values, np.tile(expected, (len(values), 1)), atol=1e-12)
+
+
+def test_resistances_oppose_the_motion_and_its_part_along_the_normal() -> None:
+    own = seen(wind=(4, 0, 0), velocity=(1, -2, 3), bulge=0.0)
+    torch.testing.assert_close(own.against_motion, -own.velocity)
+    torch.testing.assert_close(own.against_normal_motion[:, 1], -own.velocity[:, 1])
+    assert not own.against_normal_motion[:, [0, 2]].any()
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_turning_flag_and_wind_turns_the_field(name: str) -> None:
+    angle = 0.7
+    c, s = np.cos(angle), np.sin(angle)
+    about = torch.tensor([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+    def of(turn: float) -> Tensor:
+        own = seen(wind=(4, 1, 0.5), velocity=(0.5, 1, -2), turn=turn)
+        return getattr(own, name).expand(len(own.position), 3, 1)
+
+    torch.testing.assert_close(of(angle), torch.einsum("ij,vjb->vib", about, of(0.0)), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_fields_are_finite_in_still_air(name: str) -> None:
+    assert torch.isfinite(getattr(seen(wind=(0, 0, 0)), name)).all()
