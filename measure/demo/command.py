@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,16 @@ from flagdata.console import progress, say
 from flagdata.errors import ConflictError, FlagdataError
 
 _MARK = ".flagdata-demo"
+
+
+class Part(StrEnum):
+    """What is shown."""
+
+    ALL = "all"
+    FIELD = "field"
+    """A camera and an anemometer, put on one clock."""
+    LOOP = "loop"
+    """A tracked flag, and what the model of it lacks."""
 
 
 @dataclass(kw_only=True)
@@ -68,33 +79,35 @@ class Transcript:
 @click.option(
     "--minutes", type=click.FloatRange(2, 120), default=10.0, show_default=True, help="Length of the video it makes."
 )
-def demo(out: Path, seed: int, minutes: float) -> None:
-    """Make a small field recording and take it through everything, to a page that opens in a browser."""
+@click.option("--part", type=click.Choice(list(Part)), default=Part.ALL, show_default=True, help="What to show.")
+def demo(out: Path, seed: int, minutes: float, part: str) -> None:
+    """Make a small field recording and a tracked flag, and take them through everything, to pages to open."""
+    _fresh(out)
+    shell = Transcript(folder=out)
+    shell.show("init", "lake")
+    pages: list[Path] = []
+    if part != Part.LOOP:
+        pages.append(_field(shell, seed, minutes))
+    if part != Part.FIELD:
+        pages.append(_loop(shell, seed))
+    say("\nOpen " + " and ".join(str(page) for page in pages))
+
+
+def _field(shell: Transcript, seed: int, minutes: float) -> Path:
+    """From a video and a log to pairs; the page."""
     from measure.demo.field import FieldRecipe, make_field
     from measure.demo.page import write_page
 
-    began = time.monotonic()
-    _fresh(out)
+    began, out = time.monotonic(), shell.folder
     recipe = FieldRecipe(seed=seed, duration=minutes * 60)
     say(f"A flag is filmed for {minutes:g} minutes; an anemometer runs beside it on a clock of its own.")
     with progress(round(recipe.duration * recipe.frame_rate), label="filming", unit="frame") as advance:
         made = make_field(recipe, out, advance=advance)
-
-    shell = Transcript(folder=out)
-    shell.show("init", "lake")
     shell.show("ingest", "flag.mp4", "--crop", "auto", "--session", "demo", "--lake", "lake")
     shell.show(
-        "ingest",
-        "anemometer.csv",
-        "--sensor",
-        "cup-logger.toml",
-        "--zone",
-        "+02:00",
-        "--session",
-        "demo",
-        "--lake",
-        "lake",
-    )
+        "ingest", "anemometer.csv", "--sensor", "cup-logger.toml", "--zone", "+02:00", "--session", "demo",
+        "--lake", "lake",
+    )  # fmt: skip
     artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
     shell.show(
         "align", artifacts["camera"][:10], artifacts["wind"][:10], "--by", "estimate", "--plot", "alignment.png",
@@ -105,9 +118,25 @@ def demo(out: Path, seed: int, minutes: float) -> None:
     shell.show("query", "--where", "kind = 'clip' and wind between 4 and 6", "--limit", "5", "--at", "demo",
                "--lake", "lake")  # fmt: skip
     shell.show("verify", "--lake", "lake")
+    return write_page(out, made=made, at="demo", transcript=shell.entries, seconds=time.monotonic() - began)
 
-    page = write_page(out, made=made, at="demo", transcript=shell.entries, seconds=time.monotonic() - began)
-    say(f"\nOpen {page}")
+
+def _loop(shell: Transcript, seed: int) -> Path:
+    """From tracked markers to what the model of the cloth lacks; the report before and after."""
+    from measure.demo.tracked import TrackedRecipe, make_tracks
+
+    recipe = TrackedRecipe(seed=seed)
+    winds = " and ".join(f"{speed:g}" for speed in recipe.speeds)
+    say(f"\nMarkers of a flag are tracked in winds of {winds} m/s; something acts on it that no file declares.")
+    frames = round((recipe.settle + recipe.duration) * recipe.rate)
+    with progress(frames, label="tracking", unit="frame") as advance:
+        made = make_tracks(recipe, shell.folder, advance=advance)
+    shell.show("close-loop", "--recipe", made.recipe.name, "--lake", "lake", "--out", "loop")
+    models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
+    shell.show("simulate", models[-1], "--lake", "lake")
+    unit = "" if made.unit == "1" else f" {made.unit}"
+    say(f"\nWhat acted was {made.effect}, {made.parameter} {made.strength:g}{unit}.")
+    return shell.folder / "loop" / "report.html"
 
 
 def _fresh(folder: Path) -> None:

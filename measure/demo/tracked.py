@@ -27,6 +27,7 @@ from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
 
 MATERIAL = "camel-ponte-roma"
+_OUTER = 2e-3  # s; of the force beside the base model
 RECIPE = """\
 title = "tracked"
 
@@ -166,7 +167,7 @@ def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object])
         rough[list(held.vertices)] = 0.0
         scenes.append(Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0)))
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
-    method = Symplectic()
+    method = Symplectic(outer=_OUTER)
     settle, count = round(recipe.settle * recipe.rate), round(recipe.duration * recipe.rate)
     frames: list[NDArray[np.float64]] = []
     with torch.no_grad():
