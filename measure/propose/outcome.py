@@ -27,7 +27,7 @@ class Course:
         amplitudes: of each recording, in the unit of the strength.
         by_recording: mean amplitude of each, with its interval.
         speeds: of the wind, of each recording [m/s].
-        fluctuation: standard deviation of the amplitudes about their recording's mean beyond what their errors explain.
+        fluctuation: standard deviation of the amplitudes about their recording's mean, their errors included.
         frequency: at which the spectrum of the amplitude is largest [Hz].
         peak_share: of the variance, at that frequency.
         words: the same in words.

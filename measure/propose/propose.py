@@ -117,7 +117,17 @@ def weigh(
     options: Options,
     stage: Stage,
 ) -> Outcome:
-    """The outcome for recordings, given nulls along the same columns (see `considered`)."""
+    """The outcome for recordings, given nulls along the same columns (see `considered`).
+
+    Raises:
+        InputError: nulls of other columns or of segments of another length; too few segments.
+    """
+    if bank.columns != nulls.names(columns) or abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
+        raise InputError(
+            f"nulls along {len(bank.columns)} columns by {bank.duration:.2g} s, "
+            f"data along {len(columns) + len(THETA)} by {setting.segments.duration:.2g} s",
+            where="null bank", fix="simulate nulls for these columns and recordings",
+        )  # fmt: skip
     names = nulls.names(columns)
     beside = [names.index(column.name) for column in known]
     fixed = {GUSTS, *(column.name for column in known)}

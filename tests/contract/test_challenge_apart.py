@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FITTING = ("sim", "models", "measure/loop", "measure/observe", "measure/report", "measure/cases")
+FITTING = ("sim", "models", "measure/loop", "measure/observe", "measure/propose", "measure/report", "measure/cases")
 MODULES = sorted(path for part in FITTING for path in (ROOT / part).rglob("*.py"))
 
 
