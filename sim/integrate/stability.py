@@ -34,11 +34,23 @@ _LIMITS: WeakKeyDictionary[System, float] = WeakKeyDictionary()
 def stiffest(system: System) -> Tensor:
     """An upper estimate of the largest eigenvalue ω² of M⁻¹K: (batch,) [1/s²].
 
-    Taken at the rest shape stretched by 15 %, with the largest entries of every table, handle springs and contact
-    included.
+    Taken at the rest shape stretched by 15 %, with the largest entries of every table and handle springs; and, where
+    there is contact, at the rest shape with the repulsion on top, if that is more: layers that lie on one another are
+    not what is stretched most.
     """
+    value = _stiffest_stretched(system, _STRETCH)
+    if system.contact is None:
+        return value
+    # The repulsion's stiffness k a v/h at a violation of half the thickness, on a vertex of mass ρ a. Layers at rest on
+    # one another stay further apart; the step's safety covers the rest.
+    repulsion = system.contact.stiffness / 2 * torch.tensor([1 / m.density for m in system.cloth.materials]).to(value)
+    return torch.maximum(value, _stiffest_stretched(system, 1.0) + repulsion)
+
+
+def _stiffest_stretched(system: System, stretch: float) -> Tensor:
+    """The largest eigenvalue at the rest shape stretched by a factor, without contact: (batch,) [1/s²]."""
     cloth = system.cloth
-    flat = torch.as_tensor(cloth.mesh.rest * _STRETCH, dtype=cloth.dtype, device=cloth.device)
+    flat = torch.as_tensor(cloth.mesh.rest * stretch, dtype=cloth.dtype, device=cloth.device)
     position = torch.nn.functional.pad(flat, (0, 1)).unsqueeze(-1).repeat(1, 1, cloth.batch)
     at = membrane.Linearised.at(cloth, position)
     largest = cloth.samples.reshape(len(cloth.samples), -1, 4).amax(1)[cloth.table_of]
@@ -73,12 +85,7 @@ def stiffest(system: System) -> Tensor:
         field = field / (field**2).sum((0, 1)).sqrt()
         field = apply(field)
         value = (field**2).sum((0, 1)).sqrt()
-    value = value * _DEFICIT
-    if system.contact is not None:
-        # The repulsion's stiffness k a v/h at a violation of half the thickness, on a vertex of mass ρ a. Layers at
-        # rest on one another stay further apart; the step's safety covers the rest.
-        value = value + system.contact.stiffness / 2 * torch.tensor([1 / m.density for m in cloth.materials]).to(value)
-    return value
+    return value * _DEFICIT
 
 
 def stable_step(system: System) -> float:

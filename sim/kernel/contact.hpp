@@ -31,8 +31,7 @@ struct Settings {
   const T* centre;            // (faces, 2) at rest
   const T* apart;             // (faces) squared rest distance from the centre beyond which a vertex is another layer's
   const int32_t* group;       // (groups, width) vertices that are close at rest; -1 where there is none
-  const T* group_rest;        // (2, groups, width) their rest positions; NaN where there is none
-  const T* group_box;         // (4, groups up to a multiple of width) of these: least and greatest u, then v; NaN beyond
+  const T* group_rest;        // (groups, 2, width) their rest positions; NaN where there is none
   const int32_t* block;       // (blocks, width) faces that are close at rest; -1 where there is none
   double thickness, stiffness, friction;  // thickness 0: no contact
 };
@@ -94,14 +93,14 @@ class Search {
   std::vector<Pair> far_, near_;
   std::vector<Point<T>> built_;      // positions when the far list was made
   std::vector<T> allowed_, moved_;   // far allowances, and what is used up of them
-  std::vector<T> x_, y_, z_, a_;     // positions and allowances in the order of the groups
+  std::vector<T> peak_;              // greatest speeds, fading
+  std::vector<T> points_;            // (groups, 4, W) positions and allowances in the order of the groups
   std::vector<T> boxes_;             // (6, groups up to a multiple of W) least and greatest x, y, z, with allowances
-  std::vector<T> close_;             // (10, ...) of the groups near a block: their boxes in space and at rest
-  std::vector<int32_t> closest_;     // which groups these are
 
-  // Steps that the lists are meant to serve, and the fewest that are worth a near list; the share of the lane's mean
-  // speed in a vertex's own; the least allowance for a step [thicknesses].
-  static constexpr double kFarSteps = 28, kNearSteps = 8, kFewest = 3, kShare = 0.5, kLeast = 0.002;
+  // Steps that the lists are meant to serve, and the fewest that are worth a near list; what is left of a vertex's peak
+  // speed at the next near list; the share of the lane's mean speed in a vertex's own; the least allowance for a step
+  // [thicknesses].
+  static constexpr double kFarSteps = 20, kNearSteps = 7, kFewest = 3, kFading = 0.95, kShare = 0.5, kLeast = 0.002;
 
  public:
   const std::vector<Pair>& near() const { return near_; }
@@ -111,13 +110,16 @@ class Search {
     near_.clear();
     const size_t n = size_t(s.vertices);
     T mean = 0;
+    peak_.resize(n);
+    // Vertices in a fold swing to and fro: one that is slow now is soon as fast again as it was.
     for (size_t i = 0; i < n; ++i) {
-      near_allowed[i] = std::sqrt(dot(v[i], v[i]));
-      mean += near_allowed[i];
+      const T speed = std::sqrt(dot(v[i], v[i]));
+      peak_[i] = speed > T(kFading) * peak_[i] ? speed : T(kFading) * peak_[i];
+      mean += peak_[i];
     }
     const T h = T(s.thickness), lane = T(kShare) * mean / T(n), least = T(kLeast) * h;
     // What a vertex goes in a step, at least.
-    for (size_t i = 0; i < n; ++i) near_allowed[i] = step * (near_allowed[i] + lane) + least;
+    for (size_t i = 0; i < n; ++i) near_allowed[i] = step * (peak_[i] + lane) + least;
     moved_.resize(n);
     bool holds = built_.size() == n;
     if (holds)
@@ -205,20 +207,18 @@ class Search {
       if (!(std::abs(x[i].x) < T(1e4) && std::abs(x[i].y) < T(1e4) && std::abs(x[i].z) < T(1e4))) return;  // diverged
     const int64_t padded = (s.groups + W - 1) / W * W;
     constexpr T inf = std::numeric_limits<T>::infinity(), nan = std::numeric_limits<T>::quiet_NaN();
-    for (auto* values : {&x_, &y_, &z_, &a_}) values->resize(s.groups * W);
+    points_.resize(4 * s.groups * W);
     boxes_.assign(6 * padded, inf);  // beyond the last: farther than anything
     for (int64_t g = 0; g < s.groups; ++g) {
       T low[3] = {inf, inf, inf}, high[3] = {-inf, -inf, -inf}, most = 0;
-      for (int64_t i = g * W; i < (g + 1) * W; ++i) {
-        const int32_t v = s.group[i];
-        if (v < 0) {
-          x_[i] = y_[i] = z_[i] = nan, a_[i] = 0;
-          continue;
-        }
-        x_[i] = x[v].x, y_[i] = x[v].y, z_[i] = x[v].z, a_[i] = allowed_[v];
-        low[0] = std::min(low[0], x_[i]), low[1] = std::min(low[1], y_[i]), low[2] = std::min(low[2], z_[i]);
-        high[0] = std::max(high[0], x_[i]), high[1] = std::max(high[1], y_[i]), high[2] = std::max(high[2], z_[i]);
-        most = std::max(most, a_[i]);
+      T* points = points_.data() + 4 * g * W;
+      for (int64_t i = 0; i < W; ++i) {
+        const int32_t j = s.group[g * W + i];
+        const T values[4] = {j < 0 ? nan : x[j].x, j < 0 ? nan : x[j].y, j < 0 ? nan : x[j].z, j < 0 ? 0 : allowed_[j]};
+        for (int k = 0; k < 4; ++k) points[k * W + i] = values[k];
+        if (j < 0) continue;
+        for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], values[k]), high[k] = std::max(high[k], values[k]);
+        most = std::max(most, values[3]);
       }
       for (int k = 0; k < 3; ++k) {
         boxes_[2 * k * padded + g] = low[k] - most;
@@ -228,74 +228,57 @@ class Search {
     for (int64_t b = 0; b < s.blocks; ++b) look(s, x, s.block + b * W, padded);
   }
 
-  // Adds the pairs of a block of faces.
+  // Adds the pairs of a block of faces: every group near the block against one face after the other.
   void look(const Settings<T>& s, const Point<T>* x, const int32_t* faces, int64_t padded) {
     constexpr T inf = std::numeric_limits<T>::infinity();
-    const T h = T(s.thickness);
-    Point<T> low = {inf, inf, inf}, high = {-inf, -inf, -inf};
-    T most = 0;
-    for (int k = 0; k < W && faces[k] >= 0; ++k)
-      for (int c = 0; c < 3; ++c) {
-        const int32_t i = s.face[3 * faces[k] + c];
-        low = {std::min(low.x, x[i].x), std::min(low.y, x[i].y), std::min(low.z, x[i].z)};
-        high = {std::max(high.x, x[i].x), std::max(high.y, x[i].y), std::max(high.z, x[i].z)};
-        most = std::max(most, allowed_[i]);
+    Point<T> low = {inf, inf, inf}, high = {-inf, -inf, -inf}, middle[W];
+    T radius[W], reach[W], u[W], v[W], apart[W], most = 0;
+    Sight sight[W];
+    int count = 0;
+    for (; count < W && faces[count] >= 0; ++count) {
+      const int32_t *corner = s.face + 3 * int64_t(faces[count]), f = faces[count];
+      const Point<T> a = x[corner[0]], b = x[corner[1]], c = x[corner[2]], m = (T(1) / 3) * (a + b + c);
+      for (const Point<T>& p : {a, b, c}) {
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
       }
-    const T reach = T(1.001) * (h + most);
-    low = low - Point<T>{reach, reach, reach}, high = high + Point<T>{reach, reach, reach};
-    closest_.clear();
-    for (int64_t g = 0; g < padded; g += W) {
-      const T* box = boxes_.data() + g;
-      uint32_t hit = bits((load(box) <= high.x) & (load(box + padded) >= low.x) & (load(box + 2 * padded) <= high.y) &
-                          (load(box + 3 * padded) >= low.y) & (load(box + 4 * padded) <= high.z) &
-                          (load(box + 5 * padded) >= low.z));
-      for (; hit; hit &= hit - 1) closest_.push_back(int32_t(g + __builtin_ctz(hit)));
+      middle[count] = m;
+      radius[count] = std::max({dot(a - m, a - m), dot(b - m, b - m), dot(c - m, c - m)});
+      reach[count] = T(1.001) * (T(s.thickness) + std::max({allowed_[corner[0]], allowed_[corner[1]], allowed_[corner[2]]}));
+      u[count] = s.centre[2 * f], v[count] = s.centre[2 * f + 1], apart[count] = s.apart[f];
+      most = std::max(most, reach[count]);
     }
-    const int64_t count = int64_t(closest_.size()), room = (count + W - 1) / W * W;
-    close_.assign(10 * room, std::numeric_limits<T>::quiet_NaN());
-    for (int64_t k = 0; k < count; ++k) {
-      for (int side = 0; side < 6; ++side) close_[side * room + k] = boxes_[side * padded + closest_[k]];
-      for (int side = 0; side < 4; ++side) close_[(6 + side) * room + k] = s.group_box[side * padded + closest_[k]];
-    }
-    for (int k = 0; k < W && faces[k] >= 0; ++k) look(s, x, faces[k], count, room);
-  }
-
-  // Adds the pairs of a face with the groups that are near its block.
-  void look(const Settings<T>& s, const Point<T>* x, int32_t f, int64_t count, int64_t room) {
-    const int32_t* corner = s.face + 3 * int64_t(f);
-    const Point<T> a = x[corner[0]], b = x[corner[1]], c = x[corner[2]];
-    const Point<T> middle = (T(1) / 3) * (a + b + c);
-    const T square = std::max({dot(a - middle, a - middle), dot(b - middle, b - middle), dot(c - middle, c - middle)});
-    const T face = std::max({allowed_[corner[0]], allowed_[corner[1]], allowed_[corner[2]]});
-    const T reach = T(1.001) * (T(s.thickness) + face), radius = T(1.001) * std::sqrt(square) + reach;
-    const T u = s.centre[2 * f], v = s.centre[2 * f + 1], apart = s.apart[f];
-    Sight sight;
-    bool ready = false;
-    const Wide zero = Wide{};
-    auto outside = [&](const Wide& low, const Wide& high, T value) {
-      return above(above(low - value, value - high), zero);
-    };
-    for (int64_t first = 0; first < count; first += W) {
-      const T* box = close_.data() + first;
-      const Wide dx = outside(load(box), load(box + room), middle.x);
-      const Wide dy = outside(load(box + 2 * room), load(box + 3 * room), middle.y);
-      const Wide dz = outside(load(box + 4 * room), load(box + 5 * room), middle.z);
-      const Wide du = above(u - load(box + 6 * room), load(box + 7 * room) - u);
-      const Wide dv = above(v - load(box + 8 * room), load(box + 9 * room) - v);
-      uint32_t candidate = bits((dx * dx + dy * dy + dz * dz < radius * radius) & (du * du + dv * dv >= apart));
-      for (; candidate; candidate &= candidate - 1) {
-        const int64_t i = int64_t(closest_[first + __builtin_ctz(candidate)]) * W;
-        const Wide px = load(x_.data() + i), py = load(y_.data() + i), pz = load(z_.data() + i);
-        const Wide pa = load(a_.data() + i);
-        const Wide ex = px - middle.x, ey = py - middle.y, ez = pz - middle.z, bound = radius + pa;
-        const Wide eu = load(s.group_rest + i) - u, ev = load(s.group_rest + s.groups * W + i) - v;
-        const Mask near = (ex * ex + ey * ey + ez * ez < bound * bound) & (eu * eu + ev * ev >= apart);
-        if (!bits(near)) continue;
-        if (!ready) sight = Sight(a, b, c), ready = true;
-        const Wide least = sight.square(px, py, pz), within = reach + pa;
-        for (uint32_t hit = bits(near & (least < within * within)); hit; hit &= hit - 1) {
-          const int j = __builtin_ctz(hit);
-          far_.push_back({std::sqrt(least[j]), s.group[i + j], f});
+    for (int k = 0; k < count; ++k) radius[k] = T(1.001) * std::sqrt(radius[k]) + reach[k];
+    low = low - Point<T>{most, most, most}, high = high + Point<T>{most, most, most};
+    uint32_t ready = 0;
+    for (int64_t first = 0; first < padded; first += W) {
+      const T* box = boxes_.data() + first;
+      uint32_t meets = bits((load(box) <= high.x) & (load(box + padded) >= low.x) & (load(box + 2 * padded) <= high.y) &
+                            (load(box + 3 * padded) >= low.y) & (load(box + 4 * padded) <= high.z) &
+                            (load(box + 5 * padded) >= low.z));
+      for (; meets; meets &= meets - 1) {
+        const int64_t g = first + __builtin_ctz(meets);
+        const T *at = points_.data() + 4 * W * g, *rest = s.group_rest + 2 * W * g;
+        const Wide px = load(at), py = load(at + W), pz = load(at + 2 * W), pa = load(at + 3 * W);
+        const Wide pu = load(rest), pv = load(rest + W);
+        uint32_t near[W];
+        int some[W], few = 0;  // faces that have any vertex of the group near
+        for (int k = 0; k < count; ++k) {
+          const Wide ex = px - middle[k].x, ey = py - middle[k].y, ez = pz - middle[k].z, bound = radius[k] + pa;
+          const Wide eu = pu - u[k], ev = pv - v[k];
+          near[k] = bits((ex * ex + ey * ey + ez * ez < bound * bound) & (eu * eu + ev * ev >= apart[k]));
+          some[few] = k;
+          few += near[k] != 0;
+        }
+        for (int n = 0; n < few; ++n) {
+          const int k = some[n];
+          const int32_t f = faces[k], *corner = s.face + 3 * int64_t(f);
+          if (!(ready >> k & 1)) sight[k] = Sight(x[corner[0]], x[corner[1]], x[corner[2]]), ready |= 1u << k;
+          const Wide least = sight[k].square(px, py, pz), within = reach[k] + pa;
+          for (uint32_t hit = near[k] & bits(least < within * within); hit; hit &= hit - 1) {
+            const int j = __builtin_ctz(hit);
+            far_.push_back({std::sqrt(least[j]), s.group[g * W + j], f});
+          }
         }
       }
     }

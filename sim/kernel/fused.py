@@ -29,7 +29,7 @@ _BLOCKED = (
     "tie_stiffness", "tie_slack", "wind", "targets", "rate", "tie_targets", "tie_rate",
 )  # fmt: skip
 
-_CONTACT_POINTERS = ("face", "vertex_area", "centre", "apart", "group", "group_rest", "group_box", "block")
+_CONTACT_POINTERS = ("face", "vertex_area", "centre", "apart", "group", "group_rest", "block")
 _CONTACT_SCALARS = ("thickness", "stiffness", "friction")
 
 
@@ -257,14 +257,8 @@ def _set_contact(settings: _Contact, system: System, contact: Contact, face: Ten
     cloth = system.cloth
     centre, apart = layers(cloth.mesh, contact)
     group, block = _groups(cloth.mesh.rest, width), _groups(centre, width)
-    rest = np.where(group < 0, np.nan, cloth.mesh.rest.T[:, group])  # (2, group, width)
-    ends = np.stack([np.nanmin(rest, axis=2), np.nanmax(rest, axis=2)], axis=1).reshape(4, -1)
-    box = np.full((4, math.ceil(len(group) / width) * width), np.nan)
-    box[:, : len(group)] = ends
-    real = {
-        "vertex_area": cloth.mesh.vertex_areas, "centre": centre, "apart": apart**2, "group_rest": rest,
-        "group_box": box,
-    }  # fmt: skip
+    rest = np.where(group < 0, np.nan, cloth.mesh.rest.T[:, group]).swapaxes(0, 1)  # (group, 2, width)
+    real = {"vertex_area": cloth.mesh.vertex_areas, "centre": centre, "apart": apart**2, "group_rest": rest}
     tensors = {name: torch.tensor(np.ascontiguousarray(values), dtype=cloth.dtype) for name, values in real.items()}
     tensors |= {name: torch.tensor(values, dtype=torch.int32) for name, values in (("group", group), ("block", block))}
     settings.vertices, settings.faces = cloth.mesh.vertex_count, len(cloth.faces)

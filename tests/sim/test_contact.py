@@ -167,6 +167,25 @@ def test_layers_of_a_calm_flag_stay_apart_with_contact_and_cross_without(method,
     assert closest[Contact()] > gap
 
 
+def test_the_automatic_step_stays_stable_over_ten_seconds_of_layers_on_one_another() -> None:
+    # An unstable step feeds the fastest vibrations without end. A flag that hangs keeps less than a tenth of the
+    # kinetic energy of its fall: the weak wind moves it a little.
+    winds = np.linspace(0.0, 1.0, 16)
+    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=w, columns=15) for w in winds]
+    system, state = assemble([replace(scene, contact=Contact()) for scene in scenes])
+    energies, touches = [], 0
+    for frame in range(250):
+        state = Symplectic().advance(system, state, 0.04)
+        energies.append((system.cloth.mass * (state.velocity**2).sum(1)).sum(0) / 2)
+        if frame % 50 == 49:
+            touch = contact.touching(system.cloth, system.contact, state.position, pairs_of(system, state.position))
+            touches += len(touch.violation)
+    kinetic = torch.stack(energies)
+    assert bool(state.healthy().all())
+    assert touches > 0
+    assert bool((kinetic[-50:].mean(0) < kinetic.amax(0) / 10).all())
+
+
 @pytest.mark.parametrize(
     "fields", [{"thickness": 0.0}, {"stiffness": -1.0}, {"friction": -0.1}, {"friction": math.nan}]
 )
