@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]
     """A demonstration, shorter than `make demo`'s."""
     out = tmp_path_factory.mktemp("readme") / "demo"
     done = subprocess.run(
-        [sys.executable, "-m", "flagdata.cli", "demo", "--out", str(out), "--minutes", str(MINUTES)],
+        [sys.executable, "-m", "flagdata.cli", "demo", "--out", str(out), "--minutes", str(MINUTES), "--part", "field"],
         env=environment,
         capture_output=True,
         text=True,
