@@ -47,8 +47,7 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
     values: Mapping[str, Any] = {
         "title": _sentence([s.words for s in outcome.strengths]), "data": outcome.proposed_from, "strengths": parts,
         "class_name": class_name, "module": module, "name": f"proposed-{short}",
-        "formula": " + ".join(f"{p['name']} × {p['shape']} × {p['field']}" for p in parts),
-        "source": f"zero and the fit with twice its error; fitted to data {short}",
+        "source": f"from zero to the fit and its interval beyond; fitted to data {short}",
     }  # fmt: skip
     environment = Environment(
         loader=PackageLoader("measure.propose", "templates"), undefined=StrictUndefined, trim_blocks=True,
