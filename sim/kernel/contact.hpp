@@ -99,8 +99,9 @@ class Search {
 
   // Steps that the lists are meant to serve, and the fewest that are worth a near list; what is left of a vertex's peak
   // speed at the next near list; the share of the lane's mean speed in a vertex's own; the least allowance for a step
-  // [thicknesses].
-  static constexpr double kFarSteps = 20, kNearSteps = 7, kFewest = 3, kFading = 0.95, kShare = 0.5, kLeast = 0.002;
+  // [thicknesses]; the greatest peak speed, lest a member that diverged leaves one that never fades [m/s].
+  static constexpr double kFarSteps = 14, kNearSteps = 6, kFewest = 2, kFading = 0.95, kShare = 0.3, kLeast = 0.002,
+                          kFastest = 1e3;
 
  public:
   const std::vector<Pair>& near() const { return near_; }
@@ -114,7 +115,7 @@ class Search {
     // Vertices in a fold swing to and fro: one that is slow now is soon as fast again as it was.
     for (size_t i = 0; i < n; ++i) {
       const T speed = std::sqrt(dot(v[i], v[i]));
-      peak_[i] = speed > T(kFading) * peak_[i] ? speed : T(kFading) * peak_[i];
+      peak_[i] = std::min(speed > T(kFading) * peak_[i] ? speed : T(kFading) * peak_[i], T(kFastest));
       mean += peak_[i];
     }
     const T h = T(s.thickness), lane = T(kShare) * mean / T(n), least = T(kLeast) * h;
@@ -208,7 +209,7 @@ class Search {
     const int64_t padded = (s.groups + W - 1) / W * W;
     constexpr T inf = std::numeric_limits<T>::infinity(), nan = std::numeric_limits<T>::quiet_NaN();
     points_.resize(4 * s.groups * W);
-    boxes_.assign(6 * padded, inf);  // beyond the last: farther than anything
+    boxes_.assign(6 * padded, nan);  // beyond the last: meets nothing
     for (int64_t g = 0; g < s.groups; ++g) {
       T low[3] = {inf, inf, inf}, high[3] = {-inf, -inf, -inf}, most = 0;
       T* points = points_.data() + 4 * g * W;
