@@ -41,9 +41,6 @@ name = "{material}"
 
 [pins]
 at = "hoist-corners"
-
-[test]
-nulls = {nulls}
 {recordings}"""
 _RECORDING = """
 [[recording]]
@@ -70,7 +67,6 @@ class TrackedRecipe:
         density, bending: of the cloth, as factors on the catalog's; nobody is told.
         damping: of the cloth [s].
         vertices: of the mesh that the fit is told to use.
-        nulls: recordings that the test is told to simulate.
     """
 
     seed: int
@@ -88,7 +84,6 @@ class TrackedRecipe:
     bending: float = 0.8
     damping: float = 8e-4
     vertices: int = 90
-    nulls: int = 96
 
     def __post_init__(self) -> None:
         if self.duration < 5 or not self.speeds or min(self.speeds) <= 0:
@@ -144,7 +139,7 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     )
     told.write_text(
         RECIPE.format(
-            width=recipe.width, height=recipe.height, vertices=recipe.vertices, material=MATERIAL, nulls=recipe.nulls,
+            width=recipe.width, height=recipe.height, vertices=recipe.vertices, material=MATERIAL,
             recordings=recordings,
         ),
         encoding="utf-8",

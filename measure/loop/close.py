@@ -46,6 +46,8 @@ Stage = Callable[[str, int, int], object]
 _FLOOR_DURATION = 4.5  # s: two segments of each recording
 _FLOOR_COPIES = 4
 _KINDS = 12
+FEWEST_NULLS = _KINDS * banks.BATCH
+"""So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
 _PLENTY = 1.5
 
 
@@ -56,7 +58,7 @@ class Options:
     Attributes:
         seed: of the nulls.
         level: of the global test.
-        nulls: null recordings simulated where no bank is given.
+        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
         bank: a folder of nulls over priors that hold for this design; None simulates nulls about the estimates.
         workers: processes for the nulls.
 
@@ -66,18 +68,18 @@ class Options:
 
     seed: int = 0
     level: float = 0.05
-    nulls: int = 192
+    nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1
 
     def __post_init__(self) -> None:
         if not 0 < self.level < 1:
             raise UsageError(f"a level of {self.level!r}", where="close-loop", fix="give one between 0 and 1")
-        if self.nulls < 64 or self.workers < 1:
+        if self.nulls < FEWEST_NULLS or self.workers < 1:
             raise UsageError(
                 f"{self.nulls} nulls by {self.workers} workers",
                 where="close-loop",
-                fix="give 64 or more, and 1 or more",
+                fix=f"give {FEWEST_NULLS} or more, and 1 or more",
             )
 
 
@@ -195,7 +197,7 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
             speeds=(0.9 * float(setting.speeds.min()), 1.1 * float(setting.speeds.max())),
             seed=child_seed(options.seed, "null", index),
         )
-        for index in range(max(_KINDS, round(options.nulls / banks.BATCH)))
+        for index in range(math.ceil(options.nulls / banks.BATCH))
     ]  # fmt: skip
     done = 0
 

@@ -42,10 +42,10 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "rate", "unit", "noise", "up"
 @click.option("--unit", default="m", show_default=True, help="Of positions.")
 @click.option("--up", default="z", show_default=True, help="Axis that points up: z, y, x, -z, -y or -x.")
 @click.option("--noise", type=click.FloatRange(min=0), help="Of a marker's coordinate [m]; estimated by default.")
-@click.option("--nulls", type=click.IntRange(min=64), help="Null recordings; 192 by default.")
+@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 192 (the default) or more.")
 @click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              help="Of the global test; 0.03 by default.")  # fmt: skip
+              help="Of the global test; 0.05 by default.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes; by default one for each core.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
@@ -112,6 +112,8 @@ def close_loop(
     options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)))
     if recipe is not None:
         options = _said(options, level=recipe.level, nulls=recipe.nulls)
+    if bank is not None and nulls is not None:
+        raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
     options = _said(options, level=level, nulls=nulls)
     setup = _setup(Setup() if recipe is None else recipe.setup, material, size, pins)
     if recipe is not None and recipe.recordings:
