@@ -54,7 +54,11 @@ def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) ->
     common = _common(turned, seed)
     made = [_model(f"{name}-base", verdict, common, turned.specimen, ())]
     if effects := acting(verdict):
-        made.append(_model("-".join([name, *(c.effect for c in effects)]), verdict, common, turned.specimen, effects))
+        made.append(
+            _model(
+                "-".join(dict.fromkeys([name, *(c.effect for c in effects)])), verdict, common, turned.specimen, effects
+            )
+        )
     return tuple(made)
 
 
@@ -79,7 +83,10 @@ def _model(
     }  # fmt: skip
     content = {"title": name, **common, "material": material}
     if effects:
-        content["effects"] = {c.effect: {c.parameter.replace("_", "-"): _kept(c)} for c in effects}
+        strengths: dict[str, dict[str, float]] = {}
+        for candidate in effects:
+            strengths.setdefault(candidate.effect, {})[candidate.parameter.replace("_", "-")] = _kept(candidate)
+        content["effects"] = strengths
     return NamedModel(name=name, content=content)
 
 
