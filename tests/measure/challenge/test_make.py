@@ -188,5 +188,5 @@ def test_recipes_that_make_no_sense_are_refused(old: str, new: str, error: type[
 
 
 def test_the_catalogs_recipes_parse() -> None:
-    assert recipes() == ["standard"]
-    assert load("standard").count == 3
+    assert recipes() == ["standard", "strong"]
+    assert [load(name).count for name in recipes()] == [3, 3]
