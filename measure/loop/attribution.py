@@ -124,7 +124,8 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
 def _second(
     evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:
-    """An effect that, beside the best, leaves no more than nulls do and predicts better than the best alone."""
+    """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
+    strength is not nothing."""
     if best.column == GUST_COLUMN:
         return None
     others = [w for w in ranking if w.column not in (best.column, GUST_COLUMN)]
@@ -133,7 +134,9 @@ def _second(
     chosen, gained = others[order[0]], pairs[1 + order[0]] - pairs[0]
     fit = evidence.fit([best.column, chosen.column])
     strengths = [_strength(w, fit.of(w.column)[0]) for w in (best, chosen)]
-    lasting = gained.sum() > _FAR * _total_error(gained)
+    value, claimed = fit.of(chosen.column)
+    error = claimed * chosen.error / evidence.fit([chosen.column]).of(chosen.column)[1]
+    lasting = gained.sum() > _FAR * _total_error(gained) and abs(value) > _FAR * error
     return chosen if lasting and all(strengths) and _leftover(evidence, reference, fit.active) > level else None
 
 
