@@ -50,7 +50,7 @@ def arc_lengths(track: EdgeTrack, ratios: NDArray[np.float64], *, least: int = 5
         seen = np.flatnonzero(np.isfinite(height))
         if len(seen) >= least:
             whole = np.interp(np.arange(seen[0], seen[-1] + 1), seen, height[seen])
-            rise = np.diff(savgol_filter(whole, _SMOOTH, 2))
+            rise = np.diff(np.asarray(savgol_filter(whole, _SMOOTH, 2)))
             found[index] = np.hypot(1.0, ratios[:, None] * rise).sum(axis=1)
     return found
 
