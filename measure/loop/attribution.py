@@ -121,6 +121,16 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
     return judgement(Conclusion.PARTLY, (best,), reasons)
 
 
+def withdrawn(judgement: Judgement) -> Judgement:
+    """The same, once the effect named has failed on unseen data."""
+    reason = "run again on unseen recordings, it helps no more than the wrong-effect control"
+    ranking = tuple(
+        replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in judgement.named else w
+        for w in judgement.ranking
+    )
+    return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)
+
+
 def _second(
     evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:

@@ -23,7 +23,7 @@ from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
 from measure.loop.alignment import aligned
-from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge
+from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge, withdrawn
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
 from measure.loop.comparison import Predictions, compare, folds, predict
 from measure.loop.forecast import Forecaster, Segments
@@ -134,6 +134,9 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     judgement = judge(evidence, reference, level=options.level)
     solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
     comparisons = _comparisons(solved, options, tell)
+    if not _holds(comparisons):
+        solved = replace(solved, judgement=withdrawn(judgement))
+        comparisons = ()
     tell("before and after", 1, 1)
     return _verdict(solved, bank, comparisons, options, began)
 
@@ -243,6 +246,15 @@ def _comparisons(solved: Solved, options: Options, tell: Stage) -> tuple[Compari
             )
         )  # fmt: skip
     return tuple(made)
+
+
+def _holds(comparisons: Sequence[Comparison]) -> bool:
+    """Whether the effect lowers the errors on unseen data, and by more than the wrong-effect control does."""
+    if not comparisons:
+        return True
+    before, after = sum(c.before.value**2 for c in comparisons), sum(c.after.value**2 for c in comparisons)
+    control = sum(c.control.value**2 for c in comparisons if c.control is not None)
+    return after < before and (control == 0 or after < control)
 
 
 def _floor(setting: Setting, model: Model, options: Options) -> tuple[NDArray[np.int64], Floats]:
