@@ -79,7 +79,13 @@ class Transcript:
 @click.option(
     "--minutes", type=click.FloatRange(2, 120), default=10.0, show_default=True, help="Length of the video it makes."
 )
-@click.option("--part", type=click.Choice(list(Part)), default=Part.ALL, show_default=True, help="What to show.")
+@click.option(
+    "--part",
+    type=click.Choice([p.value for p in Part]),
+    default=Part.ALL.value,
+    show_default=True,
+    help="What to show.",
+)
 def demo(out: Path, seed: int, minutes: float, part: str) -> None:
     """Make a small field recording and a tracked flag, and take them through everything, to pages to open."""
     _fresh(out)

@@ -33,6 +33,8 @@ _TIED = 1.0
 """Standard errors within which held-out gains say nothing."""
 _APART = 3.0
 """A rival whose squared z is lower by more than the square of this fits worse, whatever its held-out gain's error."""
+_SEEN = ("tilted-pole",)
+"""Never named beside another effect: it shows at the attachments, whose observed places are the model's."""
 _BETTER = 1.5
 """A mode of the corrective field whose statistic is larger by this factor says that the library has no answer."""
 
@@ -138,7 +140,7 @@ def _second(
     strength is not nothing."""
     if best.column == GUST_COLUMN:
         return None
-    others = [w for w in ranking if w.column not in (best.column, GUST_COLUMN)]
+    others = [w for w in ranking if w.column not in (best.column, GUST_COLUMN) and w.candidate.effect not in _SEEN]
     pairs = gains(evidence, [[best.column], *([best.column, w.column] for w in others)])
     order = np.argsort(-pairs[1:].sum(axis=1))
     chosen, gained = others[order[0]], pairs[1 + order[0]] - pairs[0]
