@@ -29,7 +29,7 @@ from sim.mesh import grid
 
 RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)
 KINDS, RECORDINGS = 6, 8
-PUSH = 2.0  # m/s²
+PUSH = 5.0  # m/s²; half a flag's weight, so that five unseen segments show it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class SidePush(ForceEffect):
         acceleration: well below the middle.
     """
 
-    acceleration: Annotated[Value, strength(unit="m/s²", prior=(0.0, 2.0), source="made up for a test")] = 0.0
+    acceleration: Annotated[Value, strength(unit="m/s²", prior=(0.0, 5.0), source="made up for a test")] = 0.0
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         push = torch.zeros_like(position)
@@ -108,7 +108,7 @@ def bank(specimen: Specimen, columns: tuple[EffectColumn, ...]) -> NullBank:
 
 @pytest.fixture(scope="session")
 def pushed(specimen: Specimen) -> Experiment:
-    """Four winds with a push of 2 m/s²; fitted to nulls of this size, one across the wind scatters by 0.2 m/s²."""
+    """Four winds with a push of 5 m/s²; fitted to nulls of this size, one across the wind scatters by 0.2 m/s²."""
     calibrations = (Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS)
     batch = simulated(specimen, calibrations, SPEEDS, (SidePush(acceleration=PUSH),), 91)
     return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))
