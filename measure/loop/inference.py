@@ -219,15 +219,20 @@ class Fit:
         return float(self.value[place]), float(np.sqrt(self.covariance[place, place]))
 
 
+def _folds(recording: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(segment,) what is left out together: a recording, or each half of a single one."""
+    if len(np.unique(recording)) > 1:
+        return recording
+    return (np.arange(len(recording)) >= len(recording) / 2).astype(np.int64)
+
+
 def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
     """How much better each choice of columns predicts segments it was not fitted to: (choice, segment).
 
     Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the
     left-out segments' half misfits are compared with the base model's, fitted to the same.
     """
-    folds = evidence.recording
-    if len(np.unique(folds)) < 2:
-        folds = (np.arange(len(folds)) >= len(folds) / 2).astype(np.int64)
+    folds = _folds(evidence.recording)
     result = np.zeros((len(choices), len(folds)))
     for index in np.unique(folds):
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)
@@ -272,9 +277,7 @@ def fluctuation(evidence: Evidence, column: int, beside: Chosen = ()) -> Fluctua
 
 def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
     """(segment,) log likelihood of each left-out recording's segments under the others' fluctuation, over none."""
-    folds = evidence.recording
-    if len(np.unique(folds)) < 2:
-        folds = (np.arange(len(folds)) >= len(folds) / 2).astype(np.int64)
+    folds = _folds(evidence.recording)
     result = np.zeros(len(folds))
     for index in np.unique(folds):
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)
