@@ -178,10 +178,17 @@ class Evidence:
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
-    def fit(self, chosen: Chosen) -> Fit:
-        """Generalised least squares of the nuisance columns, under their priors, and the chosen ones."""
+    def fit(self, chosen: Chosen, *, centre: Sequence[float] = (0.0,) * len(THETA)) -> Fit:
+        """Generalised least squares of the nuisance columns, under their priors, and the chosen ones.
+
+        Args:
+            centre: of the calibrated parameters' prior, in steps from where the statistics were taken.
+        """
         active = [*self.nuisance, *chosen]
         curvature, score, energy = self._total()
+        pull = PRIOR**-2 * np.asarray(centre)
+        score[: len(THETA)] += pull
+        energy += float(pull @ np.asarray(centre))
         covariance = np.linalg.inv(curvature[np.ix_(active, active)])
         value = covariance @ score[active]
         return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))

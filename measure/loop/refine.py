@@ -118,14 +118,7 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
 def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
     """Of generalised least squares from here, under the prior about the nominal calibration; with standard errors."""
     count = found.r.shape[1]
-    shifts = np.broadcast_to(null.shifts.T, (len(found.r), *null.shifts.T.shape))
-    response = np.concatenate([found.response, shifts], axis=2)
-    precision = np.linalg.inv(null.covariance)
-    weighted = np.einsum("sia,ij->saj", response, precision)
-    curvature = np.einsum("saj,sjb->ab", weighted, response)
-    score = np.einsum("saj,sj->a", weighted, found.r - null.mean(speeds))
-    nuisances = len(null.shifts)
-    prior = np.concatenate([PRIOR**-2, np.zeros(count - len(PRIOR)), np.ones(nuisances)])
-    score[: len(PRIOR)] -= PRIOR**-2 * np.array(model.calibration.steps_from(Calibration()))
-    covariance = np.linalg.inv(curvature + np.diag(prior))
-    return (covariance @ score)[:count], np.sqrt(np.diag(covariance))[:count]
+    chosen = range(len(THETA), count)
+    fit = Evidence.of(found, speeds, null).fit(chosen, centre=Calibration().steps_from(model.calibration))
+    value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
+    return np.array(value), np.array(error)
