@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import functools
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError
+from flagdata.recipes import Shelf, parsed
 
 STRETCHING_SHAPE = (6, 4)
 BENDING_SHAPE = (3, 5)
+MATERIALS = Shelf(folder="materials", noun="material")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,20 +136,15 @@ def isotropic(
     )  # fmt: skip
 
 
-def names() -> list[str]:
-    """Names of the catalog's materials, sorted."""
-    folder = files("catalogs") / "materials"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
 @functools.cache
-def named(name: str) -> Material:
+def named(name: str, *, where: str | None = None) -> Material:
     """A material of the catalog.
+
+    Args:
+        where: the name stands, for the error message.
 
     Raises:
         UnknownNameError: with the nearest name that is there.
     """
-    if name not in names():
-        raise UnknownNameError.of("material", name, names())
-    text = (files("catalogs") / "materials" / f"{name}.toml").read_text(encoding="utf-8")
-    return Material.from_mapping(tomllib.loads(text), name=name)
+    found = MATERIALS.named(name, where=where)
+    return Material.from_mapping(parsed(found.text, where=found.where), name=name)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,10 @@ import numpy as np
 import pyarrow.compute as pc
 
 from flagdata.align.paired import host_clock
-from flagdata.errors import ConflictError, InputError, UnknownNameError
+from flagdata.errors import ConflictError, InputError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
@@ -76,7 +75,7 @@ class WindIngest:
         options = dict(self.wind.as_dict())
         if self.wind.recipe is not None:
             options["recipe"] = Path(self.wind.recipe).name
-            options["recipe_hash"] = digest(recipe_text(self.wind.recipe).decode(errors="replace"))
+            options["recipe_hash"] = digest(SENSORS.find(self.wind.recipe).data.decode(errors="replace"))
         return {"ingest": "wind", "wind": options}
 
 
@@ -205,9 +204,9 @@ def ingest_wind(
             else:
                 findings = (*findings, _not_attached(path))
             if options.wind.recipe is not None:
-                name = f"{Path(options.wind.recipe).name.removesuffix('.toml')}.recipe.toml"
-                text = recipe_text(options.wind.recipe)
-                record.attach(name, text, media_type="application/toml", log_time=int(time[0]))
+                found = SENSORS.find(options.wind.recipe)
+                name = f"{found.name}.recipe.toml"
+                record.attach(name, found.data, media_type="application/toml", log_time=int(time[0]))
         source.check_unchanged()
         report = _wind_report(log, findings, named=options.wind.recipe)
         if paired is not None:
@@ -218,23 +217,6 @@ def ingest_wind(
         )  # fmt: skip
         transaction.add(artifact)
     return result_of(lake, transaction, artifact, report, labels, branch=branch)
-
-
-def recipe_text(recipe: str) -> bytes:
-    """The TOML of a sensor recipe, by name or path.
-
-    Raises:
-        UnknownNameError: no recipe of that name.
-        InputError: it cannot be read.
-    """
-    try:
-        if recipe.endswith(".toml"):
-            return Path(recipe).read_bytes()
-        if recipe not in recipes.names():
-            raise UnknownNameError.of("sensor recipe", recipe, recipes.names())
-        return (files("catalogs") / "sensors" / f"{recipe}.toml").read_bytes()
-    except OSError as error:
-        raise InputError(f"the recipe cannot be read: {error.strerror}", where=recipe, fix="check its path") from None
 
 
 @dataclass

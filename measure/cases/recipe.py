@@ -5,17 +5,18 @@ A recipe is TOML in catalogs/cases. Parsed here and nowhere else; unknown keys a
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.resources import files
 from math import nan
 
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError
+from flagdata.recipes import Shelf, parsed
 from measure.cases.limit_cycle import StripRun
 from measure.cases.sheet import Sheet
 from sim.run.tables import Table
+
+CASES = Shelf(folder="cases", noun="case")
 
 
 class Group(StrEnum):
@@ -100,18 +101,16 @@ class Case:
         return tuple(sorted((c for c in self.clips if c.group is group), key=lambda c: c.speed))
 
 
-def load_case(name: str) -> Case:
-    """The case of that name in the catalog.
+def load_case(source: str) -> Case:
+    """The case of that name in the catalog, or of a `.toml` file.
 
     Raises:
+        NotFoundError: no such file.
         UnknownNameError: no such case, or a key that is not known.
         InputError: a value that does not fit.
     """
-    folder = files("catalogs") / "cases"
-    known = sorted(e.name.removesuffix(".toml") for e in folder.iterdir() if e.name.endswith(".toml"))
-    if name not in known:
-        raise UnknownNameError.of("case", name, known)
-    return parse_case((folder / f"{name}.toml").read_text(encoding="utf-8"), where=name)
+    found = CASES.find(source)
+    return parse_case(found.text, where=found.where)
 
 
 def parse_case(text: str, *, where: str) -> Case:
@@ -120,10 +119,7 @@ def parse_case(text: str, *, where: str) -> Case:
     Raises:
         UnknownNameError, InputError: as `load_case`.
     """
-    try:
-        top = Table(tomllib.loads(text), where=where)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from error
+    top = Table(parsed(text, where=where), where=where)
     sheet, air, camera = top.table("sheet"), top.table("air"), top.table("camera")
     clips, thresholds, declared = top.table("clips"), top.table("thresholds"), top.table("declared")
     simulation = top.table("simulation")

@@ -15,18 +15,18 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.resources import files
 from math import lcm
-from pathlib import Path
 from typing import Any
 
-from flagdata.errors import InputError, NotFoundError, UnknownNameError
+from flagdata.errors import InputError, UnknownNameError
+from flagdata.recipes import Shelf, parsed
 from flagdata.registry import Registry
 from sim import material
 from sim.run.tables import Range, Table
+
+CHALLENGES = Shelf(folder="challenges", noun="challenge")
 
 
 class Kind(StrEnum):
@@ -141,12 +141,6 @@ class ChallengeRecipe:
         return lcm(self.log_rate, *self.rates)
 
 
-def names() -> list[str]:
-    """Recipes of the catalog, sorted."""
-    folder = files("catalogs") / "challenges"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
 def load(source: str) -> ChallengeRecipe:
     """The recipe of that name in the catalog, or of a `.toml` file.
 
@@ -154,15 +148,8 @@ def load(source: str) -> ChallengeRecipe:
         NotFoundError: no such file.
         UnknownNameError, InputError: see `parse`.
     """
-    path = Path(source)
-    if path.suffix == ".toml":
-        if not path.is_file():
-            raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
-        return parse(path.read_text(encoding="utf-8"), where=source)
-    if source not in names():
-        raise UnknownNameError.of("challenge", source, names())
-    text = (files("catalogs") / "challenges" / f"{source}.toml").read_text(encoding="utf-8")
-    return parse(text, where=f"challenge {source}")
+    found = CHALLENGES.find(source)
+    return parse(found.text, where=found.where)
 
 
 def parse(text: str, *, where: str) -> ChallengeRecipe:
@@ -175,18 +162,14 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     from measure.challenge.outside import OUTSIDE
     from sim.effects import EFFECTS
 
-    try:
-        top = Table(tomllib.loads(text), where=where)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    top = Table(parsed(text, where=where), where=where)
     shares, flag, run = top.table("composition"), top.table("flag"), top.table("recordings")
     log, markers, numerics = top.table("log"), top.table("markers"), top.table("numerics")
     effects, outside, title = top.table("effects"), top.table("outside"), top.text("title", where) or where
     top.done()
     materials = flag.texts("materials")
     for name in materials:
-        if name not in material.names():
-            raise UnknownNameError.of("material", name, material.names(), where=flag.where)
+        material.named(name, where=flag.where)
     recipe = ChallengeRecipe(
         title=title,
         composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},

@@ -16,12 +16,11 @@ recording draws its own value.
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
-from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.recipes import Shelf, parsed
 from flagdata.schema import TRUTH_WINDOW
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
@@ -34,14 +33,9 @@ from sim.run import Recipe as Simulation
 from sim.run import load as load_simulation
 from sim.run.tables import Quantity, Table
 
+DATASETS = Shelf(folder="datasets", noun="data set")
 SIDES = ("train", "validation", "test")
 _SIZES = ("width", "height", "raster_samples", "cycles_samples")
-
-
-def names() -> list[str]:
-    """Recipes of the catalog, sorted."""
-    folder = files("catalogs") / "datasets"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def load(source: str) -> DatasetRecipe:
@@ -52,15 +46,8 @@ def load(source: str) -> DatasetRecipe:
         UnknownNameError: no such recipe; a key, name or option that is not known.
         InputError, UsageError: a value that does not fit.
     """
-    path = Path(source)
-    if path.suffix != ".toml":
-        if source not in names():
-            raise UnknownNameError.of("data set", source, names())
-        text = (files("catalogs") / "datasets" / f"{source}.toml").read_text(encoding="utf-8")
-        return parse(text, name=source, folder=Path(), where=f"data set {source}")
-    if not path.is_file():
-        raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
-    return parse(path.read_text(encoding="utf-8"), name=path.stem, folder=path.parent, where=source)
+    found = DATASETS.find(source)
+    return parse(found.text, name=found.name, folder=found.folder, where=found.where)
 
 
 def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
@@ -72,10 +59,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     Raises:
         UnknownNameError, InputError, UsageError: as `load`.
     """
-    try:
-        top = Table(tomllib.loads(text), where=where)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    top = Table(parsed(text, where=where), where=where)
     render = top.table("render")
     renderer = render.text("renderer", "raster") or ""
     if renderer not in RENDERERS:
@@ -118,7 +102,7 @@ def _simulation(table: Table, folder: Path) -> Simulation:
 def _prior(table: Table) -> RenderPrior:
     name = table.text("prior", None)
     if name is None:
-        known = ", ".join(priors.names())
+        known = ", ".join(priors.PRIORS.names())
         raise InputError("no prior of ζ is named", where=table.where, fix=f"add prior, one of {known}")
     changes: dict[str, Quantity] = {}
     for key in _SIZES:

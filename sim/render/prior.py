@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from typing import Any
 
 from flagdata.errors import InputError, UnknownNameError
+from flagdata.recipes import Shelf, parsed
 from flagdata.rng import stream
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
 from sim.run.tables import Quantity, Range, Table, ends, plain
 
+PRIORS = Shelf(folder="renders", noun="render prior")
 _DEGREES = "-deg"  # suffix of a key whose values are in degrees
 
 
@@ -105,22 +105,14 @@ class RenderPrior:
         }  # fmt: skip
 
 
-def names() -> list[str]:
-    """Names of the catalog's render priors, sorted."""
-    folder = files("catalogs") / "renders"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
 def named(name: str) -> RenderPrior:
     """A render prior of the catalog.
 
     Raises:
         UnknownNameError: with the nearest name that is there.
     """
-    if name not in names():
-        raise UnknownNameError.of("render prior", name, names())
-    text = (files("catalogs") / "renders" / f"{name}.toml").read_text(encoding="utf-8")
-    return read(tomllib.loads(text), name=name)
+    found = PRIORS.named(name)
+    return read(parsed(found.text, where=found.where), name=name)
 
 
 def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:

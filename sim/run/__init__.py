@@ -4,7 +4,7 @@ A recipe is a TOML file (see `sim.run.reading`), one of `catalogs/scenes` by nam
 """
 
 from sim.run.publish import Progress, RunReport, simulate
-from sim.run.reading import load, names
+from sim.run.reading import load
 from sim.run.recipe import Recipe
 
-__all__ = ["Progress", "Recipe", "RunReport", "load", "names", "simulate"]
+__all__ = ["Progress", "Recipe", "RunReport", "load", "simulate"]

@@ -26,14 +26,14 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
         NotFoundError: several models have it.
         FlagdataError: as `sim.run.reading.load`.
     """
-    if Path(source).suffix in (".toml", ".json") or source in reading.names():
+    if Path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
         return reading.load(source)
     rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "name"]).to_pylist()
     found = [row["artifact"] for row in rows if _means(source, row)]
     if len(found) > 1:
         raise NotFoundError(f"{len(found)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(found))
     if not found:
-        names = [*reading.names(), *(row["name"] for row in rows)]
+        names = [*reading.SCENES.names(), *(row["name"] for row in rows)]
         raise UnknownNameError.of("recipe or model", source, names)
     return of_artifact(lake.artifact(found[0], at=branch))
 

@@ -25,15 +25,14 @@ change what a member is; everything else does.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
+from flagdata.recipes import Shelf, parsed
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
@@ -43,7 +42,7 @@ from sim.handles import ARCSIM_STIFFNESS
 from sim.integrate import INTEGRATORS
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
-from sim.material import Material, named
+from sim.material import Material
 from sim.run.recipe import (
     DTYPES,
     Attachment,
@@ -64,10 +63,7 @@ from sim.tables import Evaluation
 _GUST_LENGTH = 60.0  # m, integral length scale near the ground; see sim.wind.spectral
 
 
-def names() -> list[str]:
-    """Recipes of the catalog, sorted."""
-    folder = files("catalogs") / "scenes"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+SCENES = Shelf(folder="scenes", noun="recipe")
 
 
 def load(source: str) -> Recipe:
@@ -78,17 +74,10 @@ def load(source: str) -> Recipe:
         UnknownNameError: no such recipe; a key, name or option that is not known.
         InputError: a value that does not fit, or a scene that cannot be simulated.
     """
-    path = Path(source)
-    if path.suffix == ".json":
-        return _of_scene_file(path)
-    if path.suffix != ".toml":
-        if source not in names():
-            raise UnknownNameError.of("recipe", source, names())
-        text = (files("catalogs") / "scenes" / f"{source}.toml").read_text(encoding="utf-8")
-        return parse(text, name=source, folder=Path(), where=f"recipe {source}")
-    if not path.is_file():
-        raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
-    return parse(path.read_text(encoding="utf-8"), name=path.stem, folder=path.parent, where=source)
+    if source.endswith(".json"):
+        return _of_scene_file(Path(source))
+    found = SCENES.find(source)
+    return parse(found.text, name=found.name, folder=found.folder, where=found.where)
 
 
 def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
@@ -100,11 +89,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
     Raises:
         UnknownNameError, InputError: as `load`.
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
-    return of_content(content, name=name, folder=folder, where=where)
+    return of_content(parsed(text, where=where), name=name, folder=folder, where=where)
 
 
 def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str) -> Recipe:
@@ -238,11 +223,8 @@ def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]
     if inline:
         return (Material.from_mapping(inline, name=str(inline.get("title", "material"))),)
     chosen = (name,) if name is not None else names_
-    for each in chosen:
-        if each not in material.names():
-            raise UnknownNameError.of("material", each, material.names(), where=table.where)
     if chosen:
-        return tuple(named(each) for each in chosen)
+        return tuple(material.named(each, where=table.where) for each in chosen)
     if file is not None:
         return (_material_file(folder / file),)
     if scene.arcsim is not None:
@@ -255,11 +237,7 @@ def _material_file(path: Path) -> Material:
         return read_material(path)
     if not path.is_file():
         raise NotFoundError("no such material file", where=str(path), fix="check the path")
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
-    return Material.from_mapping(content, name=path.stem)
+    return Material.from_mapping(parsed(path.read_text(encoding="utf-8"), where=str(path)), name=path.stem)
 
 
 def _wind(table: Table, scene: SceneSpec) -> WindSpec:

@@ -25,7 +25,7 @@ class Delimited:
     def recognise(self, head: Head) -> Guess | None:
         """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
         best: Guess | None = None
-        for name in recipes.names():
+        for name in recipes.SENSORS.names():
             guess = _match(recipes.load(name), name, head)
             if guess and (best is None or guess.score > best.score):
                 best = guess

@@ -50,7 +50,7 @@ class HostStamped:
             return None
         best: Guess | None = None
         most = 0.0
-        for name in recipes.names():
+        for name in recipes.SENSORS.names():
             recipe = recipes.load(name)
             if not recipe.file.host:
                 continue

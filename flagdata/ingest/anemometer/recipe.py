@@ -15,22 +15,22 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
 from flagdata.ingest.anemometer.stamps import EPOCH, pattern
+from flagdata.recipes import Shelf, parsed
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import zone
 from flagdata.units import unit
 
 T = TypeVar("T")
+
+SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "|": "|", "space": " "}
 MISSING = ("", "-", "--", "---", "nan", "na", "n/a", "null", "none", "***")
@@ -212,12 +212,6 @@ class Recipe:
             raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
 
 
-def names() -> tuple[str, ...]:
-    """Recipes that come with the project."""
-    folder = files("catalogs") / "sensors"
-    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
-
-
 def load(recipe: str) -> Recipe:
     """The recipe called `recipe`, or in the TOML file of that path.
 
@@ -226,17 +220,8 @@ def load(recipe: str) -> Recipe:
         NotFoundError: no such file.
         InputError: not TOML; a key missing, unknown or of the wrong type.
     """
-    if recipe.endswith(".toml"):
-        path = Path(recipe)
-        if not path.is_file():
-            raise NotFoundError(f"no recipe file {path.name}", where=str(path), fix="check the path")
-        try:
-            return parse(path.read_text(encoding="utf-8"), where=str(path))
-        except UnicodeDecodeError:
-            raise InputError("the recipe is not UTF-8 text", where=str(path), fix="save it as UTF-8") from None
-    if recipe not in names():
-        raise UnknownNameError.of("sensor recipe", recipe, names())
-    return parse((files("catalogs") / "sensors" / f"{recipe}.toml").read_text(encoding="utf-8"), where=recipe)
+    found = SENSORS.find(recipe)
+    return parse(found.text, where=found.where)
 
 
 def parse(text: str, *, where: str) -> Recipe:
@@ -246,10 +231,7 @@ def parse(text: str, *, where: str) -> Recipe:
         InputError: not TOML; a key missing or of the wrong type; values that do not fit together.
         UnknownNameError: a key, channel, unit or zone that is not known, with the nearest.
     """
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not valid TOML: {error}", where=where, fix="correct the recipe") from None
+    data = parsed(text, where=where)
     try:
         return _Reader(data, where).recipe()
     except UnknownNameError as error:

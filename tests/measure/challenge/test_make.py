@@ -19,8 +19,7 @@ from measure.challenge.flight import batches
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.key import Key, opened, seal
 from measure.challenge.meshes import layout, mesh_of, seen
-from measure.challenge.recipe import Kind, load, parse
-from measure.challenge.recipe import names as recipes
+from measure.challenge.recipe import CHALLENGES, Kind, load, parse
 from tests.measure.challenge import cases
 from tests.measure.challenge.cases import TINY
 
@@ -188,5 +187,5 @@ def test_recipes_that_make_no_sense_are_refused(old: str, new: str, error: type[
 
 
 def test_the_catalogs_recipes_parse() -> None:
-    assert recipes() == ["standard", "strong"]
-    assert [load(name).count for name in recipes()] == [3, 3]
+    assert CHALLENGES.names() == ("standard", "strong")
+    assert [load(name).count for name in CHALLENGES.names()] == [3, 3]

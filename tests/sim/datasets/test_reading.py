@@ -8,7 +8,7 @@ import pytest
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from sim.datasets.cast import casts
-from sim.datasets.reading import load, names, parse, with_renderer
+from sim.datasets.reading import DATASETS, load, parse, with_renderer
 from sim.datasets.recipe import DatasetRecipe, Truth
 from sim.run.tables import Range, ends
 
@@ -33,7 +33,7 @@ def test_clothsim_draws_from_all_ten_measured_cloths() -> None:
     assert len(load("clothsim").simulation.material.bases) == 10
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", DATASETS.names())
 def test_recipes_of_the_catalog_are_complete_and_no_seed_is_on_two_sides(name: str) -> None:
     recipe = load(name)
     assert recipe.licence

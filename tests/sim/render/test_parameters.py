@@ -53,7 +53,7 @@ def test_flags_are_never_seen_along_the_wind() -> None:
     assert (angles < 0).any()  # from both sides
 
 
-@pytest.mark.parametrize("name", priors.names())
+@pytest.mark.parametrize("name", priors.PRIORS.names())
 def test_every_catalog_prior_has_sources_and_draws_what_there_is(name) -> None:
     prior = priors.named(name)
     assert set(prior.sources) == set(prior.quantities)

@@ -17,7 +17,7 @@ from sim.contact import Contact
 from sim.effects import EFFECTS
 from sim.limits import StrainLimits
 from sim.run.members import Crew
-from sim.run.reading import load, names, parse
+from sim.run.reading import SCENES, load, parse
 from sim.run.recipe import Shape
 from sim.run.tables import Range, Scale
 
@@ -29,8 +29,8 @@ def read(text: str, folder: Path = Path()):
 
 
 def test_every_recipe_of_the_catalog_is_read() -> None:
-    assert {"flag-search-space", "hanging-cloth"} <= set(names())
-    for name in names():
+    assert {"flag-search-space", "hanging-cloth"} <= set(SCENES.names())
+    for name in SCENES.names():
         canonical(load(name).identity())
 
 

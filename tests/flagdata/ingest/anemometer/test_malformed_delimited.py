@@ -133,7 +133,7 @@ REFUSED = [
         {
             "content": csv(ROW),
             "error": FlagdataError,
-            "says": "no recipe file",
+            "says": "no such recipe file",
             "options": {"recipe": "/nowhere/x.toml"},
         },
         id="recipe-file-absent",

@@ -39,7 +39,7 @@ def by_recipe(tmp_path: Path, recipe: str, text: str, **options: object) -> Wind
     return read_log(path, WindOptions(recipe=str(tmp_path / "r.toml"), **options))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", recipes.names())
+@pytest.mark.parametrize("name", recipes.SENSORS.names())
 def test_every_recipe_of_the_catalog_loads_and_names_its_source(name: str) -> None:
     recipe = recipes.load(name)
     assert recipe.name == name
@@ -252,7 +252,7 @@ BAD: list[tuple[str, str, str, str]] = [
     ("check-without-column", "[sensor]", '[[check]]\nvalues = ["A"]\nabout = "x"\n[sensor]', "no column"),
     ("check-key", "[sensor]", '[[check]]\ncolum = 2\n[sensor]', "did you mean 'column'"),
     ("check-no-table", 'name = "mine"', 'check = [1]\nname = "mine"', "not a table"),
-    ("not-toml", "[time]", "[time", "not valid TOML"),
+    ("not-toml", "[time]", "[time", "not TOML"),
     ("directive", '"iso"', '"%Y-%m-%d %Q"', "unknown directive"),
 ]  # fmt: skip
 

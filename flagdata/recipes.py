@@ -1,0 +1,110 @@
+"""Recipes by name or by path: where the text of one is found. What it says is parsed by whoever knows its form.
+
+Each kind of recipe has a folder of `catalogs` with files NAME.toml. Wherever one is named, a path that ends in .toml
+names the user's own file in its place.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import InputError, NotFoundError, UnknownNameError
+
+_SUFFIX = ".toml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """A recipe that was found, not parsed yet.
+
+    Attributes:
+        name: in the catalog, or of the file without its suffix.
+        data: what the file holds.
+        folder: that files which it names are relative to; the working directory for the catalog's.
+        where: for error messages.
+    """
+
+    name: str
+    data: bytes
+    folder: Path
+    where: str
+
+    @property
+    def text(self) -> str:
+        """The file's text.
+
+        Raises:
+            InputError: it is not UTF-8.
+        """
+        try:
+            return self.data.decode("utf-8")
+        except UnicodeDecodeError:
+            raise InputError("the recipe is not UTF-8 text", where=self.where, fix="save it as UTF-8") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shelf:
+    """The recipes of one kind.
+
+    Args:
+        folder: of `catalogs`.
+        noun: what one is called in error messages ("data set").
+    """
+
+    folder: str
+    noun: str
+
+    def names(self) -> tuple[str, ...]:
+        """Recipes of the catalog, sorted."""
+        entries = (entry.name for entry in (files("catalogs") / self.folder).iterdir())
+        return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
+
+    def named(self, name: str, *, where: str | None = None) -> Found:
+        """The recipe of that name in the catalog.
+
+        Args:
+            where: the name stands, for the error message.
+
+        Raises:
+            UnknownNameError: no such name; the nearest is suggested.
+        """
+        known = self.names()
+        if name not in known:
+            raise UnknownNameError.of(self.noun, name, known, where=where)
+        data = (files("catalogs") / self.folder / f"{name}{_SUFFIX}").read_bytes()
+        return Found(name=name, data=data, folder=Path(), where=f"{self.noun} {name!r}")
+
+    def find(self, source: str) -> Found:
+        """The recipe of that name in the catalog, or the file of that path, which ends in .toml.
+
+        Raises:
+            UnknownNameError: no such name; the nearest is suggested.
+            NotFoundError: no such file.
+            InputError: it cannot be read.
+        """
+        if not source.endswith(_SUFFIX):
+            return self.named(source)
+        path = Path(source)
+        if not path.is_file():
+            raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"the recipe cannot be read: {error.strerror}", where=source, fix="check it") from None
+        return Found(name=path.stem, data=data, folder=path.parent, where=source)
+
+
+def parsed(text: str, *, where: str) -> dict[str, Any]:
+    """The tables of a recipe's text.
+
+    Raises:
+        InputError: it is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
