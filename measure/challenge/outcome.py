@@ -125,14 +125,13 @@ class Outcome:
 
     @property
     def control_gap(self) -> float | None:
-        """By how much the wrong-effect control is worse than the effect, in half-widths of the interval of the paired
-        reduction; means over the comparisons. None where one effect was not named or there is no control."""
+        """By how much the wrong-effect control is worse than the effect, in half-widths of the interval of their paired
+        difference; means over the comparisons. None where one effect was not named or there is no control."""
         if len(self.named) < 1 or self.conclusion is Conclusion.ONE_OF:
             return None
-        entries = [entry for entry in self.comparisons if entry["control"] is not None]
-        gaps = [entry["control"]["value"] - entry["after"]["value"] for entry in entries]
-        widths = [(entry["reduction"]["high"] - entry["reduction"]["low"]) / 2 for entry in entries]
-        return fmean(gaps) / fmean(widths) if entries and fmean(widths) > 0 else None
+        entries = [entry["apart"] for entry in self.comparisons if entry["apart"] is not None]
+        widths = [(entry["high"] - entry["low"]) / 2 for entry in entries]
+        return fmean(entry["value"] for entry in entries) / fmean(widths) if entries and fmean(widths) > 0 else None
 
     def strength(self, acting: Acting) -> Mapping[str, Any] | None:
         """The estimate of an effect's strength, where it was weighed with that parameter."""

@@ -133,6 +133,16 @@ def withdrawn(judgement: Judgement) -> Judgement:
     return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)
 
 
+def tied(judgement: Judgement, control: Weighed) -> Judgement:
+    """The same, once a control has proved as good as the effect named, within errors, on unseen data."""
+    ranking = tuple(
+        replace(w, candidate=replace(w.candidate, why_not="")) if w.column == control.column else w
+        for w in judgement.ranking
+    )
+    named = (*judgement.named, control.column)
+    return replace(judgement, conclusion=Conclusion.ONE_OF, named=named, ranking=ranking)
+
+
 def _second(
     evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:

@@ -23,9 +23,9 @@ from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
 from measure.loop.alignment import aligned
-from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge, withdrawn
+from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge, tied, withdrawn
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
-from measure.loop.comparison import Predictions, compare, folds, predict
+from measure.loop.comparison import Predictions, Trial, compare, folds, predict
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
@@ -133,17 +133,22 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     reference = bank.reference(len(setting.segments), seed=options.seed)
     judgement = judge(evidence, reference, level=options.level)
     solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
-    comparisons = _comparisons(solved, options, tell)
-    if not _holds(comparisons):
-        solved = replace(solved, judgement=withdrawn(judgement))
-        comparisons = ()
+    trial = _trial(solved, options, tell)
+    if trial.failed:
+        judgement, trial = withdrawn(judgement), Trial()
+    elif trial.tied and solved.control is not None and len(judgement.named) == 1:
+        judgement = tied(judgement, solved.control[0])
     tell("before and after", 1, 1)
-    return _verdict(solved, bank, comparisons, options, began)
+    return _verdict(solved, judgement, bank, trial, options, began)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solved:
-    """A judged experiment, with the models fitted to it beyond the linear."""
+    """A judged experiment, with the models fitted to it beyond the linear.
+
+    Attributes:
+        judgement: on the linear evidence, before the models were run again.
+    """
 
     setting: Setting
     evidence: Evidence
@@ -222,17 +227,19 @@ def _null_duration(segments: Segments) -> float:
     return (each * round(segments.duration / segments.period) + segments.first + 1) * segments.period
 
 
-def _comparisons(solved: Solved, options: Options, tell: Stage) -> tuple[Comparison, ...]:
+def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     """Before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
     if larger is None:
-        return ()
+        return Trial()
     tell("before and after", 0, 1)
     control = solved.control
     floor = _floor(setting, larger.model, options)
     made: list[Comparison] = []
+    helped: list[Floats] = []
+    apart: list[Floats] = []
     left_out = folds(setting.segments, [float(u) for u in setting.speeds])
-    for fold in left_out:
+    for place, fold in enumerate(left_out):
         own = setting.segments.select(np.flatnonzero(fold.outside))
         models = [solved.base.without(fold.outside), larger.without(fold.outside)]
         models += [] if control is None else [control[1].without(fold.outside)]
@@ -245,16 +252,10 @@ def _comparisons(solved: Solved, options: Options, tell: Stage) -> tuple[Compari
                 control_name="" if control is None else control[0].candidate.effect,
             )
         )  # fmt: skip
-    return tuple(made)
-
-
-def _holds(comparisons: Sequence[Comparison]) -> bool:
-    """Whether the effect lowers the errors on unseen data, and by more than the wrong-effect control does."""
-    if not comparisons:
-        return True
-    before, after = sum(c.before.value**2 for c in comparisons), sum(c.after.value**2 for c in comparisons)
-    control = sum(c.control.value**2 for c in comparisons if c.control is not None)
-    return after < before and (control == 0 or after < control)
+        if len(left_out) == 1 or place < len(setting.speeds):  # the late thirds are in the recordings as well
+            helped.append(squared[0] - squared[1])
+            apart += [] if control is None else [squared[2] - squared[1]]
+    return Trial(comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None)
 
 
 def _floor(setting: Setting, model: Model, options: Options) -> tuple[NDArray[np.int64], Floats]:
@@ -273,18 +274,19 @@ def _floor(setting: Setting, model: Model, options: Options) -> tuple[NDArray[np
 
 
 def _verdict(
-    solved: Solved, bank: NullBank, comparisons: tuple[Comparison, ...], options: Options, began: float
+    solved: Solved, judgement: Judgement, bank: NullBank, trial: Trial, options: Options, began: float
 ) -> Verdict:
-    setting, judgement = solved.setting, solved.judgement
+    setting, larger = solved.setting, solved.larger if judgement.named else None
     before = _unseen(setting, solved.base)
-    after = None if solved.larger is None else _unseen(setting, solved.larger)
+    after = None if larger is None else _unseen(setting, larger)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
             statistic=judgement.statistic, null=[float(v) for v in solved.reference.largest],
             p_value=judgement.p_value, level=options.level, nulls=bank.words,
         ),
-        parameters=_parameters(solved), ranking=_ranking(solved), comparisons=comparisons,
+        parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
+        comparisons=trial.comparisons,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         assumptions=assumptions(setting.experiment),
         provenance={
@@ -314,11 +316,10 @@ def _unseen(setting: Setting, refined: Refined) -> Predictions:
     )
 
 
-def _ranking(solved: Solved) -> tuple[Candidate, ...]:
-    """The candidates; the first effect named with its strength beyond the linear."""
-    larger = solved.larger
+def _ranking(solved: Solved, judgement: Judgement, larger: Refined | None) -> tuple[Candidate, ...]:
+    """The candidates; those of the larger model with their strengths beyond the linear."""
     made: list[Candidate] = []
-    for weighed in solved.judgement.ranking:
+    for weighed in judgement.ranking:
         candidate = weighed.candidate
         if larger is not None and weighed.column in solved.acting:
             place = solved.acting.index(weighed.column)
@@ -338,12 +339,11 @@ def _named(judgement: Judgement) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _parameters(solved: Solved) -> tuple[Parameter, ...]:
+def _parameters(base: Refined, larger: Refined | None) -> tuple[Parameter, ...]:
     made: list[Parameter] = []
-    larger = solved.larger
-    for name, unit, value in _shown(solved.base.model.calibration):
+    for name, unit, value in _shown(base.model.calibration):
         place = [entry[0] for entry in THETA].index(name)
-        error = _scaled(solved.base.errors[place], name, value)
+        error = _scaled(base.errors[place], name, value)
         before = estimate(value, error, unit)
         if larger is None:
             made.append(Parameter(name=name, before=before, after=None, shift=None))

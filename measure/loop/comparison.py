@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -17,6 +17,8 @@ from measure.loop.verdict import Comparison, Estimate
 
 Floats = NDArray[np.float64]
 _LEVEL = 0.9
+_FAR = 2.0
+"""Standard errors by which an effect must be better than the control."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,6 +27,37 @@ class Fold:
 
     words: str
     outside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """Models run again on what they were not fitted to.
+
+    Attributes:
+        comparisons: one a fold.
+        helped: (segment,) squared distance before less after, each segment of the recordings left out in turn (of a
+            single recording: of its last third) [m²].
+        apart: (segment,) control less after; None without a control.
+    """
+
+    comparisons: tuple[Comparison, ...] = ()
+    helped: Floats = field(default_factory=lambda: np.zeros(0))
+    apart: Floats | None = None
+
+    @property
+    def failed(self) -> bool:
+        """Whether the effect lowers the errors not at all, or by no more than the control does."""
+        return bool(self.comparisons) and (self.helped.sum() <= 0 or (self.apart is not None and self.apart.sum() <= 0))
+
+    @property
+    def tied(self) -> bool:
+        """Whether the control cannot be told from the effect: by less than two standard errors."""
+        return bool(self.comparisons) and self.apart is not None and self.apart.sum() < _FAR * _total_error(self.apart)
+
+
+def _total_error(values: Floats) -> float:
+    """Standard error of a sum over segments."""
+    return float(np.std(values, ddof=1)) * math.sqrt(len(values)) if len(values) > 1 else math.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +128,7 @@ def compare(
         what=fold.words, frames=frames, before=root(before), after=root(after), reduction=paired(before, after),
         floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(before.mean()) else None,
         control=None if control is None else root(control), control_name=control_name,
+        apart=None if control is None else paired(control, after),
     )  # fmt: skip
 
 

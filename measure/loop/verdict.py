@@ -77,6 +77,7 @@ class Comparison:
         share: E_red = (before − after) / (before − oracle, or floor); None where before is not above it.
         control: after, with the same freedom spent on the best wrong effect.
         control_name: which.
+        apart: paired, control − after [m].
     """
 
     what: str
@@ -89,6 +90,7 @@ class Comparison:
     share: float | None
     control: Estimate | None
     control_name: str
+    apart: Estimate | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -79,6 +79,7 @@ def comparison(*, share: float | None = 0.9, after: float = 1e-3, control: float
         what="unseen", frames=100, before=estimate(5e-3, 1e-3), after=estimate(after, 1e-3),
         reduction=estimate(5e-3 - after, 1e-3), floor=estimate(5e-4, 1e-4), oracle=None, share=share,
         control=None if control is None else estimate(control, 1e-3), control_name="another",
+        apart=None if control is None else estimate(control - after, 1e-3),
     )  # fmt: skip
 
 
