@@ -65,6 +65,7 @@ class Build:
     """One build of a recipe into a lake.
 
     Args:
+        say: told what people should know meanwhile, a line each.
         device: where workers compute.
     """
 
@@ -72,6 +73,7 @@ class Build:
     recipe: DatasetRecipe
     client: Client
     bars: Bars
+    say: Callable[[str], None]
     branch: str = "main"
     device: str = "cpu"
     _new_sequences: int = field(default=0, init=False)
@@ -83,7 +85,7 @@ class Build:
         Raises:
             ConflictError: the branch has films of this name by another recipe.
             RefusedError: too many sequences fail.
-            WorkerError: workers kept dying.
+            WorkerError: workers kept dying, or all of them are gone.
             FlagdataError: a renderer, an asset or the disk failed.
         """
         begun = time.perf_counter()
@@ -117,7 +119,7 @@ class Build:
         """All pending members of the rolls once; those that fail are noted on their roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
         done: Simulated
-        for done in results(self.client, self._batches(todo)):
+        for done in results(self.client, self._batches(todo), say=self.say):
             roll = by_name[done.name]
             good = [outcome for outcome in done.outcomes if outcome.sequence is not None]
             for outcome in done.outcomes:
@@ -160,15 +162,15 @@ class Build:
             advance(len(films) - len(missing))
             waiting: list[Filmed] = []
             last = time.monotonic()
-            for done in results(self.client, self._shots(missing)):
-                waiting.append(done)
-                if len(waiting) >= COMMIT_FILMS or time.monotonic() - last > COMMIT_SECONDS:
-                    self._commit(waiting)
-                    advance(len(waiting))
-                    waiting, last = [], time.monotonic()
-            if waiting:
-                self._commit(waiting)
-                advance(len(waiting))
+            try:
+                for done in results(self.client, self._shots(missing), say=self.say):
+                    waiting.append(done)
+                    if len(waiting) >= COMMIT_FILMS or time.monotonic() - last > COMMIT_SECONDS:
+                        ready, waiting = waiting, []
+                        advance(self._commit(ready))
+                        last = time.monotonic()
+            finally:  # what is done stays, also where workers are lost or the build is stopped
+                advance(self._commit(waiting))
         return films
 
     def _refuse_mixture(self, own: set[str]) -> None:
@@ -189,7 +191,10 @@ class Build:
             sequence = read_meshes(self.lake.object_path(objects[film.sequence]))
             yield jobs.film, (self.recipe, film, sequence, self.device)
 
-    def _commit(self, filmed: Sequence[Filmed]) -> None:
+    def _commit(self, filmed: Sequence[Filmed]) -> int:
+        """Lay films into the lake; returns how many."""
+        if not filmed:
+            return 0
         message = f"build {self.recipe.name}: {len(filmed)} films"
         with self.lake.transaction(message, branch=self.branch) as transaction:
             for done in filmed:
@@ -202,6 +207,7 @@ class Build:
                 for clip in clip_rows(record, recording):
                     transaction.add(clip)
         self._new_films += len(filmed)
+        return len(filmed)
 
     def _clips(self, films: Sequence[Film]) -> int:
         frames = self.recipe.simulation.time.frames

@@ -4,26 +4,32 @@ from __future__ import annotations
 
 import logging
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from itertools import islice
 from typing import Any, cast
 
-from distributed import Client, LocalCluster, as_completed
+from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
 
 from flagdata.errors import FlagdataError, NotFoundError, UsageError
 
 _CONNECT_TIMEOUT = 30.0  # s
 _AHEAD = 2  # jobs a thread, so that none waits for the next
+_POLL = 0.05  # s
+_LOOK = 1.0  # s, from one look at who works to the next
+PATIENCE = 120.0
+"""How long jobs wait where nobody works, before that is an error [s]."""
+_AGAIN = "then give the command again: it goes on from the last commit"
 
 Job = tuple[Callable[..., Any], Sequence[Any]]
 """A function of this package and its arguments."""
 
 
 class WorkerError(FlagdataError):
-    """Workers died over a job."""
+    """Workers died over a job, or all of them are gone."""
 
     kind = "workers-lost"
 
@@ -103,18 +109,58 @@ def _threads_per_process(count: int) -> Iterator[None]:
 
 
 def threads(client: Client) -> int:
-    """Of all workers together, at least 1."""
-    return max(1, sum(cast("dict[str, int]", client.nthreads()).values()))
-
-
-def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
-    """The jobs' results as they come; a few wait beside those that run, so that memory stays bounded.
-
-    A job whose worker dies is done again by another one, as often as Dask allows failures (three times). Leaving the
-    iteration early cancels what still runs.
+    """Of all workers together, 0 where there are none.
 
     Raises:
-        WorkerError: workers kept dying over one job.
+        WorkerError: the scheduler does not answer.
+    """
+    try:
+        return sum(cast("dict[str, int]", client.nthreads()).values())
+    except OSError:
+        raise _lost() from None
+
+
+def _lost() -> WorkerError:
+    return WorkerError("the scheduler is gone", where="dask", fix=f"start it again, {_AGAIN}")
+
+
+def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> Future:
+    """The next job that is done.
+
+    Raises:
+        WorkerError: nobody has worked for `PATIENCE`, or the scheduler is gone.
+    """
+    looked = time.monotonic()
+    alone: float | None = None
+    while not running.has_ready():
+        time.sleep(_POLL)
+        now = time.monotonic()
+        if now - looked < _LOOK:
+            continue
+        looked = now
+        if threads(client):
+            if alone is not None:
+                say("there are workers again")
+            alone = None
+        elif alone is None:
+            alone = now
+            say(f"all workers are gone; waiting {PATIENCE:g} s for new ones")
+        elif now - alone > PATIENCE:
+            raise WorkerError(f"no workers for {PATIENCE:g} s", where="dask", fix=f"see that workers run, {_AGAIN}")
+    return next(running)
+
+
+def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
+    """The jobs' results as they come; a few wait beside those that run, so that memory stays bounded.
+
+    A job whose worker dies is done again by another one, as often as Dask allows failures (three times). While there
+    are no workers, the jobs wait for new ones, for `PATIENCE`. Leaving the iteration early cancels what still runs.
+
+    Args:
+        say: told, as a line for people, that nobody works and that somebody does again.
+
+    Raises:
+        WorkerError: workers kept dying over one job; no workers for `PATIENCE`; the scheduler is gone.
         FlagdataError: a job failed; its own error.
     """
     waiting = iter(jobs)
@@ -122,14 +168,17 @@ def results(client: Client, jobs: Iterable[Job]) -> Iterator[Any]:
 
     def fill() -> None:
         """Workers may come and go meanwhile."""
-        for function, arguments in islice(waiting, max(0, threads(client) * _AHEAD - running.count())):
+        for function, arguments in islice(waiting, max(0, max(1, threads(client)) * _AHEAD - running.count())):
             running.add(client.submit(function, *arguments, pure=False))
 
     try:
         fill()
-        for future in running:
+        while not running.is_empty():
+            future = _next(client, running, say)
             try:
                 result = future.result()
+            except CancelledError:
+                raise _lost() from None
             except KilledWorker as error:
                 raise WorkerError(
                     f"workers kept dying over the same job: {error}", where="dask",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -79,7 +80,9 @@ def build(
 
     lake = _lake(lake_path) or _made(lake_path)
     with connected(scheduler, workers=workers or _cores()) as client:
-        report = Build(lake=lake, recipe=loaded, client=client, bars=_bar, branch=branch, device=device).run()
+        report = Build(
+            lake=lake, recipe=loaded, client=client, bars=_bar, say=_beside_bar, branch=branch, device=device
+        ).run()
     written = write_card(lake, loaded, branch=branch, path=card)
     if as_json:
         document("build", {"lake": str(lake.path), "recipe": loaded.name, "card": str(written), **vars(report)})
@@ -95,6 +98,13 @@ def build(
 
 def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Advance]:
     return progress(total, label=label, unit=unit)
+
+
+def _beside_bar(text: str) -> None:
+    """A line for people while a bar is shown."""
+    from tqdm import tqdm
+
+    tqdm.write(text, file=sys.stderr)
 
 
 def _lake(path: str) -> Lake | None:
@@ -120,7 +130,7 @@ def _workers(scheduler: str | None, workers: int | None) -> int:
     from sim.datasets.cluster import connected, threads
 
     with connected(scheduler, workers=0) as client:
-        return threads(client)
+        return max(1, threads(client))
 
 
 def _cores() -> int:

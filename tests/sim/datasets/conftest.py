@@ -98,29 +98,34 @@ def _replaced(text: str, changes: dict[str, str]) -> str:
 
 
 class Cluster:
-    """A scheduler and two workers in processes of their own, on loopback."""
+    """A scheduler and workers in processes of their own, on loopback."""
 
-    def __init__(self, folder: Path) -> None:
-        file = folder / "scheduler.json"
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"}
-        start = [sys.executable, "-m", "dask"]
-        options = ["--scheduler-file", str(file), "--no-dashboard"]
-        command = [*start, "scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "3600", *options]
-        self.scheduler = subprocess.Popen(command, env=environment, **quiet)
-        worker = [*start, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-        worker += ["--death-timeout", "60"]  # nothing stays behind a test run that is killed
-        self.workers = [
-            subprocess.Popen([*worker, "--local-directory", str(folder / f"worker-{i}")], env=environment, **quiet)
-            for i in range(2)
-        ]
-        self.file = file
+    def __init__(self, folder: Path, *, workers: int) -> None:
+        self._folder = folder
+        self._file = folder / "scheduler.json"
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "3600")
+        self.workers: list[subprocess.Popen[bytes]] = []
+        for _ in range(workers):
+            self.add_worker()
+
+    def add_worker(self) -> None:
+        place = str(self._folder / f"worker-{len(self.workers)}")
+        # The last: nothing stays behind a test run that is killed.
+        options = ("--nthreads", "1", "--no-nanny", "--local-directory", place, "--death-timeout", "60")
+        self.workers.append(self._start("worker", *options))
+
+    def _start(self, role: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "dask", role, "--scheduler-file", str(self._file), "--no-dashboard", *options]
+        return subprocess.Popen(
+            command, env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"},
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
 
     @property
     def address(self) -> str:
         for _ in range(600):
             with suppress(OSError, ValueError, KeyError):
-                return json.loads(self.file.read_text())["address"]
+                return json.loads(self._file.read_text())["address"]
             time.sleep(0.1)
         raise TimeoutError("the scheduler did not start")
 
@@ -132,7 +137,7 @@ class Cluster:
 
 @pytest.fixture(scope="session")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    running = Cluster(tmp_path_factory.mktemp("dask"))
+    running = Cluster(tmp_path_factory.mktemp("dask"), workers=2)
     try:
         yield running
     finally:
@@ -177,6 +182,17 @@ class Builds:
         rows = Lake.open(lake).rows(columns=columns).to_pylist()
         assert len({row["artifact"] for row in rows}) == len(rows)
         return {row["artifact"]: tuple(str(row[column]) for column in columns) for row in rows}
+
+
+@pytest.fixture
+def doomed(tmp_path: Path) -> Iterator[Cluster]:
+    """A cluster of one worker, to be killed."""
+    (tmp_path / "dask").mkdir()
+    running = Cluster(tmp_path / "dask", workers=1)
+    try:
+        yield running
+    finally:
+        running.close()
 
 
 @pytest.fixture(scope="session")

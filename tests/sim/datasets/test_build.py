@@ -104,6 +104,37 @@ def test_a_killed_workers_jobs_are_done_by_the_other(
     assert builds.rows(tmp_path / "lake") == builds.rows(built)
 
 
+def test_without_workers_a_build_waits_says_so_and_ends_and_goes_on_when_there_are_some(
+    recipe_file: Path, doomed: Any, built: Path, builds: Any, tmp_path: Path
+) -> None:
+    own, lake = type(builds)(doomed), tmp_path / "lake"
+    process = own.start(recipe_file, lake)
+    own.wait_for(process, lake, SEQUENCES + 2)
+    doomed.workers[0].kill()
+    said = process.communicate(timeout=300)[1].decode()
+    assert process.returncode == 1
+    assert "all workers are gone; waiting 4 s for new ones" in said
+    assert "no workers for 4 s" in said
+    assert "it goes on from the last commit" in said
+    kept = own.rows(lake)
+    assert len(kept) >= SEQUENCES + 2
+    doomed.add_worker()
+    own.finish(own.start(recipe_file, lake))
+    assert own.rows(lake) == builds.rows(built)
+    assert kept.items() <= builds.rows(built).items()
+
+
+def test_without_its_scheduler_a_build_ends(recipe_file: Path, doomed: Any, builds: Any, tmp_path: Path) -> None:
+    own, lake = type(builds)(doomed), tmp_path / "lake"
+    process = own.start(recipe_file, lake)
+    own.wait_for(process, lake, SEQUENCES)
+    doomed.scheduler.kill()
+    said = process.communicate(timeout=300)[1].decode()
+    assert process.returncode == 1
+    assert "the scheduler is gone" in said
+    assert "it goes on from the last commit" in said
+
+
 def test_without_a_scheduler_it_is_built_by_processes_of_this_machine(
     recipe_file: Path, built: Path, builds: Any, tmp_path: Path
 ) -> None:
