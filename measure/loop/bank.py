@@ -30,6 +30,8 @@ from measure.observe.trajectory import Floats, Specimen
 from sim.integrate.split import SplitEuler
 
 BATCH = 16
+WINDS = 4
+"""Recordings of one cloth, so that a batch holds four null experiments."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
@@ -54,20 +56,25 @@ def prior_batch(
     speeds: tuple[float, float],
     seed: int,
 ) -> NullBatch:
-    """A batch over the priors: density and bending log-uniform about the nominal ones, wind uniform between `speeds`.
+    """Null experiments over the priors: of four cloths, each in four winds.
 
-    Half of the batches have little damping and explicit steps, half the whole range.
+    Density and bending are log-uniform about the nominal ones, damping log-uniform: half of the batches have little of
+    it and explicit steps, half the whole range. The winds of a cloth are drawn one from each quarter of `speeds`.
     """
     rng = stream(seed, "null", "prior")
     gentle = rng.random() < 0.5
     damping = (_DAMPING[0], 1e-3 if gentle else _DAMPING[1])
-    calibrations = tuple(
+    cloths = BATCH // WINDS
+    made = [
         Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, damping))
-        for _ in range(BATCH)
-    )
+        for _ in range(cloths)
+    ]
+    shares = (np.arange(WINDS) + rng.random((cloths, WINDS))) / WINDS
     return NullBatch(
-        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=calibrations,
-        speeds=tuple(float(u) for u in rng.uniform(*speeds, BATCH)), seed=child_seed(seed, "null", "batch"),
+        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise,
+        calibrations=tuple(cloth for cloth in made for _ in range(WINDS)),
+        speeds=tuple(float(u) for u in (speeds[0] + (speeds[1] - speeds[0]) * shares).ravel()),
+        seed=child_seed(seed, "null", "batch"),
     )  # fmt: skip
 
 

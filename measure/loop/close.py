@@ -48,7 +48,6 @@ _FLOOR_COPIES = 4
 _KINDS = 12
 FEWEST_NULLS = _KINDS * banks.BATCH
 """So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
-_PLENTY = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,8 +221,8 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
 
 
 def _null_duration(segments: Segments) -> float:
-    """Of a null recording, so that those of a batch hold more segments than the data [s]."""
-    each = max(2, math.ceil(_PLENTY * len(segments) / banks.BATCH))
+    """Of a null recording, so that those of one cloth hold as many segments as the data [s]."""
+    each = max(2, math.ceil(len(segments) / banks.WINDS))
     return (each * round(segments.duration / segments.period) + segments.first + 1) * segments.period
 
 

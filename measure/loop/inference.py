@@ -2,13 +2,15 @@
 
 Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null recordings, whose own
 δ is known: the calibration they were simulated with. U is the wind's speed. Recordings of one cloth share the numerics
-they differ from the fit's by, so that μ has a part in common to a set: nuisance columns, learnt from the nulls as well.
+they differ from the fit's by, and what is not linear in its calibration, so that μ has a part in common to an
+experiment: nuisance columns, learnt from the nulls as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +31,9 @@ class NullModel:
 
     Attributes:
         coefficients: (feature, column) of μ in 1, U, U².
-        covariance: (column, column) Σ of one segment, about the mean of its numerics.
-        shifts: (shift, column) how μ moves from one set of numerics to another: principal directions, each as long as
-            its standard deviation.
+        covariance: (column, column) Σ of one segment, about the mean of its experiment.
+        shifts: (shift, column) how μ moves from one experiment to another: principal directions, each as long as its
+            standard deviation.
     """
 
     coefficients: Floats
@@ -45,9 +47,9 @@ class NullModel:
         features = _features(nulls.speeds)
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
         left = clean - features @ coefficients
-        means = np.stack([left[nulls.numerics == index].mean(axis=0) for index in np.unique(nulls.numerics)])
-        shared = means[np.searchsorted(np.unique(nulls.numerics), nulls.numerics)]
-        within = left - shared
+        experiment = nulls.experiment
+        means = np.stack([left[experiment == index].mean(axis=0) for index in range(experiment.max() + 1)])
+        within = left - means[experiment]
         covariance = within.T @ within / max(len(left) - len(means) - features.shape[1], 1)
         covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(left))
         return cls(coefficients=coefficients, covariance=covariance, shifts=_principal(means, covariance))
@@ -72,6 +74,12 @@ class Nulls:
     speeds: Floats
     offsets: Floats
     numerics: NDArray[np.int64]
+
+    @cached_property
+    def experiment(self) -> NDArray[np.int64]:
+        """(segment,) recordings of one cloth, by one numerics: 0, 1, …"""
+        _, index = np.unique(np.c_[self.numerics, self.offsets], axis=0, return_inverse=True)
+        return index.reshape(-1)
 
     @property
     def clean(self) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -54,38 +55,35 @@ class NullBank:
         return NullModel.fit(self.nulls)
 
     def reference(self, segments: int, *, seed: int) -> Reference:
-        """Statistics of groups like the data: so many segments, of recordings of one kind of numerics.
+        """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
+        that has seen none of its numerics.
 
         Raises:
-            InputError: no kind has that many.
+            InputError: no experiment has that many.
         """
         rng = stream(seed, "null", "groups")
+        each = math.ceil(_GROUPS / len(np.unique(self.nulls.experiment)))
         shares: list[Floats] = []
         left: list[float] = []
-        kinds = np.unique(self.nulls.numerics)
-        for fold in range(2):
-            inside = np.isin(self.nulls.numerics, kinds[fold::2])
-            model = NullModel.fit(self.nulls.select(inside))
-            outside = self.nulls.select(~inside)
-            evidence = Evidence.of_nulls(outside, model)
-            places = [
-                [
+        for kind in np.unique(self.nulls.numerics):
+            own = self.nulls.numerics == kind
+            outside = self.nulls.select(own)
+            evidence = Evidence.of_nulls(outside, NullModel.fit(self.nulls.select(~own)))
+            for index in range(outside.experiment.max() + 1):
+                places = [
                     np.flatnonzero(evidence.recording == r)
-                    for r in np.unique(evidence.recording[outside.numerics == kind])
+                    for r in np.unique(evidence.recording[outside.experiment == index])
                 ]
-                for kind in np.unique(outside.numerics)
-            ]
-            for _ in range(_GROUPS // 2):
-                own = places[rng.integers(len(places))]
-                chosen = np.concatenate([own[index] for index in rng.permutation(len(own))])[:segments]
-                if len(chosen) < segments:
-                    raise InputError(
-                        f"{segments} segments of data against {len(chosen)} nulls of one kind", where="null bank",
-                        fix="simulate longer nulls, or give shorter recordings",
-                    )  # fmt: skip
-                picked = evidence.select(chosen)
-                shares.append(unscaled(picked, self.columns))
-                left.append(picked.fit(()).left)
+                for _ in range(each):
+                    chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
+                    if len(chosen) < segments:
+                        raise InputError(
+                            f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
+                            fix="simulate longer nulls, or give shorter recordings",
+                        )  # fmt: skip
+                    picked = evidence.select(chosen)
+                    shares.append(unscaled(picked, self.columns))
+                    left.append(picked.fit(()).left)
         spread = np.maximum(np.mean(shares, axis=0), _NOTHING)
         return Reference(shares=np.array(shares), spread=spread, left=np.array(left))
 

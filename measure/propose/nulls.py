@@ -12,17 +12,18 @@ import numpy as np
 import torch
 
 from flagdata.rng import child_seed
-from measure.loop.bank import BATCH, evaluate, prior_batch
+from measure.loop.bank import BATCH, WINDS, prior_batch
 from measure.loop.close import Setting, Stage
-from measure.loop.columns import THETA, Column
+from measure.loop.columns import THETA, Calibration, Column
+from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics
+from measure.propose.sensitivities import statistics
+from sim.integrate.split import SplitEuler
 
 _KINDS = 12
-_PLENTY = 1.5
-"""A kind of numerics has so many times the segments that a group of them takes."""
 
 
 def names(columns: Sequence[Column]) -> tuple[str, ...]:
@@ -34,7 +35,7 @@ def batches(setting: Setting, *, nulls: int, seed: int) -> list[NullBatch]:
     """Null recordings over the priors of the cloth, of the winds of an experiment; of 12 numerics or more."""
     first = setting.experiment.recordings[0]
     segments = setting.segments
-    each = max(2, math.ceil(_PLENTY * len(segments) / BATCH))
+    each = max(2, math.ceil(len(segments) / WINDS))
     return [
         prior_batch(
             setting.experiment.specimen, markers=first.markers, rate=first.rate, noise=first.noise,
@@ -61,6 +62,20 @@ def bank(planned: Sequence[NullBatch], columns: Sequence[Column], *, workers: in
             stage("nulls", done, len(planned))
     words = f"{BATCH * len(planned)} recordings of {len(planned)} meshes and methods, over the priors of the cloth"
     return NullBank(nulls=joined(parts), columns=names(columns), duration=durations[0], words=words)
+
+
+def evaluate(batch: NullBatch, numerics: int, columns: Sequence[Column]) -> tuple[Nulls, float]:
+    """Simulate a batch and take its statistics along columns, from the nominal calibration; with the duration of a
+    segment [s]."""
+    segments = Segments.of(batch.simulate())
+    forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
+    found = statistics(forecaster, segments, columns)
+    offsets = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
+    nulls = Nulls(
+        statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
+        numerics=np.full(len(found.recording), numerics),
+    )  # fmt: skip
+    return nulls, segments.duration
 
 
 def joined(parts: Sequence[Nulls]) -> Nulls:

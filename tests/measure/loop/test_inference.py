@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import chi2, kstest
+from scipy.stats import chi2, kstest, uniform
 
+from flagdata.errors import InputError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.inference import Evidence, NullModel, Nulls, fluctuation, gains
+from measure.loop.reference import GUSTS, NullBank
 from measure.loop.statistics import Statistics
 
 Floats = NDArray[np.float64]
-COLUMNS, RECORDINGS, SEGMENTS = 8, 160, 4
+COLUMNS, KINDS, CLOTHS, WINDS, SEGMENTS = 8, 20, 2, 4, 4
+RECORDINGS = KINDS * CLOTHS * WINDS
 
 
 class World:
@@ -38,11 +41,11 @@ class World:
         )
 
     def nulls(self) -> Nulls:
-        kinds = np.repeat(np.arange(20), RECORDINGS // 20)
-        offsets = self.rng.normal(size=(RECORDINGS, len(THETA))) * PRIOR
+        kinds = np.repeat(np.arange(KINDS), CLOTHS * WINDS)
+        offsets = np.repeat(self.rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS, axis=0)
         delta = np.concatenate([offsets, np.zeros((RECORDINGS, COLUMNS - len(THETA)))], axis=1)
         speeds = self.rng.uniform(3, 8, RECORDINGS)
-        shift = self.rng.normal(size=20)[kinds]
+        shift = np.repeat(self.rng.normal(size=KINDS * CLOTHS), WINDS)
         own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
         return Nulls(
             statistics=own, speeds=speeds[own.recording], offsets=offsets[own.recording], numerics=kinds[own.recording]
@@ -75,9 +78,9 @@ def effect(strength: float, column: int = 5) -> Floats:
 def test_the_null_model_finds_mean_and_covariance(world: World, null: NullModel) -> None:
     speeds = np.array([3.0, 5.0, 8.0])
     features = np.stack([np.ones(3), speeds, speeds**2], axis=1)
-    # Twenty kinds of numerics, whose shift has deviation 1: 1/√20 of the direction, twice that at a parabola's ends;
-    # three deviations, and as many of the noise of 640 segments.
-    bound = 6 / 20**0.5 * np.abs(world.direction) + 0.5
+    # Forty experiments, whose shift has deviation 1: 1/√40 of the direction, twice that at a parabola's ends; three
+    # deviations, and as many of the noise of 640 segments.
+    bound = 6 / 40**0.5 * np.abs(world.direction) + 0.5
     assert (np.abs(null.mean(speeds) - features @ world.slopes) < bound).all()
     ratio = np.diag(null.covariance) / np.diag(world.covariance)
     np.testing.assert_allclose(ratio, 1.0, atol=0.4)  # 5 % by 640 segments, more by the inflation
@@ -87,6 +90,34 @@ def test_the_null_model_finds_how_numerics_shift_the_mean(world: World, null: Nu
     first = null.shifts[0]
     cosine = first @ world.direction / np.linalg.norm(first) / np.linalg.norm(world.direction)
     assert abs(cosine) > 0.9
+
+
+def test_recordings_of_one_cloth_by_one_numerics_are_one_experiment(world: World) -> None:
+    nulls = world.nulls()
+    together = nulls.experiment[:, None] == nulls.experiment[None, :]
+    place = np.arange(len(nulls.speeds)) // (WINDS * SEGMENTS)
+    assert (together == (place[:, None] == place[None, :])).all()
+
+
+def test_p_values_of_nulls_are_uniform() -> None:
+    world = World(3)
+    columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
+    bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
+    null, reference = bank.model(), bank.reference(3 * SEGMENTS, seed=0)
+    found = []
+    for _ in range(150):
+        data = world.data(null, effect(0.0))
+        found.append(reference.p_family(float(reference.statistics(data, columns).max())))
+    # Of 150 draws against 40 experiments: their quantiles are themselves uncertain by 1/√40 at the most.
+    assert kstest(found, uniform.cdf).statistic < 2 / 40**0.5
+    assert np.mean(np.array(found) <= 0.05) < 0.05 + 3 * (0.05 / 40) ** 0.5
+
+
+def test_a_bank_of_shorter_experiments_than_the_data_is_refused(world: World) -> None:
+    columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
+    bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
+    with pytest.raises(InputError, match="17 segments"):
+        bank.reference(WINDS * SEGMENTS + 1, seed=0)
 
 
 def test_strengths_are_found_within_their_errors(world: World, null: NullModel) -> None:

@@ -28,7 +28,7 @@ from sim.material import named
 from sim.mesh import grid
 
 RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)
-KINDS, RECORDINGS = 6, 8
+KINDS, CLOTHS, RECORDINGS = 6, 2, 8
 PUSH = 5.0  # m/s²; half a flag's weight, so that five unseen segments show it
 
 
@@ -93,13 +93,14 @@ def bank(specimen: Specimen, columns: tuple[EffectColumn, ...]) -> NullBank:
     for seed in range(KINDS):
         rng = stream(seed, "test", "nulls")
         # Damping beyond 1 ms: the implicit method, which is the cheaper one here.
-        calibrations = [
+        cloths = [
             Calibration(
                 density=float(rng.uniform(0.8, 1.25)), bending=float(rng.uniform(0.4, 2.5)),
                 damping=float(rng.uniform(1.1e-3, 4e-3)),
             )
-            for _ in range(RECORDINGS)
+            for _ in range(CLOTHS)
         ]  # fmt: skip
+        calibrations = [cloth for cloth in cloths for _ in range(RECORDINGS // CLOTHS)]
         speeds = [float(u) for u in rng.uniform(3.2, 6.5, RECORDINGS)]
         made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, columns)
         parts.append(made)
