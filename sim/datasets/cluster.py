@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
+from distributed.utils import silence_logging_cmgr
 
 from flagdata.errors import FlagdataError, NotFoundError, UsageError
 
@@ -53,7 +54,7 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
                 f"no scheduler answers: {error}", where=scheduler,
                 fix="start one with dask scheduler, and workers with dask worker ADDRESS",
             ) from None  # fmt: skip
-        with client:
+        with silence_logging_cmgr(logging.CRITICAL, "distributed.client"), client:  # errors here say what is wrong
             _check(client, where=scheduler)
             yield client
         return
@@ -112,8 +113,10 @@ def threads(client: Client) -> int:
     """Of all workers together, 0 where there are none.
 
     Raises:
-        WorkerError: the scheduler does not answer.
+        WorkerError: the connection to the scheduler was lost, and with it all jobs.
     """
+    if client.status != "running":
+        raise _lost()
     try:
         return sum(cast("dict[str, int]", client.nthreads()).values())
     except OSError:
