@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from flagdata.errors import UsageError
 from measure.propose.outcome import Outcome, Strength
-from measure.propose.terms import FIELDS, SHAPES
+from measure.propose.terms import MASS, Term, TermColumn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,10 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
     short = outcome.proposed_from[:12]
     class_name = "".join(word.capitalize() for part in parts for word in part["name"].split("_"))
     module = f"proposed_{short}"
+    forces, masses = [p for p in parts if not p["mass"]], [p for p in parts if p["mass"]]
+    pieces = (("FieldEffect",) if forces else ()) + (("Flat",) if masses else ()) + (("Seen",) if forces else ())
     values: Mapping[str, Any] = {
+        "forces": forces, "masses": masses, "pieces": ", ".join([*pieces, *(["heavier"] if masses else [])]),
         "title": _sentence([s.words for s in outcome.strengths]), "data": outcome.proposed_from, "strengths": parts,
         "class_name": class_name, "module": module, "name": f"proposed-{short}",
         "source": f"from zero to the fit and its interval beyond; fitted to data {short}",
@@ -64,16 +67,13 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
 
 def _part(strength: Strength) -> dict[str, Any]:
     """What the template needs of a strength whose name is `field_shape`."""
-    found = [(f, s) for f in FIELDS for s in SHAPES if f"{f}_{s}" == strength.name]
-    if not found:
-        raise UsageError(
-            f"{strength.name!r} is no term of the dictionary", where="proposal", fix="write proposals of terms only"
-        )
-    (field, shape), estimate = found[0], strength.estimate
+    term, estimate = Term.named(strength.name), strength.estimate
     reach = abs(estimate.high - estimate.low)
-    prior = (min(0.0, estimate.value - reach), max(0.0, estimate.value + reach))
+    least, _ = TermColumn.of(term).described.admissible
+    prior = (max(least, min(0.0, estimate.value - reach)), max(0.0, estimate.value + reach))
     return {
-        "name": strength.name, "field": field, "shape": shape, "unit": estimate.unit, "words": strength.words,
+        "name": strength.name, "field": term.field, "shape": term.at.code, "mass": term.field == MASS,
+        "unit": estimate.unit, "words": strength.words,
         "value": f"{estimate.value:.6g}", "low": f"{estimate.low:.3g}", "high": f"{estimate.high:.3g}",
         "level": f"{100 * estimate.level:.0f} %", "prior": tuple(f"{v:#.4g}" for v in prior),
     }  # fmt: skip

@@ -88,4 +88,5 @@ def joined(parts: Sequence[Nulls]) -> Nulls:
     return Nulls(
         statistics=Statistics.joined(own), speeds=np.concatenate([p.speeds for p in parts]),
         offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
+        noise=np.concatenate([p.noise for p in parts]),
     )  # fmt: skip

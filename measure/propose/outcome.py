@@ -70,6 +70,12 @@ class Retest:
         segments: how many.
         before, after: of each model.
         reduction: paired, before − after.
+        floor: of the larger model on data simulated from it with other numerics: differences below are not effects.
+        share: of what the model before leaves above the floor, in squares, that the proposal takes away; None where it
+            leaves nothing above.
+        control: after, with the same freedom spent on terms of other directions; None where there are none.
+        apart: paired, control − after.
+        control_names: of those terms.
     """
 
     what: str
@@ -77,6 +83,26 @@ class Retest:
     before: Estimate
     after: Estimate
     reduction: Estimate
+    floor: Estimate
+    share: float | None
+    control: Estimate | None
+    apart: Estimate | None
+    control_names: tuple[str, ...]
+
+    @property
+    def decided(self) -> tuple[Decision, str]:
+        """Whether the proposal is kept, and why: errors must fall beyond their interval, and below the control's."""
+        if self.reduction.low <= 0:
+            return Decision.REJECTED, "errors on untouched data are not lower beyond their interval"
+        lower = "errors on untouched data are lower, beyond their interval"
+        if self.apart is None:
+            return Decision.KEPT, f"{lower}; there was no term of another direction to compare with"
+        wrong = " and ".join(self.control_names)
+        if self.apart.value <= 0:
+            return Decision.REJECTED, f"{lower}, but the same freedom spent on {wrong} lowers them as much"
+        if self.apart.low <= 0:
+            return Decision.KEPT, f"{lower}; its form is open: {wrong} cannot be told from it"
+        return Decision.KEPT, f"{lower}, and lower than with the same freedom spent on {wrong}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +114,8 @@ class Outcome:
         reason: why.
         steps: terms looked at, in order.
         tried: how many terms were candidates.
+        screened: name of every term that was screened → share of the best one's gain on left-out recordings; empty
+            where all candidates met the nulls.
         strengths: of the proposal; empty where no term was taken.
         retest: on untouched data; None where there was nothing to test.
         level: of the search's tests.
@@ -101,6 +129,7 @@ class Outcome:
     reason: str
     steps: tuple[Step, ...]
     tried: int
+    screened: dict[str, float]
     strengths: tuple[Strength, ...]
     retest: Retest | None
     level: float

@@ -21,6 +21,8 @@ _FAR = 2.0
 """Standard errors of held-out gain by which a further term must improve on those before; the first must improve."""
 _TIED = 1.0
 """Standard errors within which held-out gains say nothing, and the larger statistic leads."""
+_APART = 0.7
+"""Cosine of two columns' directions, beside what is always fitted, below which they are not the same thing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +115,34 @@ def _best(
         p_family=reference.p_family(float(statistics[column])), gain=gain, gain_error=error, taken=not reason,
         reason=reason,
     )  # fmt: skip
+
+
+def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], beside: Sequence[int]) -> list[int]:
+    """As many other columns as were taken, of other directions than theirs, that predict left-out recordings best.
+
+    Fewer where there are not as many; none where there is none.
+
+    Args:
+        pool: columns to choose from.
+        beside: columns of effects that are known to act.
+    """
+    close = _cosines(evidence, beside)
+    apart = [c for c in pool if c not in taken and all(abs(close[c, other]) < _APART for other in taken)]
+    chosen: list[int] = []
+    while apart and len(chosen) < len(taken):
+        held_out = gains(evidence, [[*beside, *chosen, column] for column in apart]).sum(axis=1)
+        chosen.append(apart.pop(int(np.argmax(held_out))))
+    return chosen
+
+
+def _cosines(evidence: Evidence, beside: Sequence[int]) -> np.ndarray:
+    """(column, column) of directions, beside the nuisances and some columns more; 0 with those."""
+    total = evidence.curvature.sum(axis=0)
+    fixed = [*evidence.nuisance, *beside]
+    inner = total[np.ix_(fixed, fixed)] + 1e-9 * np.diag(np.diag(total)[fixed])
+    left = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
+    size = np.sqrt(np.maximum(np.diag(left), 1e-9 * np.diag(total)))
+    return left / np.outer(size, size)
 
 
 def _error(values: np.ndarray) -> float:

@@ -1,8 +1,13 @@
-"""The terms that are tried: forces per mass, each a shape on the flat cloth times a field (see `sim.effects.field`)."""
+"""The terms that are tried: a shape on the flat cloth times a field, as a force per mass or as a share of mass.
+
+Shapes and fields are those of `sim.effects.field`. A local shape is named by its place in hundredths: `near_70_30`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -10,19 +15,83 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from measure.loop.columns import EffectColumn
+from sim.cloth import Cloth
 from sim.effects import Effect
-from sim.effects.field import FieldEffect, Seen
+from sim.effects.effect import ClothEffect
+from sim.effects.field import FieldEffect, Flat, Seen, heavier
 from sim.effects.parameter import EVERYTHING, Parameter, Role, Value, strength
+
+MASS = "mass"
+"""The field of terms that are no forces: the cloth is heavier."""
+_LIGHTEST = -0.9
+"""Share of mass that a term may take away."""
+_SOURCE = "none: to be found from what a model leaves"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """Where a term is.
+
+    Attributes:
+        method: of `sim.effects.field.Flat`.
+        place: its arguments; () for a property.
+        words: where it is.
+    """
+
+    method: str
+    place: tuple[float, ...] = ()
+    words: str
+
+    @property
+    def code(self) -> str:
+        """As an attribute of a `Flat`, in Python."""
+        return f"{self.method}({', '.join(f'{p:g}' for p in self.place)})" if self.place else self.method
+
+    def of(self, flat: Flat) -> Tensor:
+        """(vertex, 1, 1)."""
+        found = getattr(flat, self.method)
+        return found(*self.place) if self.place else found
+
 
 SHAPES: dict[str, str] = {
     "everywhere": "all over the cloth",
+    "hoist": "growing from fly to hoist",
     "fly": "growing from hoist to fly",
     "upper": "on the upper half",
     "lower": "on the lower half",
     "upper_fly": "at the upper fly corner",
     "lower_fly": "at the lower fly corner",
 }
-"""Names of shapes, and where they are."""
+"""Names of shapes of the size of the cloth, and where they are. Local ones: see `shape_named`."""
+_LOCAL = re.compile(r"(near|stripe|band)_(\d{1,3})(?:_(\d{1,3}))?")
+_LOCAL_WORDS = {
+    "near": "near {0:.2f} of the width from the hoist and {1:.2f} of the height from below",
+    "stripe": "along a line from bottom to top at {0:.2f} of the width from the hoist",
+    "band": "along a line from hoist to fly at {0:.2f} of the height from below",
+}
+
+
+def shape_named(name: str) -> Shape:
+    """A shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
+
+    Raises:
+        UsageError: no such shape.
+    """
+    if name in SHAPES:
+        return Shape(method=name, words=SHAPES[name])
+    found = _LOCAL.fullmatch(name)
+    place = () if found is None else tuple(int(part) / 100 for part in found.groups()[1:] if part is not None)
+    if found is None or len(place) != (2 if found[1] == "near" else 1) or max(place) > 1:
+        raise UsageError(
+            f"no shape {name!r}", where="terms",
+            fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths from 0 to 100",
+        )  # fmt: skip
+    return Shape(method=found[1], place=place, words=_LOCAL_WORDS[found[1]].format(*place))
+
+
+def local(method: str, *place: float) -> str:
+    """Name of a local shape at shares of the width and the height."""
+    return "_".join([method, *(f"{round(100 * share):02d}" for share in place)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,33 +111,61 @@ class Field:
     shapes: tuple[str, ...]
 
 
-_ALL = tuple(SHAPES)
-_HALVES = ("everywhere", "fly", "upper", "lower")
-_CORNERS = ("everywhere", "fly", "upper_fly", "lower_fly")
+_CORNERS = (local("near", 1, 0), local("near", 1, 1))
+_ALL = (*SHAPES, *_CORNERS)
+_QUARTERS = ("everywhere", "fly", "upper", "lower")
+_HALVES = ("everywhere", "hoist", "fly", "upper", "lower")
+_FLY = ("everywhere", "fly", "upper_fly", "lower_fly", *_CORNERS)
+_PLACES = tuple(local("near", u, v) for u in (0.25, 0.5, 0.75, 1.0) for v in (0.0, 0.33, 0.67, 1.0))
+_STRIPES = tuple(local("stripe", u) for u in (0.2, 0.4, 0.6, 0.8, 1.0))
+_BANDS = tuple(local("band", v) for v in (0.0, 0.25, 0.5, 0.75, 1.0))
 
 FIELDS: dict[str, Field] = {
     "downwind": Field(unit="m/s²", step=0.5, words="a steady push downwind", shapes=_ALL),
     "leftward": Field(unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL),
     "upward": Field(unit="m/s²", step=0.5, words="a steady push upward", shapes=_ALL),
-    "downwind_squared": Field(unit="1/m", step=0.02, words="a push downwind as the square of the wind", shapes=_ALL),
-    "leftward_squared": Field(unit="1/m", step=0.02, words="a push to the left as the square of the wind", shapes=_ALL),
-    "upward_squared": Field(unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_ALL),
-    "toward_pole": Field(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_CORNERS),
-    "toward_height": Field(
-        unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_CORNERS
+    "downwind_squared": Field(
+        unit="1/m", step=0.02, words="a push downwind as the square of the wind", shapes=_QUARTERS
     ),
-    "against_motion": Field(unit="1/s", step=0.5, words="a resistance to motion", shapes=_HALVES),
-    "against_normal_motion": Field(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_HALVES),
-    "across": Field(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_HALVES),
+    "leftward_squared": Field(
+        unit="1/m", step=0.02, words="a push to the left as the square of the wind", shapes=_QUARTERS
+    ),
+    "upward_squared": Field(unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_QUARTERS),
+    "to_pole": Field(unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES),
+    "toward_pole": Field(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY),
+    "toward_height": Field(unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY),
+    "against_motion": Field(unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS),
+    "against_normal_motion": Field(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS),
+    "left_of_motion": Field(
+        unit="1/s", step=0.5, words="a push to the left of the motion, as in a turning frame", shapes=("everywhere",)
+    ),
+    "across": Field(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
     "across_squared": Field(
-        unit="1/m", step=0.1, words="a pressure as the square of the wind across it", shapes=("fly", "upper")
+        unit="1/m", step=0.1, words="a pressure as the square of the wind across it",
+        shapes=("hoist", "fly", "upper", "lower", "upper_fly", "lower_fly"),
     ),
-    "along": Field(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_HALVES),
+    "across_even": Field(
+        unit="1/m", step=0.1, words="a pressure as the square of the wind across it, always toward one side of the "
+        "cloth", shapes=_QUARTERS,
+    ),
+    "rising": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
+    "crossing": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES),
+    "along": Field(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_QUARTERS),
     "along_squared": Field(
-        unit="1/m", step=0.01, words="a friction as the square of the wind along it", shapes=_HALVES
+        unit="1/m", step=0.01, words="a friction as the square of the wind along it", shapes=_QUARTERS
+    ),
+    "along_width": Field(
+        unit="1/s", step=0.1, words="a friction in proportion to the wind along its width", shapes=("everywhere", "fly")
+    ),
+    "along_height": Field(
+        unit="1/s", step=0.1, words="a friction in proportion to the wind along its height",
+        shapes=("everywhere", "fly"),
+    ),
+    MASS: Field(
+        unit="1", step=0.5, words="more mass, as a share of the cloth's", shapes=(*_PLACES, *_STRIPES, *_BANDS)
     ),
 }  # fmt: skip
-"""Names of fields. The wind's whole pressure is left out: that is the calibrated model's own."""
+"""Names of fields. The wind's whole pressure and the whole mass are left out: those are the calibrated model's own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +173,7 @@ class Term:
     """A shape times a field.
 
     Attributes:
-        shape: of `SHAPES`.
+        shape: name of a shape, see `shape_named`.
         field: of `FIELDS`.
 
     Raises:
@@ -87,11 +184,22 @@ class Term:
     field: str
 
     def __post_init__(self) -> None:
-        if self.shape not in SHAPES or self.field not in FIELDS:
-            raise UsageError(
-                f"no term {self.field!r} on {self.shape!r}", where="terms",
-                fix=f"take a field of {', '.join(FIELDS)} and a shape of {', '.join(SHAPES)}",
-            )  # fmt: skip
+        if self.field not in FIELDS:
+            raise UsageError(f"no field {self.field!r}", where="terms", fix=f"take one of {', '.join(FIELDS)}")
+        shape_named(self.shape)
+
+    @classmethod
+    def named(cls, name: str) -> Term:
+        """The term of a name.
+
+        Raises:
+            UsageError: not a term's.
+        """
+        # The longest field that fits: "across_squared_fly" is no shape "squared_fly" of "across".
+        field = max((f for f in FIELDS if name.startswith(f"{f}_")), key=len, default="")
+        if not field:
+            raise UsageError(f"{name!r} is no term", where="terms", fix="give field_shape")
+        return cls(field=field, shape=name.removeprefix(f"{field}_"))
 
     @property
     def name(self) -> str:
@@ -101,7 +209,17 @@ class Term:
     @property
     def words(self) -> str:
         """What it is, and where."""
-        return f"{FIELDS[self.field].words}, {SHAPES[self.shape]}"
+        return f"{FIELDS[self.field].words}, {self.at.words}"
+
+    @property
+    def at(self) -> Shape:
+        """Its shape."""
+        return shape_named(self.shape)
+
+    def moved(self, *steps: float) -> Term:
+        """The same at a place of the cloth nearby, by shares of the width and the height."""
+        place = (min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True))
+        return replace(self, shape=local(self.at.method, *place))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,13 +231,29 @@ class TermEffect(FieldEffect):
         term: which.
     """
 
-    coefficient: Annotated[
-        Value, strength(unit="of the field", prior=(-1.0, 1.0), source="none: to be found from what a model leaves")
-    ] = 0.0
+    coefficient: Annotated[Value, strength(unit="of the field", prior=(-1.0, 1.0), source=_SOURCE)] = 0.0
     term: Term
 
     def acceleration(self, seen: Seen) -> Tensor:
-        return self.coefficient * (getattr(seen, self.term.shape) * getattr(seen, self.term.field))
+        return self.coefficient * (self.term.at.of(seen) * getattr(seen, self.term.field))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TermMass(ClothEffect):
+    """The mass of a term: 1 + coefficient × shape times the cloth's.
+
+    Attributes:
+        coefficient: as a share.
+        term: which.
+    """
+
+    coefficient: Annotated[
+        Value, strength(unit="1", prior=(-0.5, 2.0), admissible=(_LIGHTEST, float("inf")), source=_SOURCE)
+    ] = 0.0
+    term: Term
+
+    def cloth(self, cloth: Cloth) -> Cloth:
+        return heavier(cloth, self.coefficient * self.term.at.of(Flat(cloth=cloth)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,17 +272,22 @@ class TermColumn(EffectColumn):
 
     @cached_property
     def described(self) -> Parameter:
+        admissible = (_LIGHTEST, float("inf")) if self.term.field == MASS else EVERYTHING
         return Parameter(
-            role=Role.STRENGTH, unit=FIELDS[self.term.field].unit, prior=(-self.step, self.step), admissible=EVERYTHING,
-            source="none: to be found from what a model leaves", null=0.0,
+            role=Role.STRENGTH, unit=FIELDS[self.term.field].unit, prior=(-self.step, self.step), source=_SOURCE,
+            admissible=admissible, null=0.0,
         )  # fmt: skip
 
     def at(self, coefficient: float) -> Effect:
-        return TermEffect(coefficient=coefficient, term=self.term)
+        kind = TermMass if self.term.field == MASS else TermEffect
+        return kind(coefficient=coefficient, term=self.term)
 
 
 def dictionary() -> tuple[TermColumn, ...]:
     """All terms that are tried."""
-    return tuple(
-        TermColumn.of(Term(shape=shape, field=name)) for name, entry in FIELDS.items() for shape in entry.shapes
-    )
+    return columns_of([Term(shape=shape, field=name) for name, entry in FIELDS.items() for shape in entry.shapes])
+
+
+def columns_of(terms: Sequence[Term]) -> tuple[TermColumn, ...]:
+    """The columns of terms."""
+    return tuple(TermColumn.of(term) for term in terms)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from measure.loop.verdict import Estimate
-from measure.propose.outcome import Outcome
+from measure.propose.outcome import Outcome, Retest
 
 
 def words(outcome: Outcome) -> str:
@@ -19,12 +19,25 @@ def words(outcome: Outcome) -> str:
         lines.append(f"{strength.name} {interval(strength.estimate)}: {strength.words}")
         lines.append(f"  {strength.course.words}")
     if outcome.retest is not None:
-        tested = outcome.retest
-        lines.append(
-            f"on {tested.what}, unseen, n = {tested.segments} segments: error {interval(tested.before)} before, "
-            f"{interval(tested.after)} after, reduction {interval(tested.reduction)}"
-        )
+        lines += _tested(outcome.retest)
     return "\n".join(lines)
+
+
+def _tested(tested: Retest) -> list[str]:
+    errors = (
+        f"on {tested.what}, unseen, n = {tested.segments} segments: error {interval(tested.before)} before, "
+        f"{interval(tested.after)} after, reduction {interval(tested.reduction)}"
+    )
+    floor = f"  numerics alone leave {interval(tested.floor)}"
+    if tested.share is not None:
+        floor += f": of what is above, in squares, {100 * tested.share:.0f} % is gone"
+    lines = [errors, floor]
+    if tested.control is not None and tested.apart is not None:
+        lines.append(
+            f"  instead with {' and '.join(tested.control_names)}: {interval(tested.control)}, "
+            f"which is {interval(tested.apart)} more than with the proposal"
+        )
+    return lines
 
 
 def interval(estimate: Estimate) -> str:

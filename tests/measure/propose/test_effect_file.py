@@ -38,14 +38,19 @@ def proposal(**fitted: tuple[float, str]) -> Outcome:
         for name, (value, unit) in fitted.items()
     )  # fmt: skip
     return Outcome(
-        decision=Decision.KEPT, reason="", steps=(), tried=6, strengths=strengths, retest=None, level=0.03, nulls="",
-        proposed_from="ab12" * 16, tested_on="cd34" * 16, known=(), seed=0,
+        decision=Decision.KEPT, reason="", steps=(), tried=6, screened={}, strengths=strengths,
+        retest=None, level=0.03, nulls="", proposed_from="ab12" * 16, tested_on="cd34" * 16, known=(), seed=0,
     )  # fmt: skip
 
 
 @pytest.fixture
 def two() -> Outcome:
     return proposal(upward_lower=(0.8, "m/s²"), toward_pole_lower_fly=(-1.5, "1/s²"))
+
+
+@pytest.fixture
+def heavy() -> Outcome:
+    return proposal(mass_near_75_30=(2.0, "1"), mass_stripe_60=(0.5, "1"), left_of_motion_everywhere=(0.4, "1/s"))
 
 
 def test_the_file_is_the_sum_of_its_terms(two: Outcome, tmp_path: Path) -> None:
@@ -67,6 +72,20 @@ def test_the_file_is_the_sum_of_its_terms(two: Outcome, tmp_path: Path) -> None:
     np.testing.assert_allclose(one, force(*apply(terms, *batch)), rtol=1e-12, atol=1e-15)
 
 
+def test_mass_of_the_file_is_that_of_its_terms(tmp_path: Path) -> None:
+    """Also where no force is beside it."""
+    made = load(write(proposal(mass_near_75_30=(2.0, "1"), mass_stripe_60=(0.5, "1")), tmp_path).spec)
+    batch = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    u, v = (batch[0].cloth.mesh.rest / batch[0].cloth.mesh.rest.max(axis=0)).T
+    width, height = batch[0].cloth.mesh.rest.max(axis=0)
+    square = 0.01 * width * height
+    near = np.exp(-(((u - 0.75) * width) ** 2 + ((v - 0.3) * height) ** 2) / (2 * square))
+    stripe = np.exp(-(((u - 0.6) * width) ** 2) / (2 * square))
+    system, _ = apply([made(mass_near_75_30=2.0, mass_stripe_60=0.5)], *batch)
+    ratio = (system.cloth.mass / batch[0].cloth.mass)[:, 0].numpy()
+    np.testing.assert_allclose(ratio, 1 + 2 * near + 0.5 * stripe, rtol=1e-12)
+
+
 def test_its_strengths_can_be_tested_on_other_recordings(two: Outcome, tmp_path: Path) -> None:
     columns = from_file(write(two, tmp_path).spec)
     assert [column.parameter for column in columns] == ["upward_lower", "toward_pole_lower_fly"]
@@ -75,9 +94,13 @@ def test_its_strengths_can_be_tested_on_other_recordings(two: Outcome, tmp_path:
     assert columns[0].at(0.3).upward_lower == 0.3  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_its_own_contract_tests_and_the_librarys_pass(two: Outcome, tmp_path: Path) -> None:
+@pytest.mark.parametrize("which", ["two", "heavy"])
+def test_its_own_contract_tests_and_the_librarys_pass(
+    which: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     """As if it were installed: an entry point makes it one of the library's effects."""
-    made = write(two, tmp_path)
+    outcome: Outcome = request.getfixturevalue(which)
+    made = write(outcome, tmp_path)
     info = tmp_path / "proposed-1.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: proposed\nVersion: 1\n")
@@ -91,8 +114,8 @@ def test_its_own_contract_tests_and_the_librarys_pass(two: Outcome, tmp_path: Pa
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
     passed = int(done.stdout.rsplit(" passed", 1)[0].split()[-1])
-    # Seven of the file's own (a gradient for each strength), and one for each law of the library's contract.
-    assert passed >= 7 + 14
+    # Of the file's own five and a gradient for each strength, and one for each law of the library's contract.
+    assert passed >= 5 + len(outcome.strengths) + 14
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_nineteen_of_twenty_nulls_give_no_proposal(bank: NullBank) -> None:
         inside = bank.nulls.numerics != kind
         others = replace(bank, nulls=bank.nulls.select(inside))
         evidence = Evidence.of_nulls(bank.nulls.select(~inside), others.model())
-        reference = others.reference(4, seed=0)
+        reference = others.reference(4, noise=NOISE, seed=0)
         recordings = np.unique(evidence.recording)
         for pair in recordings.reshape(-1, 2):
             own = evidence.select(np.isin(evidence.recording, pair))

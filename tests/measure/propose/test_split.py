@@ -61,8 +61,8 @@ def test_the_hash_is_of_positions_and_wind() -> None:
 
 def outcome(seed: int) -> Outcome:
     return Outcome(
-        decision=Decision.REJECTED, reason="nulls show as much", steps=(), tried=6, strengths=(), retest=None,
-        level=0.03, nulls="none", proposed_from="ab", tested_on="cd", known=(), seed=seed,
+        decision=Decision.REJECTED, reason="nulls show as much", steps=(), tried=6, screened={}, strengths=(),
+        retest=None, level=0.03, nulls="none", proposed_from="ab", tested_on="cd", known=(), seed=seed,
     )  # fmt: skip
 
 

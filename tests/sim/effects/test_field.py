@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from sim.effects.field import Seen
+from sim.effects.field import Flat, Seen, heavier
 from sim.material import named
 from sim.scene import assemble, flag
 
-SHAPES = ("everywhere", "fly", "upper", "lower", "upper_fly", "lower_fly")
+SHAPES = ("everywhere", "hoist", "fly", "upper", "lower", "upper_fly", "lower_fly")
 FIELDS = (
     "downwind", "leftward", "upward", "downwind_squared", "leftward_squared", "upward_squared", "toward_pole",
     "toward_height", "against_motion", "against_normal_motion", "across", "across_squared", "along", "along_squared",
+    "to_pole", "left_of_motion", "across_even", "rising", "crossing", "along_width", "along_height",
 )  # fmt: skip
 
 
@@ -42,8 +45,8 @@ def seen(
 @pytest.mark.parametrize(
     ("name", "corners"),
     [
-        ("everywhere", (1, 1, 1, 1)), ("fly", (0, 1, 0, 1)), ("upper", (0, 0, 1, 1)), ("lower", (1, 1, 0, 0)),
-        ("upper_fly", (0, 0, 0, 1)), ("lower_fly", (0, 1, 0, 0)),
+        ("everywhere", (1, 1, 1, 1)), ("hoist", (1, 0, 1, 0)), ("fly", (0, 1, 0, 1)), ("upper", (0, 0, 1, 1)),
+        ("lower", (1, 1, 0, 0)), ("upper_fly", (0, 0, 0, 1)), ("lower_fly", (0, 1, 0, 0)),
     ],
 )  # fmt: skip
 def test_shapes_are_0_or_1_at_the_corners(name: str, corners: tuple[int, ...]) -> None:
@@ -84,6 +87,70 @@ def test_across_and_along_a_flat_flag_are_the_wind_across_and_along_its_plane() 
     }.items():  # fmt: skip
         values = getattr(own, name)[:, :, 0].numpy()
         np.testing.assert_allclose(values, np.tile(expected, (len(values), 1)), atol=1e-12)
+
+
+def test_local_shapes_fall_with_the_distance_to_their_place() -> None:
+    """By e^(−1/2) where it is a tenth of the root of the area away."""
+    own = Flat(cloth=seen(wind=(4, 0, 0)).cloth)
+    rest = own.cloth.mesh.rest
+    width, height = rest.max(axis=0)
+    for values, square in (
+        (own.near(0.7, 0.3), (rest[:, 0] - 0.7 * width) ** 2 + (rest[:, 1] - 0.3 * height) ** 2),
+        (own.stripe(0.7), (rest[:, 0] - 0.7 * width) ** 2),
+        (own.band(0.3), (rest[:, 1] - 0.3 * height) ** 2),
+    ):
+        expected = np.exp(-square / (2 * 0.01 * width * height))
+        np.testing.assert_allclose(values[:, 0, 0].numpy(), expected, rtol=1e-10)
+
+
+def test_a_heavier_cloth_has_that_share_more_mass() -> None:
+    cloth = seen(wind=(4, 0, 0)).cloth
+    share = Flat(cloth=cloth).lower
+    torch.testing.assert_close(heavier(cloth, 0.5 * share).mass, cloth.mass * (1 + 0.5 * share[:, :, 0]))
+
+
+def test_the_pull_to_the_pole_points_to_it_and_is_one_far_away() -> None:
+    own = seen(wind=(4, 0, 0))
+    arm = own.offset.clone()
+    arm[:, 2] = 0
+    far = int(torch.argmax(arm.norm(dim=1)[:, 0]))
+    distance = float(arm[far].norm())
+    radius = 0.1 * np.sqrt(np.prod(own.cloth.mesh.rest.max(axis=0)))
+    torch.testing.assert_close(own.to_pole[far], -arm[far] / np.hypot(distance, radius))
+
+
+def test_an_even_pressure_does_not_turn_with_the_wind() -> None:
+    one, other = (seen(wind=wind, bulge=0.0).across_even for wind in ((0, 2, 0), (0, -2, 0)))
+    torch.testing.assert_close(one, other)
+    torch.testing.assert_close(one.norm(dim=1), torch.full_like(one[:, 0], 4.0))
+
+
+def test_a_wind_upward_presses_on_what_leans() -> None:
+    """On a sheet that leans by 0.4: the derivative of |w·n| (w·n) n in a wind along z is 2 |w·n| (z·n) n."""
+    own = seen(wind=(0, 3, 0), bulge=0.0)
+    lean = own.position.clone()
+    lean[:, 1] = 0.4 * lean[:, 2]
+
+    def pressed(up: float) -> Tensor:
+        air = torch.tensor([[0.0], [3.0], [up]], dtype=torch.float64)
+        return replace(own, position=lean, wind=air).across_squared
+
+    difference = (pressed(1e-5) - pressed(-1e-5)) / 2e-5
+    torch.testing.assert_close(2 * replace(own, position=lean).rising, difference, rtol=1e-6, atol=1e-8)
+
+
+def test_friction_along_the_threads_is_that_along_width_and_height() -> None:
+    """On a flat flag in the plane of x and z, hoist upright: along x and along z."""
+    own = seen(wind=(3, 2, 4), bulge=0.0)
+    for name, expected in (("along_width", (3, 0, 0)), ("along_height", (0, 0, 4))):
+        values = getattr(own, name)[:, :, 0].numpy()
+        np.testing.assert_allclose(values, np.tile(expected, (len(values), 1)), atol=1e-12)
+
+
+def test_a_turning_frame_pushes_to_the_left_of_the_motion() -> None:
+    own = seen(wind=(4, 0, 0), velocity=(1, -2, 3))
+    x, y, _ = own.velocity.unbind(1)
+    torch.testing.assert_close(own.left_of_motion, torch.stack([-y, x, torch.zeros_like(x)], 1))
 
 
 def test_resistances_oppose_the_motion_and_its_part_along_the_normal() -> None:
