@@ -11,15 +11,8 @@ import pytest
 from PIL import Image
 
 from flagdata.errors import InputError, TimeError
-from flagdata.findings import Finding
 from flagdata.ingest.camera import CameraOptions, open_camera
-from flagdata.signals import CameraInfo, Frame
-
-
-def read(path: Path, options: CameraOptions) -> tuple[CameraInfo, list[Frame], dict[str, Finding]]:
-    with open_camera(path, options) as stream:
-        frames = list(stream)
-        return stream.info, frames, {f.kind: f for f in stream.findings}
+from tests.flagdata.ingest.camera.reading import read
 
 
 @pytest.fixture

@@ -15,26 +15,13 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from flagdata.errors import TimeError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Severity
 from flagdata.ingest.camera import CameraOptions, CropBox, open_camera
 from flagdata.ingest.camera.container import packets
-from flagdata.signals import CameraInfo, Frame
+from tests.flagdata.ingest.camera.reading import MS, grid_of, read
 
-MS = 1_000_000
 # 60 Hz onto 25 Hz by hand: frame = round(2.4 k), 2.4 k = 0, 2.4, 4.8, 7.2, 9.6, 12, …
 SIXTY_TO_25 = [0, 2, 5, 7, 10, 12, 14, 17, 19, 22]
-
-
-def read(path: Path, options: CameraOptions) -> tuple[CameraInfo, list[Frame], dict[str, Finding]]:
-    with open_camera(path, options) as stream:
-        frames = list(stream)
-        return stream.info, frames, {f.kind: f for f in stream.findings}
-
-
-def grid_of(frames: list[Frame], start: int) -> list[int]:
-    """Grid index of each frame at 25 Hz, refusing times off the grid."""
-    assert all((f.time - start) % (40 * MS) == 0 for f in frames)
-    return [(f.time - start) // (40 * MS) for f in frames]
 
 
 @pytest.mark.parametrize(

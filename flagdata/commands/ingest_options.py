@@ -1,0 +1,188 @@
+"""What `flagdata ingest` was told: the options of each kind of source, and which mean nothing for a source."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flagdata.errors import TimeError, UsageError
+
+if TYPE_CHECKING:
+    from flagdata.ingest.markers import MarkerOptions
+    from flagdata.ingest.meshes.store import MeshIngest
+    from flagdata.ingest.store import CameraIngest, Labels, WindIngest
+
+# Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
+CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
+WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "zero_offset", "encoding")
+LENGTHS = ("unit",)
+"""Of meshes and markers."""
+FOREIGN = {
+    "camera": ("a camera file", (*WIND_ONLY, *LENGTHS)),
+    "anemometer": ("an anemometer log", (*CAMERA_ONLY, *LENGTHS, "rate")),
+    "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
+    "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
+}
+"""What each kind of source is called, and the options that mean nothing for it."""
+SNIFF = ("sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture")
+ONE_SOURCE = ("start", "date", "name", "crop_picture")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """The command line, read."""
+
+    camera: CameraIngest
+    wind: WindIngest
+    meshes: MeshIngest
+    markers: MarkerOptions
+    labels: Labels
+    branch: str
+    crop_picture: Path | None
+    zoned_start: bool
+
+
+def option(parameter: str) -> str:
+    """How a parameter is spelled on the command line."""
+    return "--as" if parameter == "format_name" else f"--{parameter.replace('_', '-')}"
+
+
+def camera_options(
+    *,
+    start: str | None,
+    zone_name: str | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
+    rate: str,
+    crop: str,
+    exposure: float | None,
+    archive: str,
+) -> CameraIngest:
+    """Those of a camera.
+
+    Raises:
+        UsageError: a start, zone, rate or crop that cannot be read.
+    """
+    from flagdata import timebase
+    from flagdata.ingest.camera import CameraOptions, parse_crop
+    from flagdata.ingest.store import CameraIngest
+    from flagdata.record import Coding
+
+    try:
+        place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+        instant = timebase.parse(start, default=place, where="--start") if start is not None else None
+    except TimeError as error:
+        raise UsageError(error.what, where=error.where, fix=error.fix) from None
+    options = CameraOptions(
+        start=instant,
+        zone=None if start is not None and timebase.names_zone(start) else zone_name,
+        true_fps=true_fps,
+        sequence_fps=sequence_fps,
+        rate="native" if rate.strip().lower() == "native" else _number(rate, "--rate", "a rate in Hz, or native"),
+        crop=parse_crop(crop),
+        exposure=exposure,
+    )
+    return CameraIngest(camera=options, coding=Coding(archive))
+
+
+def wind_options(
+    *,
+    format_name: str | None,
+    sensor: str | None,
+    zone_name: str | None,
+    date: str | None,
+    date_order: Any,
+    platform: Any,
+    talker: str | None,
+    azimuth: float | None,
+    zero_offset: str | None,
+    encoding: str | None,
+) -> WindIngest:
+    """Those of an anemometer.
+
+    Raises:
+        UsageError: a date or zero offset that cannot be read.
+    """
+    import datetime as dt
+
+    from flagdata.ingest.anemometer import WindOptions
+    from flagdata.ingest.store import WindIngest
+    from flagdata.units import unit
+
+    try:
+        day = dt.date.fromisoformat(date) if date is not None else None
+    except ValueError:
+        raise UsageError(f"{date!r} is not a date", where="--date", fix="write it as 2026-05-01") from None
+    offset: Any = zero_offset
+    if zero_offset is not None and zero_offset not in ("report", "estimate"):
+        offset = _number(zero_offset, "--zero-offset", "a speed in m/s, report or estimate")
+    return WindIngest(
+        wind=WindOptions(
+            format=format_name,
+            recipe=sensor,
+            zone=zone_name,
+            encoding=encoding,
+            date=day,
+            date_order=date_order,
+            platform=platform,
+            talker=talker,
+            azimuth=float(unit("deg").to_si(azimuth)) if azimuth is not None else None,
+            zero_offset=offset,
+        )
+    )
+
+
+def mesh_options(*, rate: str | None, length: str) -> MeshIngest:
+    """Those of a mesh sequence; `rate` None for the source's own."""
+    from flagdata.ingest.meshes.store import MeshIngest
+
+    if rate is None or rate.strip().lower() == "native":
+        return MeshIngest(unit=length)
+    return MeshIngest(rate=_number(rate, "--rate", "frames a second"), unit=length)
+
+
+def marker_options(*, rate: str | None, length: str) -> MarkerOptions:
+    """Those of a table of markers; `rate` None for the source's own."""
+    from flagdata.ingest.markers import MarkerOptions
+
+    if rate is None or rate.strip().lower() == "native":
+        return MarkerOptions(unit=length)
+    return MarkerOptions(rate=_number(rate, "--rate", "frames a second"), unit=length)
+
+
+def _number(text: str, option: str, wanted: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"{text!r} is not a number", where=option, fix=f"give {wanted}") from None
+
+
+def labels(name: str | None, session: str | None) -> Labels:
+    """What the artifacts are called."""
+    from flagdata.ingest.store import Labels
+
+    return Labels(name=name, session=session)
+
+
+def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozenset[str]) -> None:
+    """Refuse options that mean nothing for any source, or that time or name more than one, before anything is written.
+
+    Args:
+        kinds: of the sources; one that could not be told may be any.
+    """
+    foreign = dict(FOREIGN)
+    if options.zoned_start:
+        what, parameters = foreign["camera"]
+        foreign["camera"] = (f"{what} whose --start names its zone", (*parameters, "zone"))
+    for parameter in sorted(given):
+        strange = [kind in foreign and parameter in foreign[kind][1] for kind in kinds]
+        if all(strange):
+            whose = " or ".join(sorted({foreign[kind][0] for kind in kinds if kind is not None}))
+            raise UsageError(f"{option(parameter)} means nothing for {whose}", fix="leave it out")
+        if parameter in ONE_SOURCE and strange.count(False) > 1:
+            raise UsageError(
+                f"{option(parameter)} with {strange.count(False)} sources",
+                fix="ingest the source it belongs to by itself",
+            )

@@ -1,0 +1,232 @@
+"""What `flagdata ingest` does with each source: into the lake, or a look at what it is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, TypeVar
+
+from flagdata.commands.ingest_options import Given, check_applies
+from flagdata.commands.ingest_report import print_results, print_sniffed
+from flagdata.console import document, fail, progress, say
+from flagdata.errors import FlagdataError, InputError
+
+if TYPE_CHECKING:
+    from flagdata.ingest.anemometer import Guess
+    from flagdata.ingest.store import IngestResult
+    from flagdata.lake import Lake
+
+Told = TypeVar("Told")
+Done = TypeVar("Done")
+
+
+def ingest_sources(
+    lake: Lake,
+    sources: Sequence[Path],
+    options: Given,
+    *,
+    given: frozenset[str],
+    format_name: str | None,
+    as_json: bool,
+) -> None:
+    """Bring each source into the lake and report it; exits with 1 where one of several failed.
+
+    Args:
+        given: parameters that stand on the command line.
+        format_name: of all sources; None to tell it by their content.
+
+    Raises:
+        FlagdataError: an option that means nothing for any source, or a single source that failed.
+    """
+    from flagdata.ingest.classify import classify
+
+    recipe = options.wind.wind.recipe
+    kinds = _told(sources, lambda source: classify(source, format_name=format_name, recipe=recipe))
+    check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
+    results, failures = _each(
+        sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_results, as_json=as_json
+    )
+    if as_json:
+        document(
+            "ingest",
+            {
+                "lake": str(lake.path),
+                "results": [result.as_dict() for of_source in results for result in of_source],
+                "failures": _failures(failures),
+            },
+        )
+    _exit_on(failures, sources)
+
+
+def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[str], as_json: bool) -> None:
+    """Report what each source seems to be; exits with 1 where one of several cannot be told.
+
+    Raises:
+        FlagdataError: as `ingest_sources`.
+    """
+    from flagdata.ingest.classify import guesses
+
+    ranked = _told(sources, guesses)
+    check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
+    entries, failures = _each(
+        sources, ranked, lambda source, found: _look(source, found, options), print_sniffed, as_json=as_json
+    )
+    if as_json:
+        document("sniff", {"sources": entries, "failures": _failures(failures)})
+    _exit_on(failures, sources)
+
+
+def _look(source: Path, ranked: Sequence[Guess], options: Given) -> dict[str, Any]:
+    """Guesses at a source; of a camera file, what its headers say and the crop if one was asked for."""
+    from flagdata.ingest.camera import probe, propose_crop
+
+    entry: dict[str, Any] = {"source": str(source), "guesses": [_guess(guess) for guess in ranked]}
+    if ranked[0].kind != "camera":
+        return entry
+    try:
+        entry["camera"] = probe(source, options.camera.camera).as_dict()
+    except FlagdataError as error:
+        entry["problem"] = error.as_dict()
+        return entry
+    if options.camera.camera.crop == "auto":
+        proposal = propose_crop(source, options.camera.camera)
+        entry["crop"] = {"box": list(proposal.box.as_tuple()), "share": proposal.share}
+        with _CropPicture(options.crop_picture) as picture:
+            picture.write(proposal.picture)
+    return entry
+
+
+def _guess(guess: Guess) -> dict[str, Any]:
+    return {
+        "kind": guess.kind,
+        "format": guess.format,
+        "recipe": guess.recipe,
+        "score": guess.score,
+        "reasons": list(guess.reasons),
+        "fix": guess.fix,
+        "draft": guess.draft,
+    }
+
+
+def _told(sources: Sequence[Path], tell: Callable[[Path], Told]) -> list[Told | FlagdataError]:
+    """What each source is, or why that cannot be told."""
+
+    def told(source: Path) -> Told | FlagdataError:
+        try:
+            return tell(source)
+        except FlagdataError as error:
+            return error
+
+    return [told(source) for source in sources]
+
+
+def _each(
+    sources: Sequence[Path],
+    told: Sequence[Told | FlagdataError],
+    act: Callable[[Path, Told], Done],
+    show: Callable[[Done], None],
+    *,
+    as_json: bool,
+) -> tuple[list[Done], list[tuple[Path, FlagdataError]]]:
+    """Act on every source in turn and show it; one that fails leaves the others to go on, unless it is the only one."""
+    results: list[Done] = []
+    failures: list[tuple[Path, FlagdataError]] = []
+    for source, found in zip(sources, told, strict=True):
+        try:
+            if isinstance(found, FlagdataError):
+                raise found
+            result = act(source, found)
+        except FlagdataError as error:
+            if len(sources) == 1:
+                raise
+            failures.append((source, error))
+            if not as_json:
+                fail(error, as_json=False)
+            continue
+        results.append(result)
+        if not as_json:
+            show(result)
+    return results, failures
+
+
+def _failures(failures: Sequence[tuple[Path, FlagdataError]]) -> list[dict[str, str | None]]:
+    return [{"source": str(source), **error.as_dict()} for source, error in failures]
+
+
+def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[Path]) -> None:
+    """Exit with 1, naming what failed, if anything did."""
+    if failures:
+        say(f"flagdata: {len(failures)} of {len(sources)} sources failed: {', '.join(str(s) for s, _ in failures)}")
+        sys.exit(1)
+
+
+def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestResult, ...]:
+    """Artifacts of a source: of a table of markers one a recording, of any other one."""
+    from flagdata.ingest.markers.store import ingest_markers
+    from flagdata.ingest.store import ingest_camera, ingest_wind
+
+    if kind.kind == "markers":
+        return ingest_markers(
+            lake, source, options.markers, labels=options.labels, branch=options.branch, reasons=kind.reasons
+        )
+    if kind.kind == "meshes":
+        return (_meshes(lake, source, kind, options),)
+    if kind.kind != "camera":
+        return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
+    with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
+        result = ingest_camera(
+            lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
+            progress=advance, crop_picture=picture.write if options.crop_picture else None,
+        )  # fmt: skip
+    return (result,)
+
+
+def _meshes(lake: Lake, source: Path, kind: Guess, options: Given) -> IngestResult:
+    from flagdata.ingest.meshes.store import ingest_meshes
+
+    with progress(None, label=source.name, unit="mesh") as advance:
+        return ingest_meshes(
+            lake, source, options.meshes, labels=options.labels, branch=options.branch, reasons=kind.reasons,
+            progress=advance,
+        )  # fmt: skip
+
+
+class _CropPicture:
+    """The file of --crop-picture; one that was written is removed when the block fails.
+
+    Args:
+        path: nothing is there yet; `None` where no picture was asked for.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._written = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None and self._written and self._path is not None:
+            self._path.unlink(missing_ok=True)
+
+    def write(self, data: bytes) -> None:
+        """Write the picture.
+
+        Raises:
+            InputError: the disk refuses it.
+        """
+        if self._path is None:
+            return
+        try:
+            with self._path.open("xb") as stream:
+                self._written = True
+                stream.write(data)
+        except OSError as error:
+            raise InputError(
+                f"the crop picture cannot be written: {error.strerror}", where=str(self._path),
+                fix="choose another path",
+            ) from None  # fmt: skip
