@@ -93,7 +93,7 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
-        numerics=np.full(len(found.recording), numerics),
+        numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
     )  # fmt: skip
     return nulls, segments.duration
 
@@ -125,7 +125,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     buffer = BytesIO()
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
-        marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets,
+        marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         duration=np.array(duration),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
@@ -157,14 +157,19 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names():
+        if tuple(content["columns"]) != names() or "noise" not in content:
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
             error=content["error"], marker_error=content["marker_error"],
         )  # fmt: skip
         numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
-        parts.append(Nulls(statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics))
+        parts.append(
+            Nulls(
+                statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics,
+                noise=content["noise"],
+            )
+        )  # fmt: skip
         durations.add(round(float(content["duration"]), 1))
         count = int(own.recording.max()) + 1
     if len(durations) > 1:
@@ -182,4 +187,5 @@ def _joined(parts: Sequence[Nulls]) -> Nulls:
     return Nulls(
         statistics=Statistics.joined(trimmed), speeds=np.concatenate([p.speeds for p in parts]),
         offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
+        noise=np.concatenate([p.noise for p in parts]),
     )  # fmt: skip

@@ -129,7 +129,9 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     bank = _bank(setting, options, tell)
     null = bank.model()
     evidence = Evidence.of(found, setting.speeds[setting.recording], null)
-    reference = bank.reference(len(setting.segments), seed=options.seed)
+    reference = bank.reference(
+        len(setting.segments), noise=max(s.noise for s in setting.segments.items), seed=options.seed
+    )
     judgement = judge(evidence, reference, level=options.level)
     solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
     trial = _trial(solved, options, tell)

@@ -126,7 +126,7 @@ def close_loop(
         observed = observe(read(sources, winds, reading, lake), setup)
     refuse(observed.findings)
     verdict = close(observed.experiment, options, stage=stage_bars())
-    verdict = replace(verdict, findings=tuple((f.kind, f.what) for f in observed.findings))
+    verdict = replace(verdict, findings=tuple((f.kind, told(f)) for f in observed.findings))
     called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
     closed = Closed(
         name=called, experiment=observed.experiment, findings=observed.findings, options=options, verdict=verdict,
@@ -265,7 +265,14 @@ def refuse(findings: Iterable[Finding]) -> None:
     for finding in findings:
         if finding.severity is Severity.ERROR:
             raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
-        say(f"{finding.severity.value}: {finding.what}")
+        say(f"{finding.severity.value}: {told(finding)}")
+
+
+def told(finding: Finding) -> str:
+    """Where it was found, and what; a warning with what to do."""
+    where = f"{finding.where}: " if finding.where else ""
+    fix = f" ({finding.fix})" if finding.fix and finding.severity is Severity.WARNING else ""
+    return f"{where}{finding.what}{fix}"
 
 
 def stage_bars() -> Stage:

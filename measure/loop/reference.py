@@ -54,26 +54,28 @@ class NullBank:
         """Learnt from all."""
         return NullModel.fit(self.nulls)
 
-    def reference(self, segments: int, *, seed: int) -> Reference:
+    def reference(self, segments: int, *, noise: float, seed: int) -> Reference:
         """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
         that has seen none of its numerics.
 
+        Args:
+            noise: of the data's markers [m].
+
         Raises:
-            InputError: no experiment has that many.
+            InputError: no experiment has that many segments, or too few have such noise.
         """
         rng = stream(seed, "null", "groups")
         each = math.ceil(_GROUPS / len(np.unique(self.nulls.experiment)))
         shares: list[Floats] = []
         left: list[float] = []
+        noises: list[float] = []
         for kind in np.unique(self.nulls.numerics):
             own = self.nulls.numerics == kind
             outside = self.nulls.select(own)
             evidence = Evidence.of_nulls(outside, NullModel.fit(self.nulls.select(~own)))
             for index in range(outside.experiment.max() + 1):
-                places = [
-                    np.flatnonzero(evidence.recording == r)
-                    for r in np.unique(evidence.recording[outside.experiment == index])
-                ]
+                inside = outside.experiment == index
+                places = [np.flatnonzero(evidence.recording == r) for r in np.unique(evidence.recording[inside])]
                 for _ in range(each):
                     chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
                     if len(chosen) < segments:
@@ -84,32 +86,58 @@ class NullBank:
                     picked = evidence.select(chosen)
                     shares.append(unscaled(picked, self.columns))
                     left.append(picked.fit(()).left)
-        spread = np.maximum(np.mean(shares, axis=0), _NOTHING)
-        return Reference(shares=np.array(shares), spread=spread, left=np.array(left))
+                    noises.append(float(outside.noise[inside][0]))
+        return Reference.of(np.array(shares), np.array(left), np.array(noises), noise)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
     """Null distributions.
 
-    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the nulls' mean
-    share: 1 in the mean if nothing is missing. Sets whose errors are larger all over are so no larger here. One more
-    statistic stands for gusts: the likelihood ratio of a wind pressure that fluctuates.
+    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the mean share of
+    nulls with about the same noise of the markers: 1 in the mean if nothing is missing. Sets whose errors are larger
+    all over are so no larger here, nor are those whose noise alone moves a column. One more statistic stands for gusts:
+    the likelihood ratio of a wind pressure that fluctuates.
 
     Attributes:
-        shares: (group, column), gusts the last.
-        spread: (column,) their mean.
-        left: (group,) squared distance the base model leaves.
+        scaled: (group, column), gusts the last.
+        spread: (column,) mean share of nulls as noisy as the data.
+        left: (group,) squared distance the base model leaves, over its median of nulls as noisy.
+        usual: that median for nulls as noisy as the data.
     """
 
-    shares: Floats
+    scaled: Floats
     spread: Floats
     left: Floats
+    usual: float
+
+    @classmethod
+    def of(cls, shares: Floats, left: Floats, noises: Floats, noise: float) -> Reference:
+        """Of groups (group, column), (group,) and their noise [m], for data of some noise.
+
+        Raises:
+            InputError: no nulls of such noise.
+        """
+        scaled, relative = np.empty_like(shares), np.empty_like(left)
+        for level in np.unique(noises):
+            near = np.abs(noises - level) <= _ALIKE
+            scaled[noises == level] = shares[noises == level] / np.maximum(shares[near].mean(axis=0), _NOTHING)
+            relative[noises == level] = left[noises == level] / np.median(left[near])
+        near = np.abs(noises - noise) <= _ALIKE
+        if near.sum() < _LEAST:
+            raise InputError(
+                f"no nulls with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
+                fix="build one with such noise, or leave it out",
+            )  # fmt: skip
+        return cls(
+            scaled=scaled, spread=np.maximum(shares[near].mean(axis=0), _NOTHING), left=relative,
+            usual=float(np.median(left[near])),
+        )  # fmt: skip
 
     @cached_property
     def largest(self) -> Floats:
         """(group,) the largest statistic of all columns."""
-        return (self.shares / self.spread).max(axis=1)
+        return self.scaled.max(axis=1)
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
         """(column,) of data, gusts the last, where some columns are fitted already."""
@@ -121,11 +149,11 @@ class Reference:
 
     def p_alone(self, statistic: float, column: int) -> float:
         """The same for the column alone."""
-        return _p(self.shares[:, column] / self.spread[column], statistic)
+        return _p(self.scaled[:, column], statistic)
 
     def p_left(self, left: float) -> float:
-        """Share of the groups in which the base model leaves at least this."""
-        return _p(self.left, left)
+        """Share of the groups in which the base model leaves at least this, for their noise."""
+        return _p(self.left, left / self.usual)
 
     def p_global(self, statistics: Floats, left: float) -> float:
         """Of the global test, Bonferroni's of two: the largest statistic (4/5 of the level), what is left (1/5)."""
@@ -134,6 +162,8 @@ class Reference:
 
 _NOTHING = 1e-6
 """Mean share below which a column is never seen: that of the columns that are always fitted."""
+_ALIKE = 1.5e-3
+"""m; noise that differs by less moves statistics little beside the 20 mm that meshes do."""
 
 
 def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:

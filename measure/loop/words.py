@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,8 +10,10 @@ import numpy as np
 from measure.loop.bank import columns
 from measure.loop.columns import THETA, FieldColumn
 from measure.loop.inference import Fit
-from measure.loop.verdict import Conclusion, Estimate, Verdict
+from measure.loop.verdict import Conclusion, Verdict
 from measure.observe.trajectory import Experiment
+from measure.report.quantity import number, probability, with_error, with_level
+from measure.report.sentences import readable, titles
 
 _SEPARATES: dict[frozenset[str], str] = {
     frozenset({"tangential-linear-drag", "tangential-quadratic-drag"}): "a second wind speed, twice as fast: one drag "
@@ -28,26 +31,23 @@ _SEPARATES: dict[frozenset[str], str] = {
 
 def sentence(verdict: Verdict) -> str:
     """The verdict in words."""
-    test = f"p = {verdict.test.p_value:.2g} against {len(verdict.test.null)} groups of nulls"
+    test = f"p = {probability(verdict.test.p_value)} against {len(verdict.test.null)} groups of nulls"
     if verdict.conclusion is Conclusion.SUFFICIENT:
         return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
     rejected = f"The base model is rejected ({test})."
     if verdict.conclusion is Conclusion.OUTSIDE:
         return f"{rejected} No effect of the library explains what it lacks."
-    found = " and ".join(f"{c.effect}, {c.parameter} {_interval(c.strength)}" for c in verdict.ranking if not c.why_not)
+    found = " and ".join(
+        f"{c.effect}, {readable(c.parameter)} {with_level(c.strength)}" for c in verdict.ranking if not c.why_not
+    )  # fmt: skip
     if verdict.conclusion is Conclusion.ONE_OF:
         return (
-            f"{rejected} One of {', '.join(verdict.named)} explains it; they predict unseen recordings equally well. "
+            f"{rejected} One of {', '.join(titles(verdict))} explains it; they predict unseen recordings equally well. "
             f"They would be: {found}."
         )
     if verdict.conclusion is Conclusion.PARTLY:
         return f"{rejected} It is partly explained by {found}; what is left is more than nulls leave."
     return f"{rejected} It lacks {found}; with it, what is left is what nulls leave."
-
-
-def _interval(estimate: Estimate) -> str:
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{estimate.value:.3g} [{estimate.low:.3g}, {estimate.high:.3g}]{unit} {100 * estimate.level:.0f} %"
 
 
 def separating(verdict: Verdict) -> str:
@@ -70,7 +70,7 @@ def proposal(verdict: Verdict, field: Fit, smooth: Sequence[int]) -> str:
         mode = weighed[column - len(THETA)]
         if isinstance(mode, FieldColumn):
             value, error = field.of(column)
-            terms.append((abs(value / error), f"{_where(mode)} {value:+.2f} ± {error:.2f} m/s²"))
+            terms.append((abs(value / error), f"{_where(mode)} ({with_error(value, error)}) m/s²"))
     strongest = [text for _, text in sorted(terms, key=lambda term: -term[0])[:3]]
     return "The smooth force field that fits best, per mass: " + "; ".join(strongest) + "."
 
@@ -88,9 +88,13 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     """What was taken as given."""
     specimen = experiment.specimen
     size = np.ptp(specimen.mesh.rest, axis=0)
+    air = specimen.air.plain
+    held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
     return (
-        f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {specimen.material.name}, whose stretching is known",
-        f"it is held at {len(specimen.held)} points by springs of {specimen.stiffness:.3g} N/m",
+        f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {specimen.material.name}, nominally "
+        f"{number(specimen.material.density)} kg/m², whose stretching is known",
+        f"it is held at {len(specimen.held)} points {held}",
+        f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
         "the wind at the flag is the logged one, the same all over it",
         "density, bending and internal damping are free: what only changes them is no effect",
         "the choice of the effect has seen all recordings; the errors before and after are of fits that had not",

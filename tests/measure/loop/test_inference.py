@@ -48,8 +48,9 @@ class World:
         shift = np.repeat(self.rng.normal(size=KINDS * CLOTHS), WINDS)
         own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
         return Nulls(
-            statistics=own, speeds=speeds[own.recording], offsets=offsets[own.recording], numerics=kinds[own.recording]
-        )
+            statistics=own, speeds=speeds[own.recording], offsets=offsets[own.recording], numerics=kinds[own.recording],
+            noise=np.zeros(len(own.recording)),
+        )  # fmt: skip
 
     def data(self, null: NullModel, delta: Floats) -> Evidence:
         """Three recordings of one cloth in one kind of numerics."""
@@ -103,7 +104,7 @@ def test_p_values_of_nulls_are_uniform() -> None:
     world = World(3)
     columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
     bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
-    null, reference = bank.model(), bank.reference(3 * SEGMENTS, seed=0)
+    null, reference = bank.model(), bank.reference(3 * SEGMENTS, noise=0.0, seed=0)
     found = []
     for _ in range(150):
         data = world.data(null, effect(0.0))
@@ -117,7 +118,7 @@ def test_a_bank_of_shorter_experiments_than_the_data_is_refused(world: World) ->
     columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
     bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
     with pytest.raises(InputError, match="17 segments"):
-        bank.reference(WINDS * SEGMENTS + 1, seed=0)
+        bank.reference(WINDS * SEGMENTS + 1, noise=0.0, seed=0)
 
 
 def test_strengths_are_found_within_their_errors(world: World, null: NullModel) -> None:
