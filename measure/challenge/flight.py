@@ -38,8 +38,15 @@ INSTANTS = 6
 HORIZON = 0.1
 _OUTER = 4e-3  # s; of the forces beside the base model, halved where they change faster
 _SHORTEST_OUTER = 1e-4
+_LEAST_OUTER = 1e-3  # s; a cloth that diverges at half of this diverges by itself
 _START_NOISE = 2e-3  # m
 _GUST_RATE = 10.0  # Hz
+
+
+class DivergedError(FlagdataError):
+    """A simulated cloth that is no longer one."""
+
+    kind = "diverged"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +98,7 @@ def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Fl
     """Set → what its cloth did. The clock of the effects starts with the run, `settle` before the first frame.
 
     Raises:
-        FlagdataError: a flag diverged.
+        DivergedError: a flag diverged, on short outer steps too.
     """
     numerics = recipe.numerics[keys[0].numerics]
     winds = {key.name: _winds(recipe, seed, key) for key in keys}
@@ -100,8 +107,7 @@ def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Fl
     effects = [_effect(recipe, seed, keys, name) for name in names]
     with torch.no_grad():
         system, state = apply(effects, base, start)
-        stepper = _Stepper.of(numerics)
-        frames, snapshots = _run(recipe, keys, stepper, system, state)
+        stepper, frames, snapshots = _steady(recipe, keys, _Stepper.of(numerics), system, state)
         impact = _impacts(stepper, system, base, snapshots) if effects else torch.zeros(base.cloth.batch)
     result: dict[str, Flight] = {}
     for place, key in enumerate(keys):
@@ -211,6 +217,12 @@ class _Stepper:
             return cls(method=BackwardEuler(step=numerics.step))
         return cls(method=Symplectic(outer=_OUTER))
 
+    def shorter(self) -> _Stepper | None:
+        """With half the outer step; None where there is none, or none shorter to be had."""
+        if not isinstance(self.method, Symplectic) or self.method.outer is None or self.method.outer < _LEAST_OUTER:
+            return None
+        return _Stepper(method=replace(self.method, outer=self.method.outer / 2))
+
     def advance(self, system: System, state: State, duration: float) -> State:
         method: Integrator = self.method
         while True:
@@ -220,6 +232,21 @@ class _Stepper:
                 if not isinstance(method, Symplectic) or method.outer is None or method.outer < _SHORTEST_OUTER:
                     raise
                 method = replace(method, outer=method.outer / 2)
+
+
+def _steady(
+    recipe: ChallengeRecipe, keys: Sequence[Key], stepper: _Stepper, system: System, state: State
+) -> tuple[_Stepper, dict[int, NDArray[np.float32]], list[State]]:
+    """`_run` with outer steps short enough for what acts: halved where a cloth diverges, since impulses that resist
+    motion overshoot on long steps."""
+    while True:
+        try:
+            return stepper, *_run(recipe, keys, stepper, system, state)
+        except DivergedError:
+            shorter = stepper.shorter()
+            if shorter is None:
+                raise
+            stepper = shorter
 
 
 def _run(
@@ -242,7 +269,7 @@ def _run(
             healthy = state.healthy()
             if not bool(healthy.all()):
                 member = int(torch.nonzero(~healthy)[0])
-                raise FlagdataError(
+                raise DivergedError(
                     f"the cloth diverged {tick / ticks:.2f} s after the first frame",
                     where=f"{keys[member // recipe.count].name}, numerics {keys[0].numerics!r}",
                     fix="narrow the recipe's ranges of damping or of that effect",

@@ -47,7 +47,7 @@ def make(
 
     Raises:
         ConflictError: the folder is not empty.
-        FlagdataError: a flag diverged.
+        DivergedError: a flag diverged, on short steps too.
     """
     target = files.fresh(path)
     keys = draw(recipe, seed=seed, count=count)
