@@ -58,7 +58,8 @@ class Options:
         seed: of the nulls.
         level: of the global test.
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
-        bank: a folder of nulls over priors that hold for this design; None simulates nulls about the estimates.
+        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers and
+            winds, over the same priors.
         workers: processes for the nulls.
 
     Raises:
