@@ -100,8 +100,8 @@ class Logarithmic(Scale):
 
     def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
         first, last = math.ceil(math.log10(self.low)), math.floor(math.log10(self.high))
-        if last - first < 1:
-            return self._apart([(v, number(v, digits=2)) for v in _within_decade(self.low, self.high)], room)
+        if last - first < 2:
+            return self._apart([(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room)
         return self._apart([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
 
     def _apart(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:

@@ -2,10 +2,15 @@
 
 JSON has no NaN and no infinities. A number that is missing is null; an interval's open end is "Infinity" or
 "-Infinity", as in the JSON mapping of Protocol Buffers.
+
+The cloth in motion, most of a verdict by far, is packed: {"shape": [frame, marker, 3], "float32": base64 of the values
+[m], little-endian}, where a missing one is NaN. Documents that hold it as nested lists are read too.
 """
 
 from __future__ import annotations
 
+import base64
+import binascii
 import dataclasses
 import math
 import types
@@ -13,17 +18,26 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
+
 from flagdata.errors import InputError
 from measure.loop.verdict import Verdict
 
 SCHEMA = "flagdata.verdict/1"
 _SCALARS = {bool: "true or false", int: "a whole number", str: "a text"}
+_MOVING = ("observed", "before", "after")
+_Moving = list[list[list[float]]]
 _INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
 
 
 def as_document(verdict: Verdict) -> dict[str, Any]:
     """The verdict as JSON values, with its schema tag."""
-    return _plain(verdict.as_dict())
+    content = _plain({**verdict.as_dict(), "residuals": ()})
+    content["residuals"] = [
+        {**_plain({**own, **dict.fromkeys(_MOVING)}), **{name: _packed(own[name]) for name in _MOVING}}
+        for own in map(dataclasses.asdict, verdict.residuals)
+    ]
+    return content
 
 
 def from_document(document: Mapping[str, Any]) -> Verdict:
@@ -51,11 +65,28 @@ def _plain(value: Any) -> Any:
     return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
 
 
+def _packed(frames: _Moving) -> dict[str, Any]:
+    values = np.asarray(frames, dtype="<f4").reshape(len(frames), len(frames[0]) if frames else 0, 3)
+    return {"shape": list(values.shape), "float32": base64.b64encode(values.tobytes()).decode("ascii")}
+
+
+def _unpacked(value: Mapping[str, Any], where: str) -> _Moving:
+    try:
+        data = np.frombuffer(base64.b64decode(value["float32"], validate=True), dtype="<f4")
+        return data.astype(np.float64).reshape(value["shape"]).tolist()
+    except (KeyError, TypeError, ValueError, binascii.Error) as error:
+        raise InputError(
+            f"packed values that cannot be read: {error}", where=where, fix="give shape, and float32 in base64"
+        ) from error
+
+
 def _read(value: Any, kind: Any, where: str) -> Any:
     """`value` as `kind`: one of the verdict's types, built from dataclasses, tuples, lists, numbers and texts."""
     if get_origin(kind) in (Union, types.UnionType):
         (present,) = (k for k in get_args(kind) if k is not types.NoneType)
         return None if value is None else _read(value, present, where)
+    if kind == _Moving and isinstance(value, Mapping):
+        return _unpacked(value, where)
     if dataclasses.is_dataclass(kind):
         return _record(value, kind, where)
     if get_origin(kind) in (tuple, list):

@@ -45,6 +45,7 @@ def page(verdict: Verdict) -> str:
     """The report of `verdict`, HTML."""
     errors = rows.errors_scale(verdict.comparisons)
     gains = rows.gain_scale(verdict.ranking)
+    named = sentences.named_candidates(verdict)
     motions = [m for m in map(motion.motion, verdict.residuals) if m is not None]
     values = {
         "verdict": verdict,
@@ -53,7 +54,7 @@ def page(verdict: Verdict) -> str:
         "test_sentence": sentences.test_sentence(verdict.test),
         "remark": sentences.test_remark(verdict.test),
         "p_interval": sentences.p_interval(verdict.test),
-        "named": sentences.named_candidates(verdict),
+        "named": named,
         "rejected": sentences.rejected(verdict),
         "warnings": sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict),
         "after_label": sentences.after_label(verdict),
@@ -66,7 +67,8 @@ def page(verdict: Verdict) -> str:
         "ranking_level": sentences.common_level(c.strength for c in verdict.ranking),
         "lengths": _lengths(verdict),
         "errors_row": lambda comparison: rows.errors_row(comparison, errors),
-        "gain_row": lambda c: rows.gain_row(c, gains, "after" if c.effect in verdict.named else "single"),
+        "gain_row": lambda c: rows.gain_row(c, gains, "after" if c in named else "single"),
+        "title": lambda c: sentences.candidate_title(verdict, c),
         "strength_row": rows.strength_row,
         "null": figures.null_distribution(verdict.test),
         "some_unseen": any(r.held_out for r in verdict.residuals),
@@ -182,4 +184,5 @@ _FILTERS = {
     "share": _share,
     "with_error": _with_error,
     "known": quantity.known,
+    "readable": sentences.readable,
 }

@@ -2,7 +2,8 @@
 
 Digits follow the Particle Data Group's rule ("Review of Particle Physics", Introduction, section 5.3): an uncertainty
 keeps two digits if its three leading digits lie below 355, and one above (from 950 on it is rounded up to 1000); the
-value and both ends of the interval are rounded to the same place.
+value and both ends of the interval are rounded to the same place; never to more than four significant digits, since an
+interval from a few values can be narrow by chance.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from measure.loop.verdict import Estimate
 MINUS = "\N{MINUS SIGN}"
 NONE = "\N{EM DASH}"
 _DIGITS = 3  # of a number that comes without an uncertainty
+_MOST_DIGITS = 4  # of a number that comes with one
 _WIDEST = 1e5  # from here on, and below 1e-3, powers of ten
 _NARROWEST = 1e-3
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -90,8 +92,8 @@ def estimate_parts(estimate: Estimate | None, *, shown: Display | None = None) -
         return f"{number(value)}{inside.suffix}", ""
     if not 0 < half < math.inf:
         return f"{number(value)}{inside.suffix}", f"[{number(low)}, {number(high)}]"
-    place = decimals(half)
     largest = max(abs(value), abs(low), abs(high))
+    place = min(decimals(half), _MOST_DIGITS - 1 - math.floor(math.log10(largest)))
     power = ""
     if not (_NARROWEST <= largest < _WIDEST):
         exponent = math.floor(math.log10(largest))

@@ -15,7 +15,7 @@ _LEVEL = 0.9
 
 def heading(verdict: Verdict) -> str:
     """The conclusion in one line."""
-    named = listed(verdict.named)
+    named = listed(titles(verdict))
     partly = f"the base model lacked {named}, and something more" if verdict.named else "something is still missing"
     return {
         Conclusion.SUFFICIENT: "No effect needed: the base model explains these recordings",
@@ -31,6 +31,26 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "an unnamed effect"
 
 
+def titles(verdict: Verdict) -> tuple[str, ...]:
+    """What the verdict names, in its order; an effect of which several parameters were weighed with its parameter."""
+    found: list[str] = []
+    for name in verdict.named:
+        own = [c for c in verdict.ranking if c.effect == name]
+        acting = [c for c in own if not c.why_not]
+        found += [title(c.effect, c.parameter) for c in acting] if acting and len(own) > 1 else [name]
+    return tuple(found)
+
+
+def title(effect: str, parameter: str) -> str:
+    """An effect by one of its parameters."""
+    return f"{effect} ({readable(parameter)})"
+
+
+def readable(name: str) -> str:
+    """A parameter's name as it is written in a sentence."""
+    return name.replace("_", " ")
+
+
 def after_label(verdict: Verdict) -> str:
     """What the columns "after" are of."""
     if verdict.conclusion is Conclusion.SUFFICIENT:
@@ -38,8 +58,8 @@ def after_label(verdict: Verdict) -> str:
     if not verdict.named:
         return "with the corrective field"
     if verdict.conclusion is Conclusion.ONE_OF:
-        return f"with the best of {listed(verdict.named)}"
-    return f"with {listed(verdict.named)}"
+        return f"with the best of {listed(titles(verdict))}"
+    return f"with {listed(titles(verdict))}"
 
 
 def test_sentence(test: NullTest) -> str:
@@ -48,10 +68,10 @@ def test_sentence(test: NullTest) -> str:
     says = "is rejected" if test.p_value <= test.level else "is not rejected"
     spread = p_interval(test)
     interval = f" [{probability(spread.low)}, {probability(spread.high)}] {level_text(_LEVEL)}" if spread else ""
-    more = "" if counted(test) else ", to which more than the statistic shown here contributes"
+    more = "" if counted(test) else " The p-value is corrected for a second test, of all that the base model leaves."
     return (
-        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}{more}. "
-        f"{as_large(test)} of {len(null)} nulls reach the observed statistic {number(test.statistic)}."
+        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}. "
+        f"{as_large(test)} of {len(null)} groups of nulls reach the observed statistic {number(test.statistic)}.{more}"
     )
 
 
@@ -105,7 +125,7 @@ def p_interval(test: NullTest) -> Estimate | None:
 def control_warnings(verdict: Verdict) -> list[str]:
     """Where the wrong effect helps as much as the named one, the attribution fails: one sentence each."""
     return [
-        f"On {c.what} the control {c.control_name} does as well as the named effect: the attribution fails there."
+        f"{_begun(c.what)}: the control {c.control_name} does as well as the named effect: the attribution fails there."
         for c in verdict.comparisons
         if c.control is not None and known(c.control) and known(c.after) and c.control.value <= c.after.value
     ]
@@ -118,20 +138,32 @@ def reduction_warnings(verdict: Verdict) -> list[str]:
         if not known(c.after):
             continue
         if c.share is None and known(c.floor):
-            found.append(f"On {c.what} the base model errs no more than the numerical floor: nothing was to be gained.")
+            what = "the base model errs no more than the numerical floor: nothing was to be gained"
+            found.append(f"{_begun(c.what)}: {what}.")
         elif known(c.reduction) and c.reduction.low <= 0:
-            found.append(f"On {c.what} the reduction cannot be told from zero.")
+            found.append(f"{_begun(c.what)}: the reduction cannot be told from zero.")
     return found
 
 
 def named_candidates(verdict: Verdict) -> list[Candidate]:
-    """The candidates that the verdict names, in its order."""
-    return [c for name in verdict.named for c in verdict.ranking if c.effect == name]
+    """The candidates that the verdict names, in its order: of an effect with several parameters, those that act."""
+    return [c for name in verdict.named for c in verdict.ranking if c.effect == name and not c.why_not]
 
 
 def rejected(verdict: Verdict) -> list[Candidate]:
     """The candidates that it does not name."""
-    return [c for c in verdict.ranking if c.effect not in verdict.named]
+    return [c for c in verdict.ranking if c not in named_candidates(verdict)]
+
+
+def candidate_title(verdict: Verdict, candidate: Candidate) -> str:
+    """The effect's name; with the parameter where several of its parameters were weighed."""
+    several = sum(c.effect == candidate.effect for c in verdict.ranking) > 1
+    return title(candidate.effect, candidate.parameter) if several else candidate.effect
+
+
+def _begun(text: str) -> str:
+    """As the beginning of a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def common_level(estimates: Iterable[Estimate]) -> str:

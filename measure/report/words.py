@@ -38,7 +38,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
     remark = sentences.test_remark(verdict.test)
     yield _item("test", " ".join([sentences.test_sentence(verdict.test), remark]).strip())
     for candidate in sentences.named_candidates(verdict):
-        yield _item(candidate.effect, _weighed(candidate))
+        yield _item(sentences.candidate_title(verdict, candidate), _weighed(candidate))
     for comparison in verdict.comparisons:
         yield _item(comparison.what, _compared(comparison, sentences.after_label(verdict)))
     for warning in sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict):
@@ -50,7 +50,9 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
         yield _item(parameter.name, f"{with_level(parameter.before)}{moved}")
     others = sentences.rejected(verdict)
     for candidate in others[:_RUNNERS_UP]:
-        yield _item(f"not {candidate.effect}", candidate.why_not or "no reason was recorded")
+        yield _item(
+            f"not {sentences.candidate_title(verdict, candidate)}", candidate.why_not or "no reason was recorded"
+        )
     if len(others) > _RUNNERS_UP:
         yield _item("", f"and {len(others) - _RUNNERS_UP} more were weighed; the page has them all")
     for label, text in (("would separate", verdict.separating), ("proposal", verdict.proposal)):
@@ -65,7 +67,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
 def _weighed(candidate: Candidate) -> str:
     gain = with_error(candidate.gain, candidate.gain_error)
     parts = [
-        f"{candidate.parameter} {with_level(candidate.strength)}",
+        f"{sentences.readable(candidate.parameter)} {with_level(candidate.strength)}",
         f"z = {in_errors(candidate.z)}, p = {probability(candidate.p_family)} in the family",
         f"held-out gain {gain} nat",
         f"p = {probability(candidate.leftover)} for what it leaves",

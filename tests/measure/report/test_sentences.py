@@ -9,6 +9,7 @@ import pytest
 
 from measure.loop.verdict import Conclusion, NullTest
 from measure.report import sentences
+from measure.report.words import words
 from tests.measure.report.verdicts import about, verdict
 
 
@@ -52,8 +53,24 @@ def test_a_p_value_that_other_tests_contribute_to_gets_no_interval_and_no_critic
     assert sentences.p_interval(alone) is not None
     assert sentences.critical_value(combined) is None
     assert sentences.p_interval(combined) is None
-    assert "more than the statistic shown here contributes" in sentences.test_sentence(combined)
-    assert "contributes" not in sentences.test_sentence(alone)
+    assert "corrected for a second test" in sentences.test_sentence(combined)
+    assert "corrected" not in sentences.test_sentence(alone)
+
+
+def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
+    """A pole's lean and its sway are weighed apart: one acting does not name the other."""
+    whole = verdict(Conclusion.EFFECT)
+    lean, sway = (
+        replace(c, effect="tilted-pole", parameter=parameter, why_not=why)
+        for c, parameter, why in zip(whole.ranking, ("lean_angle", "sway"), ("", "far behind"), strict=False)
+    )
+    whole = replace(whole, named=("tilted-pole",), ranking=(lean, sway, *whole.ranking[2:]))
+    assert sentences.named_candidates(whole) == [lean]
+    assert sentences.rejected(whole) == [sway, *whole.ranking[2:]]
+    assert sentences.heading(whole) == "The base model lacked tilted-pole (lean angle)"
+    assert "  not tilted-pole (sway): far behind" in words(whole).splitlines()
+    both = replace(whole, conclusion=Conclusion.ONE_OF, ranking=(lean, replace(sway, why_not=""), *whole.ranking[2:]))
+    assert sentences.titles(both) == ("tilted-pole (lean angle)", "tilted-pole (sway)")
 
 
 def test_a_base_model_that_is_not_rejected_is_not_called_true() -> None:
