@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.console import document, json_option, say
+from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
     from measure.propose.outcome import Outcome
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 @click.argument("recipe_path", metavar="RECIPE.toml", type=click.Path(path_type=Path))
 @click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings; seek no other.")
 @click.option("--known", multiple=True, metavar="EFFECT.STRENGTH", help="What the model has already; may be repeated.")
-@click.option("--nulls", type=click.IntRange(min=64), help="Null recordings; 192 by default.")
+@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 192 (the default) or more.")
+@click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
               help="Of the test of every term; 0.03 by default.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
@@ -34,6 +36,7 @@ def propose(
     effect: str | None,
     known: tuple[str, ...],
     nulls: int | None,
+    bank: Path | None,
     level: float | None,
     seed: int,
     workers: int | None,
@@ -44,9 +47,10 @@ def propose(
     """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
 
     RECIPE.toml is one of `flagdata close-loop --recipe` that names its recordings. Terms are sought in a part of them;
-    up to three become an effect, written as a module with its contract tests; the rest of the recordings decide. What
-    was tried goes into proposal/ledger.json. Run it where close-loop says "none of the library"; where it says "partly
-    explained", name what it found with --known. --effect tests such a file on other recordings.
+    up to three become an effect, written as a module with its contract tests; the rest of the recordings decide: errors
+    must fall, and below those of as many terms of another direction. What was tried goes into proposal/ledger.json. Run
+    it where close-loop says "none of the library"; where it says "partly explained", name what it found with --known.
+    --effect tests such a file on other recordings, beside the terms as controls.
 
     \b
       flagdata propose flag.toml
@@ -64,15 +68,17 @@ def propose(
     from measure.propose.words import words
 
     recipe = recipes.load(recipe_path)
-    options = Options(seed=seed, workers=workers or len(os.sched_getaffinity(0)))
+    if bank is not None and nulls is not None:
+        raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
+    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)))
     level, nulls = level or recipe.level, nulls or recipe.nulls
     options = replace(options, level=level or options.level, nulls=nulls or options.nulls)
-    tried = dictionary() if effect is None else candidates.from_file(effect)
+    tried, controls = (dictionary(), ()) if effect is None else (candidates.from_file(effect), dictionary())
     observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))
     refuse(observed.findings)
     outcome = seek(
-        observed.experiment, tried, known=[candidates.weighed(name) for name in known], options=options,
-        stage=stage_bars(),
+        observed.experiment, tried, known=[candidates.weighed(name) for name in known],
+        controls=controls, options=options, stage=stage_bars(),
     )  # fmt: skip
     folder = out / "proposal"
     spec = effect or ""

@@ -18,6 +18,21 @@ class Decision(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Ranked:
+    """A term alone.
+
+    Attributes:
+        name: of its column.
+        statistic: calibrated, 1 in the mean of nulls.
+        gain: in log likelihood of left-out recordings.
+    """
+
+    name: str
+    statistic: float
+    gain: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Course:
     """How the amplitude of a term behaves: fitted to each stretch of time, with the rest of the model as it is.
 
@@ -114,8 +129,7 @@ class Outcome:
         reason: why.
         steps: terms looked at, in order.
         tried: how many terms were candidates.
-        screened: name of every term that was screened → share of the best one's gain on left-out recordings; empty
-            where all candidates met the nulls.
+        ranking: of all candidates, each alone, best first.
         strengths: of the proposal; empty where no term was taken.
         retest: on untouched data; None where there was nothing to test.
         level: of the search's tests.
@@ -129,7 +143,7 @@ class Outcome:
     reason: str
     steps: tuple[Step, ...]
     tried: int
-    screened: dict[str, float]
+    ranking: tuple[Ranked, ...]
     strengths: tuple[Strength, ...]
     retest: Retest | None
     level: float

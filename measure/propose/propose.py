@@ -1,8 +1,8 @@
 """Effects from data: terms sought in a part of recordings, fitted there, and tested on the rest.
 
-Many terms are screened by what they predict of recordings left out, which costs no nulls; a shortlist meets recordings
-of the base model itself, whose numerics could look like a term; what is taken is run again on data that nothing has
-seen, beside terms of another direction and beside what numerics leave.
+Terms are seen through a lens, along the directions in which the base model's own errors are known from nulls: its
+numerics could look like a term. What is taken is run again on data that nothing has seen, beside terms of another
+direction and beside what numerics leave.
 """
 
 from __future__ import annotations
@@ -10,32 +10,43 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
+from measure.loop import bank as banks
 from measure.loop.attribution import estimate
-from measure.loop.close import Setting, Stage
-from measure.loop.columns import THETA, EffectColumn
-from measure.loop.inference import Evidence
-from measure.loop.reference import GUSTS, NullBank, Reference
-from measure.loop.refine import Refined, refine
+from measure.loop.close import FEWEST_NULLS, Setting, Stage
+from measure.loop.columns import THETA, Column, EffectColumn
+from measure.loop.inference import Evidence, NullModel, gains
+from measure.loop.reference import NullBank
+from measure.loop.statistics import Statistics
 from measure.observe.trajectory import Experiment
 from measure.propose import nulls
-from measure.propose.candidates import weighed
 from measure.propose.course import course
-from measure.propose.outcome import Decision, Outcome, Strength
+from measure.propose.family import Family
+from measure.propose.fit import Fitted, fit
+from measure.propose.lens import Lens, evidence
+from measure.propose.outcome import Decision, Outcome, Ranked, Strength
 from measure.propose.retest import retest
-from measure.propose.screen import SHORT, Screened, screen
 from measure.propose.search import Step, search, wrong
-from measure.propose.sensitivities import statistics
 from measure.propose.split import data_hash, split
 from measure.propose.terms import MASS, TermColumn
 from sim.effects.field import Flat
 
+Floats = NDArray[np.float64]
+
 _CALM = 0.3
 """Wind below which its direction is not known well enough for terms along it [m/s]."""
+
+
+_MOVES = (0.12, 0.06)
+"""By which the places of local terms are improved, as shares of width and height."""
+_CLOSE = 0.6
+"""A local term with this share of the best one's gain is worth a better place."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +56,8 @@ class Options:
     Attributes:
         seed: of the nulls.
         level: of each step's test against nulls.
-        nulls: null recordings simulated, at least.
+        nulls: null recordings simulated where no bank is given, at least.
+        bank: a folder of nulls over priors that hold for this design, as `flagdata close-loop --bank` takes it.
         workers: processes for them.
 
     Raises:
@@ -54,16 +66,18 @@ class Options:
 
     seed: int = 0
     level: float = 0.03
-    nulls: int = 192
+    nulls: int = FEWEST_NULLS
+    bank: Path | None = None
     workers: int = 1
 
     def __post_init__(self) -> None:
         if not 0 < self.level < 1:
             raise UsageError(f"a level of {self.level!r}", where="propose", fix="give one between 0 and 1")
-        if self.nulls < 64 or self.workers < 1:
+        if self.nulls < FEWEST_NULLS or self.workers < 1:
             raise UsageError(
-                f"{self.nulls} nulls by {self.workers} workers", where="propose", fix="give 64 or more, and 1 or more"
-            )
+                f"{self.nulls} nulls by {self.workers} workers", where="propose",
+                fix=f"give {FEWEST_NULLS} or more, and 1 or more",
+            )  # fmt: skip
 
 
 def propose(
@@ -89,17 +103,15 @@ def propose(
     torch.set_num_threads(1)
     tell = stage or (lambda what, done, total: None)
     setting = made_ready(experiment)
-    screened = Screened(columns=tuple(candidates), gains={})
-    if len(candidates) > SHORT:
-        tell("screening", 0, 1)
-        seen = setting.segments.select(np.flatnonzero(split(setting.segments, setting.speeds).seen))
-        screened = screen(setting.forecaster, seen, candidates, known)
-        tell("screening", 1, 1)
-    columns = considered([*screened.columns, *controls], known)
-    planned = nulls.batches(setting, nulls=options.nulls, seed=options.seed)
-    bank = nulls.bank(planned, columns, workers=options.workers, stage=tell)
-    found = weigh(setting, columns, bank, known=known, controls=controls, options=options, stage=tell)
-    return replace(found, tried=max(found.tried, len(screened.gains)), screened=screened.gains)
+    if options.bank is not None:
+        bank = nulls.given(options.bank, setting)
+    else:
+        bank = nulls.simulated(
+            setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
+        )  # fmt: skip
+    return weigh(
+        setting, candidates, bank, banks.columns(), known=known, controls=controls, options=options, stage=tell
+    )
 
 
 def made_ready(experiment: Experiment) -> Setting:
@@ -118,98 +130,136 @@ def made_ready(experiment: Experiment) -> Setting:
     return setting
 
 
-def considered(candidates: Sequence[EffectColumn], known: Sequence[EffectColumn]) -> tuple[EffectColumn, ...]:
-    """All columns of the evidence: the wind's scale (for gusts), effects that are known, candidates."""
-    first = {column.name: column for column in (weighed(GUSTS), *known)}
-    return (*first.values(), *(column for column in candidates if column.name not in first))
-
-
 def weigh(
     setting: Setting,
-    columns: Sequence[EffectColumn],
+    candidates: Sequence[EffectColumn],
     bank: NullBank,
+    weighed: Sequence[Column],
     *,
     known: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
     options: Options,
     stage: Stage,
 ) -> Outcome:
-    """The outcome for recordings, given nulls along the same columns (see `considered`).
+    """The outcome for recordings, given nulls.
+
+    Args:
+        weighed: the columns that the nulls are known along, the calibrated parameters left out.
 
     Raises:
-        InputError: nulls of other columns or of segments of another length; too few segments.
+        InputError: nulls of segments of another length; too few segments.
     """
-    if bank.columns != nulls.names(columns) or abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
-        raise InputError(
-            f"nulls along {len(bank.columns)} columns by {bank.duration:.2g} s, "
-            f"data along {len(columns) + len(THETA)} by {setting.segments.duration:.2g} s",
-            where="null bank", fix="simulate nulls for these columns and recordings",
-        )  # fmt: skip
-    names = nulls.names(columns)
-    beside = [names.index(column.name) for column in known]
-    fixed = {GUSTS, *(column.name for column in known)}
-    others = [place for place in range(len(THETA), len(names)) if names[place] not in fixed]
-    only = {column.name for column in controls}
-    pool = [place for place in others if names[place] not in only]
+    nulls.check(bank, setting)
     parts = split(setting.segments, setting.speeds)
     seen = setting.segments.select(np.flatnonzero(parts.seen))
-    stage("terms", 0, 1)
-    found = statistics(setting.forecaster, seen, columns)
+    untouched = setting.segments.select(np.flatnonzero(~parts.seen))
     null = bank.model()
-    speeds = setting.speeds[np.array([s.recording for s in seen.items])]
-    evidence = Evidence.of(found, speeds, null)
-    reference = bank.reference(
-        len(seen), noise=max(s.noise for s in setting.segments.items), seed=options.seed
-    )
-    steps = search(evidence, reference, names, pool, beside=beside, level=options.level)
+    stage("terms", 0, 1)
+    lens = Lens.of(setting.forecaster, seen, weighed)
+    speeds = lens.speeds(setting.speeds)
+    tried = _tried(lens, null, speeds, candidates, [*known, *controls])
+    own = evidence(tried.found, speeds, null)
+    noise = max(segment.noise for segment in seen.items)
+    family = Family.of(bank.nulls, tried.found, noise=noise, seed=options.seed)
+    names = tuple(column.name for column in tried.columns)
+    beside = list(range(len(THETA), len(THETA) + len(known)))
+    others = list(range(len(THETA) + len(known), len(THETA) + len(names)))
+    pool = others[len(controls) :]
+    labels = (*(name for name, _, _ in THETA), *names)
+    steps = search(own, family, labels, pool, beside=beside, level=options.level)
     stage("terms", 1, 1)
     taken = [step for step in steps if step.taken]
-    chosen = [*beside, *(step.column for step in taken)]
-    untouched = setting.segments.select(np.flatnonzero(~parts.seen))
 
-    def fitted(active: Sequence[int]) -> Refined:
-        return refine(setting.forecaster, seen, evidence, null, speeds, active, weighed=columns)
+    def fitted(columns: Sequence[int]) -> Fitted:
+        return fit(lens, null, speeds, [tried.columns[column - len(THETA)] for column in columns])
 
     strengths: tuple[Strength, ...] = ()
     tested = None
     decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
     if taken:
         stage("test on untouched data", 0, 1)
-        before, after = fitted(beside), fitted(chosen)
-        instead = wrong(evidence, others, [step.column for step in taken], beside)
+        before, after = fitted(beside), fitted([*beside, *(step.column for step in taken)])
+        instead = wrong(own, others, [step.column for step in taken], beside)
         tested = retest(
             setting, untouched, before.model, after.model, words=parts.words, seed=options.seed,
-            control=fitted([*beside, *instead]).model if instead else None, control_names=[names[c] for c in instead],
+            control=fitted([*beside, *instead]).model if instead else None,
+            control_names=[labels[column] for column in instead],
         )  # fmt: skip
-        strengths = _strengths(setting, evidence, reference, names, taken, beside, after)
+        strengths = _strengths(setting, own, family, taken, beside, after)
         decision, reason = tested.decided
         stage("test on untouched data", 1, 1)
     return Outcome(
-        decision=decision, reason=reason, steps=steps, tried=len(pool), screened={}, strengths=strengths,
-        retest=tested, level=options.level, nulls=bank.words, proposed_from=data_hash(seen),
+        decision=decision, reason=reason, steps=steps, tried=len(pool), ranking=_ranking(own, family, labels, pool),
+        strengths=strengths, retest=tested, level=options.level, nulls=bank.words, proposed_from=data_hash(seen),
         tested_on=data_hash(untouched), known=tuple(column.name for column in known), seed=options.seed,
     )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Tried:
+    """Columns, and what the lens sees of them after the calibrated parameters."""
+
+    columns: tuple[EffectColumn, ...]
+    found: Statistics
+
+
+def _tried(
+    lens: Lens, null: NullModel, speeds: Floats, candidates: Sequence[EffectColumn], fixed: Sequence[EffectColumn]
+) -> _Tried:
+    """Fixed columns, candidates, and the best local candidate at places nearby."""
+    columns = (*fixed, *candidates)
+    tried = _Tried(columns=columns, found=lens.of_columns(columns))
+    for size in _MOVES:
+        first = len(THETA) + len(fixed)
+        gained = gains(
+            evidence(tried.found, speeds, null), [[c] for c in range(first, len(THETA) + len(tried.columns))]
+        )
+        moved = _moved(dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size)
+        if not moved:
+            break
+        more = lens.of_columns(moved).response[:, :, len(THETA) :]
+        response = np.concatenate([tried.found.response, more], axis=2)
+        tried = _Tried(columns=(*tried.columns, *moved), found=replace(tried.found, response=response))
+    return tried
+
+
+def _moved(gained: dict[EffectColumn, float], size: float) -> list[TermColumn]:
+    """The best local term at places nearby, if it is among the best at all."""
+    best = max(gained.values(), default=0.0)
+    near = {c: g for c, g in gained.items() if isinstance(c, TermColumn) and c.term.at.place and g >= _CLOSE * best}
+    if not near or best <= 0:
+        return []
+    term = max(near, key=lambda column: near[column]).term
+    count = len(term.at.place)
+    steps = np.array(np.meshgrid(*[(-size, 0.0, size)] * count)).reshape(count, -1).T
+    found = {column.name: column for column in (TermColumn.of(term.moved(*step)) for step in steps.tolist())}
+    known = {column.name for column in gained}
+    return [column for name, column in found.items() if name not in known]
+
+
+def _ranking(own: Evidence, family: Family, names: tuple[str, ...], pool: Sequence[int]) -> tuple[Ranked, ...]:
+    """All terms, each alone, best first."""
+    statistics, gained = family.statistics(own), gains(own, [[column] for column in pool]).sum(axis=1)
+    made = [
+        Ranked(name=names[column], statistic=float(statistics[column]), gain=float(gain))
+        for column, gain in zip(pool, gained, strict=True)
+    ]
+    return tuple(sorted(made, key=lambda ranked: -ranked.gain))
+
+
 def _strengths(
-    setting: Setting,
-    evidence: Evidence,
-    reference: Reference,
-    names: tuple[str, ...],
-    taken: Sequence[Step],
-    beside: Sequence[int],
-    after: Refined,
+    setting: Setting, own: Evidence, family: Family, taken: Sequence[Step], beside: Sequence[int], after: Fitted
 ) -> tuple[Strength, ...]:
     """Fitted beyond the linear; errors are scaled by what makes the nulls' mean squared z 1."""
     chosen = [*beside, *(step.column for step in taken)]
-    fit = evidence.fit(chosen)
+    linear = own.fit(chosen)
     made: list[Strength] = []
     for place, step in enumerate(taken, start=len(beside)):
         column, value = after.model.effects[place]
-        linear, claimed = fit.of(step.column)
+        first, claimed = linear.of(step.column)
         others = [c for c in chosen if c != step.column]
-        statistic = float(reference.statistics(evidence, names, others)[step.column])
-        scale = max(1.0, abs(linear) / math.sqrt(max(statistic, 1e-12)) / claimed)
+        statistic = float(family.statistics(own, others)[step.column])
+        scale = max(1.0, abs(first) / math.sqrt(max(statistic, 1e-12)) / claimed)
         error = scale * after.errors[len(THETA) + place]
         shown = estimate(column.described.null + value, error, column.unit)
         words = _words(setting, column, value, after.model.calibration.density)

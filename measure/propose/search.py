@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure.loop.inference import Evidence, gains
-from measure.loop.reference import Reference
+from measure.propose.family import Family
 
 MOST = 3
 _FAR = 2.0
@@ -52,7 +52,7 @@ class Step:
 
 def search(
     evidence: Evidence,
-    reference: Reference,
+    family: Family,
     names: tuple[str, ...],
     candidates: Sequence[int],
     *,
@@ -73,7 +73,7 @@ def search(
         pool = [column for column in candidates if column not in chosen]
         if not pool:
             break
-        step = _best(evidence, reference, names, pool, chosen, level=level, first=not steps)
+        step = _best(evidence, family, names, pool, chosen, candidates, level=level, first=not steps)
         steps.append(step)
         if not step.taken:
             break
@@ -83,16 +83,17 @@ def search(
 
 def _best(
     evidence: Evidence,
-    reference: Reference,
+    family: Family,
     names: tuple[str, ...],
     pool: Sequence[int],
     chosen: Sequence[int],
+    candidates: Sequence[int],
     *,
     level: float,
     first: bool,
 ) -> Step:
-    statistics = reference.statistics(evidence, names, chosen)
-    significant = [column for column in pool if reference.p_family(float(statistics[column])) <= level]
+    statistics = family.statistics(evidence, chosen)
+    significant = [c for c in pool if family.p_value(float(statistics[c]), candidates) <= level]
     looked = significant or [max(pool, key=lambda column: float(statistics[column]))]
     held_out = gains(evidence, [list(chosen), *([*chosen, column] for column in looked)])
     increments = held_out[1:] - held_out[0]
@@ -112,7 +113,7 @@ def _best(
     column = looked[place]
     return Step(
         name=names[column], column=column, statistic=float(statistics[column]),
-        p_family=reference.p_family(float(statistics[column])), gain=gain, gain_error=error, taken=not reason,
+        p_family=family.p_value(float(statistics[column]), candidates), gain=gain, gain_error=error, taken=not reason,
         reason=reason,
     )  # fmt: skip
 

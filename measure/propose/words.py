@@ -5,6 +5,9 @@ from __future__ import annotations
 from measure.loop.verdict import Estimate
 from measure.propose.outcome import Outcome, Retest
 
+_NEAREST = 4
+"""Terms beside those looked at that are told."""
+
 
 def words(outcome: Outcome) -> str:
     """What was tried, what was found, what became of it."""
@@ -15,6 +18,10 @@ def words(outcome: Outcome) -> str:
             f"  {step.name}: p = {step.p_family:.2g} of all terms, "
             f"held-out gain {step.gain:.1f} ± {step.gain_error:.1f}, {verb}"
         )
+    nearest = [ranked for ranked in outcome.ranking if ranked.name not in {step.name for step in outcome.steps}]
+    if nearest:
+        shown = ", ".join(f"{ranked.name} {ranked.gain:.1f}" for ranked in nearest[:_NEAREST])
+        lines.append(f"  not looked at further, by held-out gain alone: {shown}")
     for strength in outcome.strengths:
         lines.append(f"{strength.name} {interval(strength.estimate)}: {strength.words}")
         lines.append(f"  {strength.course.words}")

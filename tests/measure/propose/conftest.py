@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -13,13 +13,13 @@ from torch import Tensor
 
 from flagdata.rng import stream
 from measure.loop.bank import evaluate
-from measure.loop.columns import Calibration, EffectColumn
+from measure.loop.columns import THETA, Calibration, Column, EffectColumn, fields
+from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
+from measure.loop.statistics import Statistics
 from measure.observe.trajectory import Experiment, Specimen
-from measure.propose import nulls
-from measure.propose.propose import considered
-from measure.propose.terms import Term, TermColumn
+from measure.propose.terms import Term, columns_of
 from sim import handles
 from sim.cloth import Cloth
 from sim.effects.effect import Effect, ForceEffect
@@ -69,7 +69,13 @@ def columns() -> tuple[EffectColumn, ...]:
         ("upward", "lower"), ("downwind", "fly"), ("leftward", "everywhere"), ("leftward", "lower"),
         ("toward_pole", "lower_fly"), ("against_motion", "everywhere"),
     )  # fmt: skip
-    return considered([TermColumn.of(Term(field=field, shape=shape)) for field, shape in terms], ())
+    return columns_of([Term(field=field, shape=shape) for field, shape in terms])
+
+
+@pytest.fixture(scope="session")
+def lens() -> tuple[Column, ...]:
+    """What terms are seen along: the smooth fields, of which the small bank can hold the null distribution."""
+    return fields()
 
 
 def simulated(
@@ -86,9 +92,9 @@ def simulated(
 
 
 @pytest.fixture(scope="session")
-def bank(specimen: Specimen, columns: tuple[EffectColumn, ...]) -> NullBank:
-    """48 recordings of six meshes and methods."""
-    parts = []
+def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], lens: tuple[Column, ...]) -> tuple[Nulls, float]:
+    """48 recordings of six meshes and methods, along the lens and then along the terms; duration of a segment [s]."""
+    parts: list[Nulls] = []
     duration = 0.0
     for seed in range(KINDS):
         rng = stream(seed, "test", "nulls")
@@ -102,9 +108,26 @@ def bank(specimen: Specimen, columns: tuple[EffectColumn, ...]) -> NullBank:
         ]  # fmt: skip
         calibrations = [cloth for cloth in cloths for _ in range(RECORDINGS // CLOTHS)]
         speeds = [float(u) for u in rng.uniform(3.2, 6.5, RECORDINGS)]
-        made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, columns)
-        parts.append(made)
-    return NullBank(nulls=nulls.joined(parts), columns=nulls.names(columns), duration=duration, words="of the tests")
+        made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, (*lens, *columns))
+        shifted = replace(made.statistics, recording=made.statistics.recording + seed * RECORDINGS)
+        parts.append(replace(made, statistics=shifted))
+    whole = Nulls(
+        statistics=Statistics.joined([p.statistics for p in parts]), speeds=np.concatenate([p.speeds for p in parts]),
+        offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
+        noise=np.concatenate([p.noise for p in parts]),
+    )  # fmt: skip
+    return whole, duration
+
+
+@pytest.fixture(scope="session")
+def bank(nulls: tuple[Nulls, float], lens: tuple[Column, ...]) -> NullBank:
+    """The same along the lens alone: what a proposal is given."""
+    whole, duration = nulls
+    count = len(THETA) + len(lens)
+    own = whole.statistics
+    cut = replace(own, r=own.r[:, :count], response=own.response[:, :count, :count])
+    names = (*(name for name, _, _ in THETA), *(column.name for column in lens))
+    return NullBank(nulls=replace(whole, statistics=cut), columns=names, duration=duration, words="of the tests")
 
 
 @pytest.fixture(scope="session")

@@ -38,7 +38,7 @@ def proposal(**fitted: tuple[float, str]) -> Outcome:
         for name, (value, unit) in fitted.items()
     )  # fmt: skip
     return Outcome(
-        decision=Decision.KEPT, reason="", steps=(), tried=6, screened={}, strengths=strengths,
+        decision=Decision.KEPT, reason="", steps=(), tried=6, ranking=(), strengths=strengths,
         retest=None, level=0.03, nulls="", proposed_from="ab12" * 16, tested_on="cd34" * 16, known=(), seed=0,
     )  # fmt: skip
 

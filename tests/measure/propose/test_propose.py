@@ -10,12 +10,15 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.loop.columns import EffectColumn
-from measure.loop.inference import Evidence
+from measure.loop.columns import THETA, Column, EffectColumn
+from measure.loop.inference import NullModel, Nulls
 from measure.loop.reference import NullBank
+from measure.loop.verdict import Estimate
 from measure.observe.trajectory import Experiment, Specimen, WindTrack
 from measure.propose.effect_file import write
-from measure.propose.outcome import Decision, Outcome
+from measure.propose.family import Family
+from measure.propose.lens import evidence
+from measure.propose.outcome import Decision, Outcome, Retest
 from measure.propose.propose import Options, made_ready, weigh
 from measure.propose.search import search
 from measure.propose.words import words
@@ -29,23 +32,31 @@ def silent(what: str, done: int, total: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def found(pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank) -> Outcome:
-    return weigh(made_ready(pushed), columns, bank, options=Options(), stage=silent)
+def found(pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, lens: tuple[Column, ...]) -> Outcome:
+    return weigh(made_ready(pushed), columns, bank, lens, options=Options(), stage=silent)
 
 
-def test_nineteen_of_twenty_nulls_give_no_proposal(bank: NullBank) -> None:
+def test_nineteen_of_twenty_nulls_give_no_proposal(
+    nulls: tuple[Nulls, float], bank: NullBank, columns: tuple[EffectColumn, ...]
+) -> None:
     """Every kind of numerics in turn against the nulls of the others."""
-    pool = list(range(4, len(bank.columns)))
+    whole, rows = nulls[0], len(bank.columns)
+    labels = (*(name for name, _, _ in THETA), *(column.name for column in columns))
+    kept = [*range(len(THETA)), *range(rows, rows + len(columns))]
+    pool = list(range(len(THETA), len(labels)))
     tried = taken = 0
-    for kind in np.unique(bank.nulls.numerics):
-        inside = bank.nulls.numerics != kind
-        others = replace(bank, nulls=bank.nulls.select(inside))
-        evidence = Evidence.of_nulls(bank.nulls.select(~inside), others.model())
-        reference = others.reference(4, noise=NOISE, seed=0)
-        recordings = np.unique(evidence.recording)
-        for pair in recordings.reshape(-1, 2):
-            own = evidence.select(np.isin(evidence.recording, pair))
-            steps = search(own, reference, bank.columns, pool, level=0.03)
+    for kind in np.unique(whole.numerics):
+        inside = whole.numerics != kind
+        others, own = bank.nulls.select(inside), whole.select(~inside)
+        response = own.statistics.response[:, :rows][:, :, kept]
+        seen = replace(own.statistics, r=own.clean[:, :rows], response=response)
+        for pair in np.unique(seen.recording).reshape(-1, 2):
+            chosen = np.isin(seen.recording, pair)
+            data = seen.select(chosen)
+            family = Family.of(others, data, noise=float(own.noise[0]), seed=0)
+            steps = search(
+                evidence(data, own.speeds[chosen], NullModel.fit(others)), family, labels, pool, level=0.03
+            )  # fmt: skip
             tried, taken = tried + 1, taken + steps[0].taken
     assert tried == 24
     assert taken <= tried / 20
@@ -55,6 +66,11 @@ def test_a_planted_push_is_kept(found: Outcome) -> None:
     assert found.decision is Decision.KEPT, words(found)
     assert found.retest is not None
     assert found.retest.reduction.low > 0
+    # Beside terms of another direction, and above what the numerics leave.
+    assert found.retest.control is not None
+    assert found.retest.apart is not None
+    assert found.retest.apart.value > 0
+    assert found.retest.floor.value < found.retest.before.value
     assert any(strength.name.startswith("leftward") for strength in found.strengths)
     assert "kept" in words(found)
 
@@ -90,6 +106,32 @@ def test_a_recording_in_calm_air_is_refused(pushed: Experiment) -> None:
     calm = replace(first, wind=WindTrack.constant((0.1, 0.0, 0.0)))
     with pytest.raises(InputError, match="no direction"):
         made_ready(replace(pushed, recordings=(calm, *pushed.recordings[1:])))
+
+
+def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decision, str]:
+    """The decision for a reduction with a lower end, and a control with a difference and its lower end [m]."""
+    some = Estimate(value=0.01, low=0.009, high=0.011, unit="m")
+    control = None if apart is None else Estimate(value=apart[0], low=apart[1], high=0.01, unit="m")
+    return Retest(
+        what="", segments=6, before=some, after=some, reduction=replace(some, low=low), floor=some, share=None,
+        control=None if apart is None else some, apart=control, control_names=("drag",),
+    ).decided  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("low", "apart", "decision", "said"),
+    [
+        (-1e-4, None, Decision.REJECTED, "not lower beyond"), (1e-4, (-1e-4, -2e-4), Decision.REJECTED, "as much"),
+        (1e-4, (1e-4, -1e-4), Decision.KEPT, "form is open"), (1e-4, (1e-3, 5e-4), Decision.KEPT, "spent on drag"),
+        (1e-4, None, Decision.KEPT, "no term of another direction"),
+    ],
+)  # fmt: skip
+def test_what_helps_no_more_than_a_wrong_term_is_rejected(
+    low: float, apart: tuple[float, float] | None, decision: Decision, said: str
+) -> None:
+    found, reason = outcome_of(low=low, apart=apart)
+    assert found is decision
+    assert said in reason
 
 
 @pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"nulls": 10}, {"workers": 0}])

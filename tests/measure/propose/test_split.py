@@ -61,7 +61,7 @@ def test_the_hash_is_of_positions_and_wind() -> None:
 
 def outcome(seed: int) -> Outcome:
     return Outcome(
-        decision=Decision.REJECTED, reason="nulls show as much", steps=(), tried=6, screened={}, strengths=(),
+        decision=Decision.REJECTED, reason="nulls show as much", steps=(), tried=6, ranking=(), strengths=(),
         retest=None, level=0.03, nulls="none", proposed_from="ab", tested_on="cd", known=(), seed=seed,
     )  # fmt: skip
 

@@ -1,0 +1,103 @@
+"""What the terms' statistics are when nothing is missing: errors of nulls in the place of the data's.
+
+The response of the lens to the terms is the data's; what is seen through it is taken from null recordings, by a null
+model that has seen none of their numerics. So nulls along the directions of the lens alone test any number of terms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from measure.loop.columns import THETA
+from measure.loop.inference import Evidence, NullModel, Nulls
+from measure.loop.statistics import Statistics
+from measure.propose.lens import evidence
+
+Floats = NDArray[np.float64]
+
+_GROUPS = 400
+_NOTHING = 1e-6
+"""Mean share below which a term is never seen."""
+_ALIKE = 1e-3
+"""Difference of the markers' noise that does not matter [m]."""
+_LEAST = 24
+"""Groups of nulls as noisy as the data, below which all are taken."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Family:
+    """Null distributions of all terms together.
+
+    A term's statistic is the share of its drop of the squared distance in what is left with it, over the nulls' mean
+    share: 1 in the mean if nothing is missing.
+
+    Attributes:
+        shares: (group, column) of null groups.
+    """
+
+    shares: Floats
+
+    @classmethod
+    def of(cls, nulls: Nulls, found: Statistics, *, noise: float, seed: int) -> Family:
+        """For what a lens sees of data.
+
+        Args:
+            found: of the data.
+            noise: of the data's markers [m].
+
+        Raises:
+            InputError: no null experiment has as many segments.
+        """
+        rng = stream(seed, "null", "groups")
+        count, columns = found.response.shape[0], found.response.shape[2]
+        alike = nulls.select(np.abs(nulls.noise - noise) <= _ALIKE)
+        pool = alike if len(alike.noise) and len(np.unique(alike.experiment)) >= _LEAST else nulls
+        each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
+        shares: list[Floats] = []
+        for kind in np.unique(pool.numerics):
+            outside = pool.select(pool.numerics == kind)
+            model = NullModel.fit(nulls.select(nulls.numerics != kind))
+            clean, recording = outside.clean, outside.statistics.recording
+            for index in range(int(outside.experiment.max()) + 1):
+                own = [np.flatnonzero(recording == r) for r in np.unique(recording[outside.experiment == index])]
+                for _ in range(each):
+                    chosen = np.concatenate([own[k] for k in rng.permutation(len(own))])[:count]
+                    if len(chosen) < count:
+                        raise InputError(
+                            f"{count} segments of data against {len(chosen)} nulls of one experiment",
+                            where="null bank", fix="simulate longer nulls, or give shorter recordings",
+                        )  # fmt: skip
+                    placed = replace(found, r=clean[chosen])
+                    shares.append(_shares(evidence(placed, outside.speeds[chosen], model), ()))
+        result = np.array(shares)
+        return cls(shares=result[:, :columns])
+
+    @cached_property
+    def _spread(self) -> Floats:
+        return np.maximum(self.shares.mean(axis=0), _NOTHING)
+
+    @cached_property
+    def _scaled(self) -> Floats:
+        return self.shares[:, len(THETA) :] / self._spread[len(THETA) :]
+
+    def statistics(self, own: Evidence, beside: Sequence[int] = ()) -> Floats:
+        """(column,) of data, where some columns are fitted already."""
+        return _shares(own, beside) / self._spread
+
+    def p_value(self, statistic: float, columns: Sequence[int]) -> float:
+        """Share of the groups in which the largest statistic of these columns is at least this one."""
+        largest = self._scaled[:, [column - len(THETA) for column in columns]].max(axis=1)
+        return float((1 + (largest >= statistic).sum()) / (1 + len(largest)))
+
+
+def _shares(own: Evidence, beside: Sequence[int]) -> Floats:
+    drops, left = own.drops(beside), own.fit(beside).left
+    return drops / np.maximum(left - drops, 1e-9)

@@ -1,0 +1,55 @@
+"""Models fitted beyond the linear through a lens: linearised again where the last fit led, until they stay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.loop.columns import PRIOR, THETA, Calibration, EffectColumn
+from measure.loop.inference import NullModel
+from measure.loop.model import Model
+from measure.propose.lens import Lens, evidence
+
+Floats = NDArray[np.float64]
+
+_ROUNDS = 4
+_STAYS = 0.3
+"""Standard errors below which a step is not worth another round."""
+_LONGEST = 1.5
+"""A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """A model with standard errors of its calibrated parameters and strengths, as the null model has them."""
+
+    model: Model
+    errors: tuple[float, ...]
+
+
+def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectColumn]) -> Fitted:
+    """Calibrated parameters and strengths, by Gauss and Newton from the nominal model.
+
+    Args:
+        speeds: (segment,) of the wind [m/s].
+    """
+    model = Model(calibration=Calibration(), effects=tuple((column, 0.0) for column in columns))
+    step, errors = _step(lens, null, speeds, model)
+    for _ in range(_ROUNDS):
+        model = model.moved(tuple(step))
+        step, errors = _step(lens, null, speeds, model)
+        if np.abs(step / errors).max() < _STAYS:
+            break
+    return Fitted(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
+
+
+def _step(lens: Lens, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
+    """Of generalised least squares from a model, under the prior about the nominal calibration; standard errors."""
+    own = evidence(lens.at(model), speeds, null)
+    found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
+    value, error = np.array([found.of(column) for column in range(own.columns)]).T
+    longest = np.concatenate([_LONGEST * PRIOR, np.full(len(value) - len(PRIOR), np.inf)])
+    return np.clip(value, -longest, longest), error

@@ -1,0 +1,104 @@
+"""Through which terms are seen: the directions along which nulls are known, those of the library and of smooth fields.
+
+A term's own statistic would want nulls of its own, for each of many terms. Instead the errors are projected onto the
+directions s_i that `measure.loop.bank` weighs, whose null distribution is known, and a term is what it does to those:
+
+    E r_i = μ_i + Σ_j R_ij δ_j,   R_ij = Σ w s_i·c_j / √(Σ w s_i²)
+
+with c_j the sensitivity to term j. What a term does across all of these directions is not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from measure.loop.columns import THETA, Calibration, Column
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Evidence, NullModel
+from measure.loop.model import Model
+from measure.loop.statistics import Statistics, reduced
+from measure.propose.sensitivities import of_columns
+
+Floats = NDArray[np.float64]
+
+_TOGETHER = 40
+"""Columns that are brought down at a time: bounds memory."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lens:
+    """Segments with the sensitivities that they are looked at along.
+
+    Attributes:
+        forecaster: of the model.
+        segments: what is looked at.
+        base: errors of the nominal model (frame, marker, 3, segment) [m].
+        directions: sensitivities there, of the calibrated parameters and of what is weighed.
+    """
+
+    forecaster: Forecaster
+    segments: Segments
+    base: Tensor
+    directions: tuple[Tensor, ...]
+
+    @classmethod
+    def of(cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column]) -> Lens:
+        """Along the calibrated parameters and some columns: those of the nulls."""
+        nominal = [Calibration()] * len(segments)
+        base = forecaster.errors(*forecaster.system(segments, nominal), segments)
+        along = forecaster.calibration_sensitivities(segments, nominal, base)
+        found = of_columns(forecaster, segments, base, weighed)
+        return cls(
+            forecaster=forecaster, segments=segments, base=base,
+            directions=(*along, *(found[column.name] for column in weighed)),
+        )  # fmt: skip
+
+    @property
+    def calibrated(self) -> Statistics:
+        """Of the calibrated parameters, at the nominal model."""
+        return self.seen(self.base, self.directions[: len(THETA)])
+
+    def of_columns(self, columns: Sequence[Column]) -> Statistics:
+        """Of the calibrated parameters and some columns, at the nominal model."""
+        parts = [self.calibrated]
+        for first in range(0, len(columns), _TOGETHER):
+            own = columns[first : first + _TOGETHER]
+            found = of_columns(self.forecaster, self.segments, self.base, own)
+            parts.append(self.seen(self.base, [found[column.name] for column in own]))
+        return replace(parts[0], response=np.concatenate([part.response for part in parts], axis=2))
+
+    def at(self, model: Model) -> Statistics:
+        """Of the calibrated parameters and the effects of a model, there."""
+        steps = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
+
+        def errors(moved: Model) -> Tensor:
+            return self.forecaster.errors(*moved.system(self.forecaster, self.segments), self.segments)
+
+        base = errors(model)
+        changes = [
+            (base - errors(model.moved(tuple(step if k == place else 0.0 for k in range(len(steps)))))) / step
+            for place, step in enumerate(steps)
+        ]
+        return self.seen(base, changes)
+
+    def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
+        """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
+        recording = np.array([s.recording for s in self.segments.items])
+        noise = np.array([s.noise for s in self.segments.items])
+        found = reduced(base, [*self.directions, *changes], recording, noise)
+        count = len(self.directions)
+        return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
+
+    def speeds(self, of_recordings: Floats) -> Floats:
+        """(segment,) of the wind [m/s], of speeds by recording."""
+        return of_recordings[np.array([s.recording for s in self.segments.items])]
+
+
+def evidence(found: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+    """Of what a lens sees; its columns are those of the response."""
+    return replace(Evidence.of(found, speeds, null), columns=found.response.shape[2])
