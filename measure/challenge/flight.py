@@ -13,7 +13,7 @@ from torch import Tensor
 
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.rng import stream
-from measure.challenge.key import Key
+from measure.challenge.key import Acting, Key
 from measure.challenge.meshes import mesh_of
 from measure.challenge.recipe import ChallengeRecipe, Method, Numerics, effect_type
 from sim import handles as held
@@ -38,15 +38,23 @@ INSTANTS = 6
 HORIZON = 0.1
 _OUTER = 4e-3  # s; of the forces beside the base model, halved where they change faster
 _SHORTEST_OUTER = 1e-4
-_LEAST_OUTER = 1e-3  # s; a cloth that diverges at half of this diverges by itself
+_HALVINGS = 3
 _START_NOISE = 2e-3  # m
 _GUST_RATE = 10.0  # Hz
 
 
-class DivergedError(FlagdataError):
-    """A simulated cloth that is no longer one."""
+class _DivergedError(Exception):
+    """A simulated cloth that is no longer one.
 
-    kind = "diverged"
+    Attributes:
+        place: of its set among those simulated.
+        seconds: after the first frame.
+    """
+
+    def __init__(self, place: int, seconds: float) -> None:
+        super().__init__(place, seconds)
+        self.place = place
+        self.seconds = seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,11 +85,13 @@ class Flight:
     Attributes:
         positions: one (frame, vertex, 3) for each recording, the lower attachment at the origin [m].
         winds: one (sample, 3) for each recording: one sample where it is steady, else at the log's rate [m/s].
+        effects: what acted, with the strengths that were simulated.
         impact: see `Key`.
     """
 
     positions: tuple[NDArray[np.float32], ...]
     winds: tuple[Floats, ...]
+    effects: tuple[Acting, ...]
     impact: float
 
 
@@ -97,9 +107,36 @@ def batches(keys: Sequence[Key], recordings: int) -> list[tuple[Key, ...]]:
 def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Flight]:
     """Set → what its cloth did. The clock of the effects starts with the run, `settle` before the first frame.
 
+    Some effects feed the cloth with energy and, at some strengths, tear it apart. The strengths of a set that diverges
+    are halved, three times at most.
+
     Raises:
-        DivergedError: a flag diverged, on short outer steps too.
+        FlagdataError: a flag diverged all the same.
     """
+    return _tried(recipe, seed, keys, _HALVINGS)
+
+
+def _tried(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key], halvings: int) -> dict[str, Flight]:
+    try:
+        return _fly(recipe, seed, keys)
+    except _DivergedError as error:
+        place, seconds = error.place, error.seconds
+    key = keys[place]
+    if not halvings:
+        raise FlagdataError(
+            f"the cloth diverged {seconds:.2f} s after the first frame", where=f"{key.name}, numerics {key.numerics!r}",
+            fix="narrow the recipe's ranges of damping or of that effect",
+        )  # fmt: skip
+    weaker = replace(key, effects=tuple(map(_halved, key.effects)))
+    return _tried(recipe, seed, [*keys[:place], weaker, *keys[place + 1 :]], halvings - 1)
+
+
+def _halved(acting: Acting) -> Acting:
+    null = float(effect_type(acting.effect).parameters()[acting.parameter].null)
+    return replace(acting, value=null + (acting.value - null) / 2)
+
+
+def _fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Flight]:
     numerics = recipe.numerics[keys[0].numerics]
     winds = {key.name: _winds(recipe, seed, key) for key in keys}
     base, start = _base(recipe, seed, numerics, keys, winds)
@@ -107,7 +144,8 @@ def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Fl
     effects = [_effect(recipe, seed, keys, name) for name in names]
     with torch.no_grad():
         system, state = apply(effects, base, start)
-        stepper, frames, snapshots = _steady(recipe, keys, _Stepper.of(numerics), system, state)
+        stepper = _Stepper.of(numerics)
+        frames, snapshots = _run(recipe, keys, stepper, system, state)
         impact = _impacts(stepper, system, base, snapshots) if effects else torch.zeros(base.cloth.batch)
     result: dict[str, Flight] = {}
     for place, key in enumerate(keys):
@@ -117,7 +155,7 @@ def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Fl
         settled = tuple(wind[round(recipe.settle * recipe.log_rate) :] if len(wind) > 1 else wind
                         for wind in winds[key.name])  # fmt: skip
         square = float((impact[list(members)] ** 2).mean())
-        result[key.name] = Flight(positions=positions, winds=settled, impact=math.sqrt(square))
+        result[key.name] = Flight(positions=positions, winds=settled, effects=key.effects, impact=math.sqrt(square))
     return result
 
 
@@ -217,12 +255,6 @@ class _Stepper:
             return cls(method=BackwardEuler(step=numerics.step))
         return cls(method=Symplectic(outer=_OUTER))
 
-    def shorter(self) -> _Stepper | None:
-        """With half the outer step; None where there is none, or none shorter to be had."""
-        if not isinstance(self.method, Symplectic) or self.method.outer is None or self.method.outer < _LEAST_OUTER:
-            return None
-        return _Stepper(method=replace(self.method, outer=self.method.outer / 2))
-
     def advance(self, system: System, state: State, duration: float) -> State:
         method: Integrator = self.method
         while True:
@@ -232,21 +264,6 @@ class _Stepper:
                 if not isinstance(method, Symplectic) or method.outer is None or method.outer < _SHORTEST_OUTER:
                     raise
                 method = replace(method, outer=method.outer / 2)
-
-
-def _steady(
-    recipe: ChallengeRecipe, keys: Sequence[Key], stepper: _Stepper, system: System, state: State
-) -> tuple[_Stepper, dict[int, NDArray[np.float32]], list[State]]:
-    """`_run` with outer steps short enough for what acts: halved where a cloth diverges, since impulses that resist
-    motion overshoot on long steps."""
-    while True:
-        try:
-            return stepper, *_run(recipe, keys, stepper, system, state)
-        except DivergedError:
-            shorter = stepper.shorter()
-            if shorter is None:
-                raise
-            stepper = shorter
 
 
 def _run(
@@ -269,11 +286,7 @@ def _run(
             healthy = state.healthy()
             if not bool(healthy.all()):
                 member = int(torch.nonzero(~healthy)[0])
-                raise DivergedError(
-                    f"the cloth diverged {tick / ticks:.2f} s after the first frame",
-                    where=f"{keys[member // recipe.count].name}, numerics {keys[0].numerics!r}",
-                    fix="narrow the recipe's ranges of damping or of that effect",
-                )  # fmt: skip
+                raise _DivergedError(member // recipe.count, tick / ticks)
             frames[tick] = state.position.numpy().copy()
         if tick in instants:
             snapshots.append(state)

@@ -47,7 +47,7 @@ def make(
 
     Raises:
         ConflictError: the folder is not empty.
-        DivergedError: a flag diverged, on short steps too.
+        FlagdataError: a flag diverged, with weak effects too.
     """
     target = files.fresh(path)
     keys = draw(recipe, seed=seed, count=count)
@@ -56,7 +56,7 @@ def make(
     def write(flights: dict[str, Flight]) -> None:
         by_name = {key.name: key for key in keys}
         for name, flight in flights.items():
-            entries[name] = _write(target, recipe, seed, replace(by_name[name], impact=flight.impact), flight)
+            entries[name] = _write(target, recipe, seed, by_name[name], flight)
         if progress is not None:
             progress(len(flights))
 
@@ -103,6 +103,7 @@ def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key
         ],
     }  # fmt: skip
     data = files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
+    key = replace(key, impact=flight.impact, effects=flight.effects)
     salt = stream(seed, key.name, "salt").bytes(32).hex()
     files.write_json(target.sealed(key.name), {"key": key.as_dict(), "salt": salt})
     return {"data": data, "commitment": seal(key, salt)}
