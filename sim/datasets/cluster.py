@@ -63,6 +63,7 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
         LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0,
             dashboard_address=None,  # pyright: ignore[reportArgumentType]  None is no dashboard, as documented
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # any port: two builds must not want the same
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,

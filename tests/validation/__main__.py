@@ -8,6 +8,7 @@ from tests.validation.page import draw_page
 VALIDATIONS = {
     "arcsim": "tests.validation.arcsim",
     "clock-recovery": "tests.validation.clock_recovery",
+    "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
     "paper-flag": "tests.validation.paper_flag",

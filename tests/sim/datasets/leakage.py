@@ -60,6 +60,7 @@ def features_of(name: str, record: Record, *, order: int, size: int) -> list[flo
 def accuracies(features: Floats, labels: Floats, sequence: NDArray[np.int64]) -> dict[str, Floats]:
     """Share of right guesses (target,) of labels ±1 (film, target), on films of sequences that were not fitted to.
 
+    Both labels weigh the same, so that a blind guess is right in half of the cases however often each occurs.
     "ridge" is linear in the features and their squares, "neighbours" the majority of the nearest films.
     """
     spread = features.std(axis=0)
@@ -74,7 +75,13 @@ def accuracies(features: Floats, labels: Floats, sequence: NDArray[np.int64]) ->
         away = np.square(x[held][:, None] - x[fitted]).sum(axis=-1)
         nearest = np.argpartition(away, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
         near[held] = labels[fitted][nearest].mean(axis=1)
-    return {"ridge": (np.sign(ridge) == labels).mean(axis=0), "neighbours": (np.sign(near) == labels).mean(axis=0)}
+    return {"ridge": _right(ridge, labels), "neighbours": _right(near, labels)}
+
+
+def _right(guesses: Floats, labels: Floats) -> Floats:
+    hits = np.sign(guesses) == labels
+    shares = [(hits & (labels == label)).sum(axis=0) / (labels == label).sum(axis=0) for label in (-1, 1)]
+    return (shares[0] + shares[1]) / 2
 
 
 def dealt_anew(sequence: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.int64]:

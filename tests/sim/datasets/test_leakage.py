@@ -63,8 +63,8 @@ def test_all_films_have_the_same_size_and_so_have_their_frames(around: Surroundi
 @pytest.mark.parametrize("guess", ["ridge", "neighbours"])
 def test_a_classifier_of_the_surroundings_is_at_chance(around: Surroundings, guess: str) -> None:
     found = accuracies(around.features, around.labels(TARGETS), around.sequence)[guess]
-    # Parameters of the simulation are those of 40 sequences, others of 80 films; 3 σ of a fair coin. Two classifiers and eleven
-    # targets: one in some 35 seeds would exceed it, and the seed is fixed.
+    # Parameters of the simulation are those of 40 sequences, others of 80 films; 3 σ of a fair coin. Two classifiers
+    # and eleven targets: one in some 35 seeds would exceed it, and the seed is fixed.
     counts = [FILMS if "." in target and not target.startswith("bending") else SEQUENCES for target in TARGETS]
     assert (found < 0.5 + 3 * 0.5 / np.sqrt(counts)).all(), dict(zip(TARGETS, found, strict=True))
 
