@@ -16,7 +16,7 @@ from measure.loop.close import Setting
 from measure.loop.columns import EffectColumn
 from measure.loop.model import Model
 from measure.loop.verdict import Estimate
-from measure.propose.outcome import Course
+from measure.propose.outcome import Course, Line
 from sim.effects import apply
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,10 @@ Floats = NDArray[np.float64]
 BIN = 0.2
 """Duration of a stretch [s]: five frames at 25 a second."""
 _LEVEL = 0.9
-_STROUHAL = "f L/U with L the cloth's height"
+_RARE = 0.01
+"""Of a line in white noise, below which it is told."""
+_SLOW = 3
+"""Periods in a recording below which a line is no more than a trend."""
 
 
 def course(setting: Setting, model: Model, place: int) -> Course:
@@ -33,13 +36,15 @@ def course(setting: Setting, model: Model, place: int) -> Course:
     amplitudes, period = _amplitudes(setting, model, column, fitted)
     stretch = max(1, round(BIN / period))
     binned: list[Floats] = []
+    lines: list[Line] = []
     times: list[Floats] = []
     segments = setting.segments
     for index in range(len(setting.speeds)):
         own = np.flatnonzero(setting.recording == index)
-        parts, places = [], []
+        parts, places, frames = [], [], []
         for segment in own:
             top, bottom = amplitudes[0][:, segment], amplitudes[1][:, segment]
+            frames.append(top / bottom)
             count = len(top) // stretch
             sums = [values[: count * stretch].reshape(count, stretch).sum(axis=1) for values in (top, bottom)]
             parts.append(fitted + sums[0] / sums[1])
@@ -47,15 +52,15 @@ def course(setting: Setting, model: Model, place: int) -> Course:
             places.append(segments.items[segment].start + segments.first * period + middle)
         binned.append(np.concatenate(parts))
         times.append(np.concatenate(places))
+        lines.append(line(np.concatenate(frames), period))
     by_recording = [_mean(values, column.unit) for values in binned]
-    frequency, share = _peak(binned, stretch * period)
     spread = float(np.sqrt(np.mean([np.var(values, ddof=1) for values in binned])))
     speeds = [float(u) for u in setting.speeds]
     height = float(np.ptp(setting.experiment.specimen.mesh.rest[:, 1]))
     return Course(
         bin=stretch * period, times=[t.tolist() for t in times], amplitudes=[a.tolist() for a in binned],
-        by_recording=by_recording, speeds=speeds, fluctuation=spread, frequency=frequency, peak_share=share,
-        words=_words(by_recording, speeds, spread, frequency, share, height),
+        by_recording=by_recording, speeds=speeds, fluctuation=spread, lines=lines,
+        words=_words(by_recording, speeds, spread, lines, height),
     )  # fmt: skip
 
 
@@ -81,25 +86,37 @@ def _mean(values: Floats, unit: str) -> Estimate:
     return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
 
 
-def _peak(binned: list[Floats], period: float) -> tuple[float, float]:
-    """Frequency of the largest line of the mean periodogram, and its share of the variance."""
-    shortest = min(len(values) for values in binned)
-    spectra = [np.abs(np.fft.rfft(v[:shortest] - v[:shortest].mean())) ** 2 for v in binned]
-    power = np.mean([s / max(s[1:].sum(), 1e-300) for s in spectra], axis=0)
-    best = 1 + int(np.argmax(power[1:]))
-    return float(np.fft.rfftfreq(shortest, period)[best]), float(power[best])
+def line(values: Floats, period: float) -> Line:
+    """The largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A 125, 1929).
+
+    Args:
+        values: equally spaced.
+        period: between them [s].
+    """
+    power = np.abs(np.fft.rfft(values - values.mean()))[_SLOW:] ** 2
+    best = int(np.argmax(power))
+    share = float(power[best] / max(power.sum(), 1e-300))
+    count = len(power)
+    terms = [
+        (-1) ** (k - 1) * math.comb(count, k) * (1 - k * share) ** (count - 1)
+        for k in range(1, min(count, int(1 / share) if share > 0 else count) + 1)
+    ]
+    # The sum alternates and cancels for small lines, which its first term bounds.
+    p_value = min(1.0, terms[0]) if share < 0.05 else min(1.0, max(0.0, sum(terms)))
+    frequency = float(np.fft.rfftfreq(len(values), period)[_SLOW + best])
+    return Line(frequency=frequency, share=share, p_value=p_value)
 
 
-def _words(
-    by_recording: list[Estimate], speeds: list[float], spread: float, frequency: float, share: float, height: float
-) -> str:
+def _words(by_recording: list[Estimate], speeds: list[float], spread: float, lines: list[Line], height: float) -> str:
     unit = "" if by_recording[0].unit == "1" else f" {by_recording[0].unit}"
     means = "; ".join(
         f"{e.value:+.3g} [{e.low:.3g}, {e.high:.3g}]{unit} at {u:.1f} m/s"
         for e, u in zip(by_recording, speeds, strict=True)
     )
     text = f"{means}; in time it varies by {spread:.2g}{unit}, errors included"
-    if share > 0.3:
-        numbers = ", ".join(f"{frequency * height / u:.2g}" for u in speeds)
-        text += f", mostly at {frequency:.2g} Hz ({_STROUHAL}: {numbers})"
-    return text
+    told = [
+        f"{one.frequency:.2f} Hz ({100 * one.share:.0f} %; f L/U = {one.frequency * height / u:.2g}) at {u:.1f} m/s"
+        for one, u in zip(lines, speeds, strict=True)
+        if one.p_value < _RARE
+    ]
+    return f"{text}, with lines at {', '.join(told)}; L is the cloth's height" if told else text

@@ -33,6 +33,21 @@ class Ranked:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Line:
+    """The largest line of the periodogram of an amplitude in one recording.
+
+    Attributes:
+        frequency: [Hz].
+        share: of the variance.
+        p_value: of a line as large in white noise (Fisher's g).
+    """
+
+    frequency: float
+    share: float
+    p_value: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Course:
     """How the amplitude of a term behaves: fitted to each stretch of time, with the rest of the model as it is.
 
@@ -43,8 +58,7 @@ class Course:
         by_recording: mean amplitude of each, with its interval.
         speeds: of the wind, of each recording [m/s].
         fluctuation: standard deviation of the amplitudes about their recording's mean, their errors included.
-        frequency: at which the spectrum of the amplitude is largest [Hz].
-        peak_share: of the variance, at that frequency.
+        lines: of each recording, from amplitudes of single frames.
         words: the same in words.
     """
 
@@ -54,8 +68,7 @@ class Course:
     by_recording: list[Estimate]
     speeds: list[float]
     fluctuation: float
-    frequency: float
-    peak_share: float
+    lines: list[Line]
     words: str
 
 

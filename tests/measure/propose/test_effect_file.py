@@ -27,8 +27,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 def proposal(**fitted: tuple[float, str]) -> Outcome:
     course = Course(
-        bin=0.2, times=[], amplitudes=[], by_recording=[], speeds=[], fluctuation=0.0, frequency=1.0, peak_share=0.0,
-        words="",
+        bin=0.2, times=[], amplitudes=[], by_recording=[], speeds=[], fluctuation=0.0, lines=[], words="",
     )  # fmt: skip
     strengths = tuple(
         Strength(
