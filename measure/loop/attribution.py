@@ -16,10 +16,11 @@ from scipy.stats import norm
 
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn, FieldColumn
-from measure.loop.inference import Evidence, fluctuation, fluctuation_gains, gains
+from measure.loop.inference import Evidence, Fit, fluctuation, fluctuation_gains, gains
 from measure.loop.reference import GUSTS, Reference
 from measure.loop.verdict import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
+from sim.effects.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +36,8 @@ _APART = 3.0
 """A rival whose squared z is lower by more than the square of this fits worse, whatever its held-out gain's error."""
 _SEEN = ("tilted-pole",)
 """Never named beside another effect: it shows at the attachments, whose observed places are the model's."""
+_BEYOND = 3.0
+"""A strength so many times what is expected of it, beyond its error, is not physical."""
 _BETTER = 1.5
 """A mode of the corrective field whose statistic is larger by this factor says that the library has no answer."""
 
@@ -51,7 +54,7 @@ class Weighed:
         candidate: as reported.
         error: standard error of the strength.
         gains: (segment,) held-out gain.
-        admissible: whether the fitted strength makes physical sense.
+        admissible: whether the fitted strength makes physical sense: see `_plausible`.
     """
 
     column: int
@@ -125,7 +128,7 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
 
 def withdrawn(judgement: Judgement) -> Judgement:
     """The same, once the effect named has failed on unseen data."""
-    reason = "run again on unseen recordings, it helps no more than the wrong-effect control"
+    reason = "run again on unseen recordings, it does not help more than the wrong-effect control"
     ranking = tuple(
         replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in judgement.named else w
         for w in judgement.ranking
@@ -155,18 +158,29 @@ def _second(
     order = np.argsort(-pairs[1:].sum(axis=1))
     chosen, gained = others[order[0]], pairs[1 + order[0]] - pairs[0]
     fit = evidence.fit([best.column, chosen.column])
-    strengths = [_strength(w, fit.of(w.column)[0]) for w in (best, chosen)]
-    value, claimed = fit.of(chosen.column)
-    error = claimed * chosen.error / evidence.fit([chosen.column]).of(chosen.column)[1]
+    strengths = [_beside(evidence, fit, w) for w in (best, chosen)]
+    plausible = all(_plausible(_described(w), *strength) for w, strength in zip((best, chosen), strengths, strict=True))
+    value, error = strengths[1]
     lasting = gained.sum() > _FAR * _total_error(gained) and abs(value) > _FAR * error
-    return chosen if lasting and all(strengths) and _leftover(evidence, reference, fit.active) > level else None
+    return chosen if lasting and plausible and _leftover(evidence, reference, fit.active) > level else None
 
 
-def _strength(weighed: Weighed, coefficient: float) -> bool:
-    """Whether a strength is admissible."""
-    described = EFFECTS[weighed.candidate.effect].parameters()[weighed.candidate.parameter]
+def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
+    """A strength in a joint fit, and its standard error, as much larger than Σ says as when it is fitted alone."""
+    value, claimed = fit.of(weighed.column)
+    return value, claimed * weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
+
+
+def _described(weighed: Weighed) -> Parameter:
+    return EFFECTS[weighed.candidate.effect].parameters()[weighed.candidate.parameter]
+
+
+def _plausible(described: Parameter, coefficient: float, error: float) -> bool:
+    """Whether a strength is admissible, and no more than `_BEYOND` times what is expected in its direction."""
     least, most = described.admissible
-    return least <= described.null + coefficient <= most
+    expected = described.prior[1 if coefficient > 0 else 0] - described.null
+    reach = _BEYOND * max(math.copysign(1.0, coefficient) * expected, 0.0)
+    return least <= described.null + coefficient <= most and abs(coefficient) - _FAR * error <= reach
 
 
 def _leftover(evidence: Evidence, reference: Reference, active: Sequence[int]) -> float:
@@ -184,16 +198,14 @@ def _weigh(
     # The standard error is that which makes the nulls' mean squared z 1.
     statistic = float(statistics[column])
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
-    least, most = effect.described.admissible
     null = effect.described.null
-    admissible = least <= null + value <= most
     by_recording = []
     for index in np.unique(evidence.recording):
         own = evidence.select(evidence.recording == index).fit([column])
         single, claimed = own.of(column)
         by_recording.append(estimate(single, claimed * error / fit.of(column)[1], effect.unit))
     return Weighed(
-        column=column, error=error, gains=gained, admissible=admissible,
+        column=column, error=error, gains=gained, admissible=_plausible(effect.described, value, error),
         candidate=Candidate(
             effect=effect.effect, parameter=effect.parameter, null=null,
             strength=estimate(null + value, error, effect.unit),

@@ -31,7 +31,7 @@ from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank, Reference
-from measure.loop.refine import Refined, refine
+from measure.loop.refine import DivergedError, Refined, refine
 from measure.loop.residuals import residuals
 from measure.loop.statistics import statistics
 from measure.loop.verdict import Candidate, Comparison, Conclusion, NullTest, Parameter, Verdict
@@ -58,8 +58,8 @@ class Options:
         seed: of the nulls.
         level: of the global test.
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
-        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers and
-            winds, over the same priors.
+        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
+            and winds, over the same priors.
         workers: processes for the nulls.
 
     Raises:
@@ -136,7 +136,9 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     judgement = judge(evidence, reference, level=options.level)
     solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
     trial = _trial(solved, options, tell)
-    if trial.failed:
+    partly = judgement.conclusion is Conclusion.PARTLY
+    diverges = solved.larger is None and bool(judgement.named) and GUST_COLUMN not in judgement.named
+    if diverges or trial.failed or (trial.tied and partly):
         judgement, trial = withdrawn(judgement), Trial()
     elif trial.tied and solved.control is not None and len(judgement.named) == 1:
         judgement = tied(judgement, solved.control[0])
@@ -165,9 +167,14 @@ class Solved:
 
     @cached_property
     def larger(self) -> Refined | None:
-        """With the effects that act; None where none does, or where its course is unknown (gusts)."""
+        """With the effects that act; None where none does, its course is unknown (gusts), or its cloth diverges."""
         named = self.acting
-        return self._refined(named) if named and GUST_COLUMN not in named else None
+        if not named or GUST_COLUMN in named:
+            return None
+        try:
+            return self._refined(named)
+        except DivergedError:
+            return None
 
     @property
     def acting(self) -> tuple[int, ...]:
@@ -179,8 +186,14 @@ class Solved:
     def control(self) -> tuple[Weighed, Refined] | None:
         """The best effect that was not named, and the model with it."""
         taken = (*self.judgement.named, GUST_COLUMN)
-        wrong = next((w for w in self.judgement.ranking if w.column not in taken and w.admissible), None)
-        return None if wrong is None else (wrong, self._refined((wrong.column,)))
+        for wrong in self.judgement.ranking:
+            if wrong.column in taken or not wrong.admissible:
+                continue
+            try:
+                return wrong, self._refined((wrong.column,))
+            except DivergedError:
+                continue
+        return None
 
     def _refined(self, chosen: Sequence[int]) -> Refined:
         setting = self.setting

@@ -46,13 +46,18 @@ class Trial:
 
     @property
     def failed(self) -> bool:
-        """Whether the effect lowers the errors not at all, or by no more than the control does."""
-        return bool(self.comparisons) and (self.helped.sum() <= 0 or (self.apart is not None and self.apart.sum() <= 0))
+        """Whether the effect does not lower the errors, or the control lowers them more, by two standard errors."""
+        worse = self.apart is not None and _above(-self.apart)
+        return bool(self.comparisons) and (worse or not self.helped.sum() > 0)
 
     @property
     def tied(self) -> bool:
         """Whether the control cannot be told from the effect: by less than two standard errors."""
-        return bool(self.comparisons) and self.apart is not None and self.apart.sum() < _FAR * _total_error(self.apart)
+        return bool(self.comparisons) and self.apart is not None and not _above(self.apart)
+
+
+def _above(values: Floats) -> bool:
+    return bool(values.sum() > _FAR * _total_error(values))
 
 
 def _total_error(values: Floats) -> float:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.errors import FlagdataError
 from measure.loop.columns import PRIOR, THETA, Calibration, Column, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
@@ -17,10 +18,17 @@ from measure.loop.statistics import Statistics, reduced
 Floats = NDArray[np.float64]
 
 _ROUNDS = 3
+_HALVINGS = 4
 _STAYS = 0.3
 """Standard errors below which a step is not worth another round."""
 _LONGEST = 1.5
 """A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
+
+
+class DivergedError(FlagdataError):
+    """A model whose predictions are not finite."""
+
+    kind = "diverged"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,6 +76,9 @@ def refine(
     Args:
         speeds: (segment,) of the wind [m/s].
         weighed: the evidence's columns, but for the calibrated parameters.
+
+    Raises:
+        DivergedError: the model's cloth does not stay one, at an eighth of the effects' strengths neither.
     """
     fit = evidence.fit(chosen)
     own = [weighed[c - len(THETA)] for c in chosen]
@@ -84,7 +95,16 @@ def refine(
 
 
 def _round(forecaster: Forecaster, segments: Segments, origin: Model, null: NullModel, speeds: Floats) -> Refined:
-    found = _linearised(forecaster, segments, origin)
+    for _ in range(_HALVINGS):
+        found = _linearised(forecaster, segments, origin)
+        if np.isfinite(found.r).all() and np.isfinite(found.response).all():
+            break
+        origin = replace(origin, effects=tuple((column, strength / 2) for column, strength in origin.effects))
+    else:
+        raise DivergedError(
+            "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
+            fix="look at the recordings' residuals: no model of the library is near them",
+        )  # fmt: skip
     step, errors = _step(found, null, speeds, origin)
     return Refined(
         model=origin.moved(_cut(step)), errors=tuple(float(e) for e in errors), statistics=found, origin=origin,
