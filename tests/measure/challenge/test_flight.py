@@ -45,5 +45,5 @@ def test_a_strength_that_tears_the_cloth_apart_is_halved_until_it_does_not(recip
 
 
 def test_what_tears_the_cloth_apart_at_an_eighth_as_well_is_an_error(recipe: ChallengeRecipe) -> None:
-    with pytest.raises(FlagdataError, match="set-001.*diverged"):
-        fly(recipe, 1, [reacting("set-001", 100.0)])
+    with pytest.raises(FlagdataError, match=r"set-001.*diverged"):
+        fly(recipe, 1, [reacting("set-001", 30.0)])
