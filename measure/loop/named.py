@@ -21,7 +21,7 @@ from sim.air import AIR_FORCES, AirForce
 from sim.effects import EFFECTS
 from sim.handles import ARCSIM_STIFFNESS
 from sim.integrate.split import SplitEuler
-from sim.material import Material, named, names
+from sim.material import MATERIALS, Material, named
 from sim.mesh import grid
 from sim.scene import upright
 
@@ -150,7 +150,7 @@ def _mesh(specimen: Specimen) -> dict[str, Any]:
 
 def _material(nominal: Material) -> dict[str, Any]:
     """By its name, where the catalog's tables are its; else with its tables."""
-    if nominal.name in names():
+    if nominal.name in MATERIALS.names():
         known = named(nominal.name)
         if np.array_equal(known.stretching, nominal.stretching) and np.array_equal(known.bending, nominal.bending):
             return {"name": nominal.name}
