@@ -20,7 +20,7 @@ from sim import handles
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import STAGES
 from sim.handles import ARCSIM_STIFFNESS
-from sim.material import BENDING_SHAPE, STRETCHING_SHAPE, Material, named, names
+from sim.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named
 
 
 def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Known, tuple[Finding, ...]]:
@@ -107,7 +107,7 @@ def _force(spec: Mapping[str, Any]) -> AirForce:
 def _arcsim_material(entry: Mapping[str, Any], where: str) -> Material | None:
     data = entry.get("data")
     name = PurePosixPath(data).stem if isinstance(data, str) else ""
-    if name not in names():
+    if name not in MATERIALS.names():
         return None
     thicken = _number(entry, "thicken", 1.0, where)
     return named(name).scaled(

@@ -40,7 +40,7 @@ from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
 from sim.arcsim import read_material
 from sim.material import Material, named
-from sim.material import names as materials
+from sim.material import MATERIALS
 from sim.run.tables import Table
 
 
@@ -207,8 +207,8 @@ def _material(table: Table, folder: Path) -> Material | None:
         return None
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
-    if name is not None and name not in materials():
-        raise UnknownNameError.of("material", name, materials(), where=table.where)
+    if name is not None and name not in MATERIALS.names():
+        raise UnknownNameError.of("material", name, MATERIALS.names(), where=table.where)
     base = named(name) if name is not None else _material_file(folder / (file or ""))
     thicken = table.number("thicken", 1.0, above=0.0)
     made = base.scaled(

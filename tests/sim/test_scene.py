@@ -12,7 +12,7 @@ from flagdata.errors import InputError, UsageError
 from sim import handles as held
 from sim.handles import Handles
 from sim.integrate.symplectic import Symplectic, advance
-from sim.material import named, names
+from sim.material import MATERIALS, named
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble, flag, hanging_cloth, upright
 from sim.tables import Evaluation
@@ -106,7 +106,7 @@ def test_uniform_wind_refuses_what_is_not_finite() -> None:
 
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 def test_every_measured_cloth_flies_in_strong_wind(evaluation: Evaluation) -> None:
-    cloths = [name for name in names() if name not in ("paper", "aluminium")]
+    cloths = [name for name in MATERIALS.names() if name not in ("paper", "aluminium")]
     scenes = [flag(material=named(name), wind_speed=10.0, columns=9, evaluation=evaluation) for name in cloths]
     system, state = assemble(scenes)
     state = Symplectic().advance(system, state, 2.0)
