@@ -39,8 +39,7 @@ from measure.observe.trajectory import WindTrack
 from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
 from sim.arcsim import read_material
-from sim.material import Material, named
-from sim.material import MATERIALS
+from sim.material import MATERIALS, Material, named
 from sim.run.tables import Table
 
 
