@@ -15,7 +15,7 @@ from measure.propose.lens import Lens, evidence
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 4
+_ROUNDS = 3
 _STAYS = 0.3
 """Standard errors below which a step is not worth another round."""
 _LONGEST = 1.5
@@ -30,14 +30,15 @@ class Fitted:
     errors: tuple[float, ...]
 
 
-def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectColumn]) -> Fitted:
-    """Calibrated parameters and strengths, by Gauss and Newton from the nominal model.
+def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectColumn], start: Sequence[float]) -> Fitted:
+    """Calibrated parameters and strengths, by Gauss and Newton.
 
     Args:
         speeds: (segment,) of the wind [m/s].
+        start: steps from the nominal model to begin with: the linear fit there.
     """
     model = Model(calibration=Calibration(), effects=tuple((column, 0.0) for column in columns))
-    step, errors = _step(lens, null, speeds, model)
+    step, errors = _cut(np.array(start, dtype=np.float64)), np.zeros(len(start))
     for _ in range(_ROUNDS):
         model = model.moved(tuple(step))
         step, errors = _step(lens, null, speeds, model)
@@ -51,5 +52,9 @@ def _step(lens: Lens, null: NullModel, speeds: Floats, model: Model) -> tuple[Fl
     own = evidence(lens.at(model), speeds, null)
     found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
     value, error = np.array([found.of(column) for column in range(own.columns)]).T
-    longest = np.concatenate([_LONGEST * PRIOR, np.full(len(value) - len(PRIOR), np.inf)])
-    return np.clip(value, -longest, longest), error
+    return _cut(value), error
+
+
+def _cut(step: Floats) -> Floats:
+    longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
+    return np.clip(step, -longest, longest)

@@ -171,7 +171,9 @@ def weigh(
     taken = [step for step in steps if step.taken]
 
     def fitted(columns: Sequence[int]) -> Fitted:
-        return fit(lens, null, speeds, [tried.columns[column - len(THETA)] for column in columns])
+        linear = own.fit(columns)
+        start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
+        return fit(lens, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
 
     strengths: tuple[Strength, ...] = ()
     tested = None

@@ -50,13 +50,13 @@ def test_nineteen_of_twenty_nulls_give_no_proposal(
         others, own = bank.nulls.select(inside), whole.select(~inside)
         response = own.statistics.response[:, :rows][:, :, kept]
         seen = replace(own.statistics, r=own.clean[:, :rows], response=response)
-        for pair in np.unique(seen.recording).reshape(-1, 2):
-            chosen = np.isin(seen.recording, pair)
-            data = seen.select(chosen)
-            family = Family.of(others, data, noise=float(own.noise[0]), seed=0)
-            steps = search(
-                evidence(data, own.speeds[chosen], NullModel.fit(others)), family, labels, pool, level=0.03
-            )  # fmt: skip
+        model = NullModel.fit(others)
+        pairs = [np.isin(seen.recording, pair) for pair in np.unique(seen.recording).reshape(-1, 2)]
+        # The responses of pairs are alike: the family of the first stands for those of one kind.
+        family = Family.of(others, seen.select(pairs[0]), noise=float(own.noise[0]), seed=0)
+        for chosen in pairs:
+            data = evidence(seen.select(chosen), own.speeds[chosen], model)
+            steps = search(data, family, labels, pool, level=0.03)
             tried, taken = tried + 1, taken + steps[0].taken
     assert tried == 24
     assert taken <= tried / 20
