@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from measure.loop.columns import PRIOR, THETA
 from measure.loop.inference import Evidence, gains
 from measure.propose.family import Family
 
@@ -140,7 +141,8 @@ def _cosines(evidence: Evidence, beside: Sequence[int]) -> np.ndarray:
     """(column, column) of directions, beside the nuisances and some columns more; 0 with those."""
     total = evidence.curvature.sum(axis=0)
     fixed = [*evidence.nuisance, *beside]
-    inner = total[np.ix_(fixed, fixed)] + 1e-9 * np.diag(np.diag(total)[fixed])
+    priors = np.concatenate([PRIOR**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(beside))])
+    inner = total[np.ix_(fixed, fixed)] + np.diag(priors)
     left = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
     size = np.sqrt(np.maximum(np.diag(left), 1e-9 * np.diag(total)))
     return left / np.outer(size, size)

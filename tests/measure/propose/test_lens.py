@@ -1,0 +1,66 @@
+"""Terms side by side move the predictions as each alone does, and a lens sees of them what statistics see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from measure.loop.columns import THETA, Calibration, Column
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.statistics import statistics
+from measure.observe.trajectory import Experiment
+from measure.propose.lens import Lens
+from measure.propose.propose import made_ready
+from measure.propose.sensitivities import of_columns
+from measure.propose.terms import Term, columns_of
+
+TERMS = columns_of(
+    [
+        Term(field="leftward", shape="lower"), Term(field="mass", shape="near_75_30"),
+        Term(field="leftward", shape="everywhere"), Term(field="mass", shape="band_50"),
+    ]
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def two(pushed: Experiment) -> tuple[Forecaster, Segments]:
+    """Two segments of different winds."""
+    setting = made_ready(pushed)
+    return setting.forecaster, setting.segments.select([0, 3])
+
+
+def test_terms_side_by_side_are_what_each_is_alone(two: tuple[Forecaster, Segments]) -> None:
+    forecaster, segments = two
+    nominal = [Calibration()] * len(segments)
+    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    together = of_columns(forecaster, segments, base, TERMS)
+    for column in TERMS:
+        alone = forecaster.sensitivity(column, segments, nominal, base)
+        # The implicit solver stops at a tolerance of 1e-4, at other bits in a batch of another size.
+        assert torch.linalg.vector_norm(together[column.name] - alone) < 0.02 * torch.linalg.vector_norm(alone)
+
+
+def test_a_lens_sees_of_a_term_what_its_statistics_say(
+    two: tuple[Forecaster, Segments], lens: tuple[Column, ...]
+) -> None:
+    """The rows of the lens, the columns of the calibrated parameters and of the terms, of all statistics together."""
+    forecaster, segments = two
+    weighed = lens[:3]
+    whole = statistics(forecaster, segments, [Calibration()] * len(segments), (*weighed, *TERMS))
+    seen = Lens.of(forecaster, segments, weighed).of_columns(TERMS)
+    rows = len(THETA) + len(weighed)
+    kept = [*range(len(THETA)), *range(rows, rows + len(TERMS))]
+    size = np.abs(whole.response).max()
+    np.testing.assert_allclose(seen.r, whole.r[:, :rows], rtol=1e-4, atol=1e-4 * np.abs(whole.r).max())
+    # As above: 2 % of the largest.
+    np.testing.assert_allclose(seen.response, whole.response[:, :rows][:, :, kept], atol=0.02 * size)
+
+
+@pytest.mark.parametrize("name", ["across_squared_lower_fly", "mass_near_72_30", "to_pole_hoist", "mass_stripe_60"])
+def test_a_term_is_known_by_its_name(name: str) -> None:
+    assert Term.named(name).name == name
+
+
+def test_a_place_is_moved_and_stays_on_the_cloth() -> None:
+    assert Term.named("mass_near_90_05").moved(0.12, -0.12).name == "mass_near_100_00"
