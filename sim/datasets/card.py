@@ -115,7 +115,12 @@ def distributions(parameters: Sequence[dict[str, Any]], *, rendered: bool) -> li
                 name=name.removeprefix("render."), low=low, middle=float(np.median(values)), high=high, counts=counts
             )
         )
-    return found
+    return sorted(found, key=lambda distribution: _in_order(distribution.name))
+
+
+def _in_order(name: str) -> tuple[tuple[bool, int, str], ...]:
+    """Sorts "bending.2" before "bending.10"."""
+    return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in name.split("."))
 
 
 def _names(parameters: Sequence[dict[str, Any]]) -> list[tuple[str, list[tuple[str, int]]]]:

@@ -87,14 +87,15 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
     member = crew.member(job.index)
     reading = anemometer.read(recipe.anemometer, crew, member, seed=job.seed, begin=job.begin)
     drawn = picture.settings(recipe.camera, seed=job.seed)
-    parameters = parameters_of(member, zeta, {**reading.parameters, **drawn}, recipe.anemometer.truth)
-    frames = shot(recipe, job, sequence, zeta, assets, device=device)
     slot = recipe.camera.frame_slot
+    seen = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
+    frames, quality = picture.jpegs(seen, drawn, slot=slot, seed=job.seed)
+    drawn["camera.jpeg_quality"] = float(quality)
+    parameters = parameters_of(member, zeta, {**reading.parameters, **drawn}, recipe.anemometer.truth)
     times = job.begin + sequence.time
     content = Content(
-        film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, slot=slot,
-        frames=list(picture.jpegs(frames.cpu().numpy(), drawn, slot=slot, seed=job.seed)),
-    )  # fmt: skip
+        film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, slot=slot, frames=frames
+    )
     return Filmed(
         film=job, data=record_bytes(content), start=int(times[0]), end=int(times[-1]),
         parameters=canonical({**parameters, **texts_of(member, zeta)}),

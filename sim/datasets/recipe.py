@@ -15,7 +15,8 @@ from sim.render.prior import RenderPrior
 from sim.run.recipe import Recipe as Simulation
 from sim.run.tables import Quantity, plain
 
-RECIPE_VERSION = 1
+RECIPE_VERSION = 2
+"""Raised whenever the same recipe makes other bytes."""
 
 
 class Truth(StrEnum):
@@ -49,10 +50,10 @@ class CameraSpec:
     """The camera behind the picture.
 
     Attributes:
-        jpeg_quality: 1 to 100.
+        jpeg_quality: 1 to 100; less where a frame would not fit into its slot.
         read_noise: standard deviation that does not depend on the light, in 8-bit steps.
         shot_noise: of a full-scale (255) pixel, in 8-bit steps; its square is in proportion to the light.
-        frame_slot: stored frames are filled up to whole multiples of this, so that their size tells nothing [B].
+        frame_slot: length of every stored frame, so that it tells nothing; see `sim.datasets.picture.jpegs` [B].
     """
 
     jpeg_quality: Quantity

@@ -31,7 +31,7 @@ from flagdata.rng import stream
 from flagdata.schema import CATALOG
 from sim.datasets.reading import load
 from sim.datasets.recipe import DatasetRecipe, side_filter
-from tests.sim.datasets.leakage import Surroundings, accuracies, dealt_anew, features_of
+from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 
 RECIPE = "flagsim-small"
 KILLS = (0.1, 0.35, 0.7)
@@ -154,7 +154,10 @@ def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
         deals = np.concatenate([labels[dealt_anew(around.sequence, rng)] for _ in range(TOGETHER)], axis=1)
         for guess, values in accuracies(around.features, deals, around.sequence).items():
             chances[guess].append(values.reshape(TOGETHER, len(targets)))
-    result: dict[str, Any] = {"films": len(labels), "sequences": len(np.unique(around.sequence)), "deals": DEALS}
+    result: dict[str, Any] = {
+        "films": len(labels), "sequences": len(np.unique(around.sequence)), "parameters": len(targets), "deals": DEALS,
+        "different_sizes": _different(around, "size"), "different_frame_lengths": _different(around, "mean frame"),
+    }  # fmt: skip
     for guess, values in found.items():
         chance = np.concatenate(chances[guess])
         low, high = np.quantile(chance, [0.025, 0.975], axis=0)
@@ -173,21 +176,36 @@ def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
     return result
 
 
+def _different(around: Surroundings, feature: str) -> int:
+    return len(np.unique(around.features[:, FEATURES.index(feature)]))
+
+
 def _drawn(around: Surroundings, name: str) -> bool:
     """Whether a parameter is of wind, θ, ζ or anemometer, and drawn. A camera's shows in its JPEGs, as it should."""
     return not name.startswith("camera.") and len({film[name] for film in around.parameters}) > 1
 
 
 def surroundings(lake: Lake, recipe: DatasetRecipe) -> Surroundings:
-    """Of all films of a data set, in the order of the catalog."""
+    """Of all films of a data set, by the catalog; a name among the parameters is 0 or 1 for each there is."""
     columns = ["name", "seed", "object", "object_bytes", "parameters"]
     rows = lake.rows(f"kind = 'recording' and name like '{recipe.name}-%'", columns=columns).to_pylist()
     features = [
         features_of(row["name"], Record.open(lake.object_path(row["object"])), order=order, size=row["object_bytes"])
         for order, row in enumerate(rows)
     ]
-    numbers = [json.loads(row["parameters"]) for row in rows]
+    drawn = [json.loads(row["parameters"]) for row in rows]
+    kinds = sorted({(key, _kind(value)) for film in drawn for key, value in film.items() if isinstance(value, str)})
     return Surroundings(
         features=np.array(features), sequence=np.array([row["seed"] for row in rows]),
-        parameters=[{k: v for k, v in film.items() if not isinstance(v, str)} for film in numbers],
+        parameters=[
+            {key: value for key, value in film.items() if not isinstance(value, str)}
+            | {f"{key} {kind}": float(_kind(film[key]) == kind) for key, kind in kinds}
+            for film in drawn
+        ],
     )  # fmt: skip
+
+
+def _kind(name: str) -> str:
+    """Of a background, which is numbered, its kind: "sky"; of a flag all of it."""
+    kind, _, number = name.partition("/")
+    return kind if number.isdigit() else name

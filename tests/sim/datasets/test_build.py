@@ -156,6 +156,8 @@ def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRe
     for name in ("wind_speed", "density", "camera_radius", "anemometer-lag.distance", "flag/"):
         assert name in text
     assert "<td>train</td><td>4</td><td>–</td><td>11</td><td>11</td>" in text
+    assert text.index("<td>bending.2<") < text.index("<td>bending.10<")
+    assert "The same in all films: " in text
 
 
 def test_two_recipes_of_one_name_are_not_mixed(recipe_file: Path, builds: Any, built: Path, tmp_path: Path) -> None:

@@ -9,10 +9,12 @@ import pytest
 import simplejpeg
 from PIL import Image
 
+from flagdata.errors import InputError
 from sim.datasets.picture import filled, jpegs, settings
 from sim.datasets.recipe import CameraSpec
 from sim.run.tables import Range
 
+SLOT = 65536
 EXACT = {"camera.jpeg_quality": 100.0, "camera.read_noise": 0.0, "camera.shot_noise": 0.0}
 
 
@@ -23,10 +25,9 @@ def decoded(jpeg: bytes) -> np.ndarray:
 def test_a_filled_jpeg_is_the_same_picture_for_two_decoders() -> None:
     image = np.random.default_rng(0).integers(0, 256, (40, 60), dtype=np.uint8)
     plain = simplejpeg.encode_jpeg(image[..., None], quality=80, colorspace="GRAY")
-    for slot in (1, 2, 4096, 65536, len(plain)):
-        long = filled(plain, slot)
-        assert len(long) % slot == 0
-        assert 0 <= len(long) - len(plain) < slot
+    for length in (len(plain), len(plain) + 1, 4096, 65536):
+        long = filled(plain, length)
+        assert len(long) == length
         np.testing.assert_array_equal(decoded(long), decoded(plain))
         np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(long))), decoded(plain))
 
@@ -35,7 +36,7 @@ def test_gray_is_rec_601_luma() -> None:
     # Y = 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601), within the half step of rounding and one of the JPEG.
     frames = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [200, 100, 50]], dtype=np.uint8)
     shown = np.broadcast_to(frames[:, None, None, :], (4, 16, 16, 3))
-    grays = [decoded(jpeg) for jpeg in jpegs(shown, EXACT, slot=1, seed=0)]
+    grays = [decoded(jpeg) for jpeg in jpegs(shown, EXACT, slot=SLOT, seed=0)[0]]
     for gray, (r, g, b) in zip(grays, frames.astype(float), strict=True):
         assert np.abs(gray - (0.299 * r + 0.587 * g + 0.114 * b)).max() <= 1.5
 
@@ -44,7 +45,7 @@ def test_gray_is_rec_601_luma() -> None:
 def test_noise_has_the_variance_of_reading_and_light(level: int, variance: float) -> None:
     frames = np.full((1, 256, 256, 3), level, dtype=np.uint8)
     drawn = {**EXACT, "camera.read_noise": 2.0, "camera.shot_noise": 3.0}
-    (jpeg,) = jpegs(frames, drawn, slot=1, seed=3)
+    ((jpeg,), _) = jpegs(frames, drawn, slot=2 * SLOT, seed=3)
     # 1/12 of rounding and about as much of the JPEG at quality 100; 65,536 pixels: 0.6 % of the variance is one σ.
     assert decoded(jpeg).astype(float).var() == pytest.approx(variance + 1 / 12, rel=0.05)
 
@@ -52,10 +53,25 @@ def test_noise_has_the_variance_of_reading_and_light(level: int, variance: float
 def test_frames_have_noise_of_their_own_and_the_same_seed_the_same_bytes() -> None:
     frames = np.full((2, 32, 32, 3), 128, dtype=np.uint8)
     drawn = {**EXACT, "camera.read_noise": 2.0}
-    first, second = jpegs(frames, drawn, slot=1, seed=3)
+    (first, second), _ = jpegs(frames, drawn, slot=SLOT, seed=3)
     assert first != second
-    assert [first, second] == list(jpegs(frames, drawn, slot=1, seed=3))
-    assert first != next(jpegs(frames, drawn, slot=1, seed=4))
+    assert [first, second] == jpegs(frames, drawn, slot=SLOT, seed=3)[0]
+    assert first != jpegs(frames, drawn, slot=SLOT, seed=4)[0][0]
+
+
+def test_a_film_with_a_frame_too_long_has_the_best_quality_at_which_all_fit() -> None:
+    flat = np.full((32, 32, 3), 128, dtype=np.uint8)
+    busy = np.random.default_rng(0).integers(0, 256, (32, 32, 3), dtype=np.uint8)
+    drawn = {**EXACT, "camera.jpeg_quality": 90.0}
+    gray = np.asarray(Image.fromarray(busy).convert("L"))[..., None]
+    lengths = [len(simplejpeg.encode_jpeg(gray, quality=quality, colorspace="GRAY")) for quality in range(101)]
+    slot = lengths[70]
+    (first, second), quality = jpegs(np.stack([flat, busy]), drawn, slot=slot, seed=1)
+    assert len(first) == len(second) == slot
+    assert quality == max(q for q in range(1, 91) if lengths[q] <= slot)
+    assert jpegs(flat[None], drawn, slot=slot, seed=1)[1] == 90
+    with pytest.raises(InputError, match="at the lowest quality"):
+        jpegs(busy[None], drawn, slot=lengths[1] - 1, seed=1)
 
 
 def test_each_setting_has_a_stream_of_its_own() -> None:
