@@ -38,7 +38,7 @@ class Reading:
     parameters: Mapping[str, float]
 
 
-def read(spec: AnemometerSpec, crew: Crew, member: Member, *, seed: int, begin: int) -> Reading:
+def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, seed: int, begin: int) -> Reading:
     """The log of one recording.
 
     The instrument stands at the middle of the hoist in undisturbed air: effects that change the wind from place to
@@ -46,14 +46,15 @@ def read(spec: AnemometerSpec, crew: Crew, member: Member, *, seed: int, begin: 
     order, with noise, in steps of its resolution, and never below 0; stamps fall anywhere within a second.
 
     Args:
-        seed: of the recording.
+        instrument: seed of what it is, its effects and the size of its noise.
+        seed: of the recording, for the noise and the stamps.
         begin: instant at which the simulation's time is 0 [UTC ns].
     """
     drawn = {
-        name: {key: _drawn(value, seed, "anemometer", name, key) for key, value in parameters.items()}
+        name: {key: _drawn(value, instrument, "anemometer", name, key) for key, value in parameters.items()}
         for name, parameters in spec.effects.items()
     }
-    noise = _drawn(spec.noise, seed, "anemometer", "noise")
+    noise = _drawn(spec.noise, instrument, "anemometer", "noise")
     time, velocity = air(spec, crew, member)
     speed = torch.from_numpy(np.hypot(velocity[:, 0], velocity[:, 1])[:, None])
     for name, values in drawn.items():

@@ -31,8 +31,8 @@ class Film:
         index: of the sequence in its cast.
         sequence: artifact of the mesh sequence.
         sequence_seed: of the member; the recording's too, so that splits keep its films together.
-        seed: of ζ, the camera's noise and the anemometer.
-        look: seed of ζ; in a session the camera stays where it is.
+        seed: of the camera's noise and the anemometer's.
+        look: seed of ζ and of what the instruments are; in a session the camera and the anemometer stay the same.
         begin: instant at which the simulation's time is 0 [UTC ns].
         filming: all that shapes it beside the sequence and the seeds.
     """

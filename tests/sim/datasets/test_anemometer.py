@@ -38,7 +38,7 @@ def gusty(make: Make) -> Crew:
 
 def test_an_ideal_instrument_reads_a_steady_wind_as_it_is(make: Make) -> None:
     team = steady(make, 4.25)
-    reading = anemometer.read(IDEAL, team, team.member(0), seed=1, begin=BEGIN)
+    reading = anemometer.read(IDEAL, team, team.member(0), instrument=1, seed=1, begin=BEGIN)
     np.testing.assert_allclose(reading.series.channels["wind_speed"], 4.25, atol=1e-6)
     end = team.recipe.time
     assert reading.series.time[-1] <= BEGIN + round((end.total - 1) / end.rate * 1e9)
@@ -54,14 +54,14 @@ def test_direction_is_where_the_wind_blows_from_clockwise_from_north(
 ) -> None:
     # x is east, y is north: air that goes east comes from the west, 270°.
     team = steady(make, 5.0, toward)
-    reading = anemometer.read(IDEAL, team, team.member(0), seed=1, begin=BEGIN)
+    reading = anemometer.read(IDEAL, team, team.member(0), instrument=1, seed=1, begin=BEGIN)
     np.testing.assert_allclose(np.degrees(reading.series.channels["wind_direction"]), blowing_from, atol=1e-9)
 
 
 def test_noise_resolution_and_gain_are_those_of_the_recipe(make: Make) -> None:
     team = steady(make, 5.0)
     spec = replace(IDEAL, before=2000.0, noise=0.3, resolution=0.1, effects={"anemometer-gain": {"gain": 1.1}})
-    reading = anemometer.read(spec, team, team.member(0), seed=1, begin=BEGIN)
+    reading = anemometer.read(spec, team, team.member(0), instrument=1, seed=1, begin=BEGIN)
     speed = reading.series.channels["wind_speed"]
     # 2000 samples: the mean within 4 standard errors, the standard deviation within 4 of its own (σ/√(2n)).
     assert speed.mean() == pytest.approx(5.5, abs=4 * 0.3 / math.sqrt(2000))
@@ -75,7 +75,7 @@ def test_below_its_threshold_it_reads_zero_and_says_so(make: Make) -> None:
     spec = replace(IDEAL, effects={"anemometer-dead-zone": {"threshold": 0.5}})
     for speed, reads, flag in ((0.4, 0.0, SampleFlag.DEAD_ZONE), (0.6, 0.6, SampleFlag.OK)):
         team = steady(make, speed)
-        series = anemometer.read(spec, team, team.member(0), seed=1, begin=BEGIN).series
+        series = anemometer.read(spec, team, team.member(0), instrument=1, seed=1, begin=BEGIN).series
         np.testing.assert_allclose(series.channels["wind_speed"], reads, atol=1e-6)
         assert set(series.flags.tolist()) == {int(flag)}
         assert series.sensor.threshold == 0.5
@@ -84,7 +84,7 @@ def test_below_its_threshold_it_reads_zero_and_says_so(make: Make) -> None:
 def test_samples_are_means_of_the_gusts_the_flag_felt(make: Make) -> None:
     team = gusty(make)
     member = team.member(0)
-    series = anemometer.read(IDEAL, team, member, seed=1, begin=BEGIN).series
+    series = anemometer.read(IDEAL, team, member, instrument=1, seed=1, begin=BEGIN).series
     assert series.time[0] >= BEGIN + 10**9  # nothing is known of the air before the simulation
     system, _ = team.assemble([member])
     for stamp, speed in list(zip(series.time.tolist(), series.channels["wind_speed"].tolist(), strict=True))[::7]:
@@ -99,7 +99,9 @@ def test_samples_are_means_of_the_gusts_the_flag_felt(make: Make) -> None:
 def test_lag_smooths_gusts(make: Make) -> None:
     team = gusty(make)
     late = replace(IDEAL, effects={"anemometer-lag": {"distance": 20.0}})
-    fast, slow = (anemometer.read(spec, team, team.member(0), seed=1, begin=BEGIN) for spec in (IDEAL, late))
+    fast, slow = (
+        anemometer.read(spec, team, team.member(0), instrument=1, seed=1, begin=BEGIN) for spec in (IDEAL, late)
+    )
     quick, lagging = (np.diff(r.series.channels["wind_speed"]).std() for r in (fast, slow))
     assert lagging < 0.8 * quick
     assert slow.series.sensor.distance_constant == 20.0

@@ -108,3 +108,22 @@ def test_the_same_film_is_the_same_bytes(gusty: Shown, tmp_path: Path) -> None:
         assert outcome.sequence is not None
         again = jobs.film(gusty.recipe, gusty.film, outcome.sequence, "cpu")
     assert again.data == gusty.record.path.read_bytes()
+
+
+def test_films_of_a_session_have_the_same_camera_and_anemometer(make: Callable[..., DatasetRecipe]) -> None:
+    recipe = make({
+        "[sides.train]\nsequences = 4\nrenders = 11":
+        "[sessions]\nspread = 0.25\n[sides.train]\nsequences = 2\nrenders = 2\nsessions = 1",
+        "sequences = 2\nrenders = 4": "sequences = 2\nrenders = 4\nsessions = 1",
+    })  # fmt: skip
+    cast = next(casts(recipe))
+    films = list(Sequences(recipe=recipe, side="train", members=((cast, 0, "0" * 32), (cast, 1, "1" * 32))).films())
+    with one_thread():
+        outcomes = jobs.simulate(cast.simulation, 0, [0, 1], "cpu").outcomes
+        meshes = {outcome.member.index: outcome.sequence for outcome in outcomes if outcome.sequence is not None}
+        made = [jobs.film(recipe, film, meshes[film.index], "cpu") for film in films]
+    one, other = (json.loads(film.parameters) for film in made)
+    for name in ("camera.jpeg_quality", "anemometer-lag.distance", "anemometer-gain.gain", "render.camera_radius"):
+        assert one[name] == other[name]
+    assert one["wind_speed"] != other["wind_speed"]
+    assert made[0].film.seed != made[1].film.seed
