@@ -181,7 +181,9 @@ def weigh(
     if taken:
         stage("test on untouched data", 0, 1)
         before, after = fitted(beside), fitted([*beside, *(step.column for step in taken)])
-        instead = wrong(own, others, [step.column for step in taken], beside)
+        kinds = {_kind(tried.columns[step.column - len(THETA)]) for step in taken}
+        unlike = [column for column in others if _kind(tried.columns[column - len(THETA)]) not in kinds]
+        instead = wrong(own, unlike, [step.column for step in taken], beside)
         tested = retest(
             setting, untouched, before.model, after.model, words=parts.words, seed=options.seed,
             control=fitted([*beside, *instead]).model if instead else None,
@@ -195,6 +197,11 @@ def weigh(
         strengths=strengths, retest=tested, level=options.level, nulls=bank.words, proposed_from=data_hash(seen),
         tested_on=data_hash(untouched), known=tuple(column.name for column in known), seed=options.seed,
     )  # fmt: skip
+
+
+def _kind(column: EffectColumn) -> str:
+    """The field of a term, the effect of another strength: a control is of another."""
+    return column.term.field if isinstance(column, TermColumn) else column.effect
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
