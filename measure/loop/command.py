@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,11 +20,16 @@ from flagdata.findings import Finding, Severity
 if TYPE_CHECKING:
     from measure.loop.artifacts import Closed, Kept
     from measure.loop.close import Options, Stage
+    from measure.loop.verdict import Verdict
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe
 
-_OF_SOURCES = ("winds", "axis", "north", "offset", "rate", "unit", "noise", "up")
+_OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
+
+
+_DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
+"""Kinds of findings that look like an effect."""
 
 
 @click.command("close-loop")
@@ -35,6 +40,8 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "rate", "unit", "noise", "up"
 @click.option("--axis", default="1,0,0", show_default=True, metavar="X,Y,Z", help="Where the air of a speed goes.")
 @click.option("--north", type=float, metavar="DEG", help="From +x towards +y; with a log that has directions.")
 @click.option("--offset", type=float, help="From a log's first sample to frame 1 [s].")
+@click.option("--sensor", metavar="NAME|FILE.toml", help="Recipe of a log that does not say what it is.")
+@click.option("--zone", help="Of a log's stamps: +02:00, or an IANA name.")
 @click.option("--material", help="Nominal cloth, of the catalog; by default the source's own.")
 @click.option("--size", metavar="WxH", help="Of the flat cloth [m]; by default the markers' outline.")
 @click.option("--pins", help="hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default the source's own.")
@@ -64,6 +71,8 @@ def close_loop(
     axis: str,
     north: float | None,
     offset: float | None,
+    sensor: str | None,
+    zone: str | None,
     material: str | None,
     size: str | None,
     pins: str | None,
@@ -121,12 +130,13 @@ def close_loop(
     else:
         reading = Reading(
             rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
-            axis=_axis(context, axis, north), north=None if north is None else math.radians(north),
+            sensor=sensor, zone=zone, axis=_axis(context, axis, north),
+            north=None if north is None else math.radians(north),
         )  # fmt: skip
         observed = observe(read(sources, winds, reading, lake), setup)
     refuse(observed.findings)
     verdict = close(observed.experiment, options, stage=stage_bars())
-    verdict = replace(verdict, findings=tuple((f.kind, told(f)) for f in observed.findings))
+    verdict = doubted(verdict, observed.findings)
     called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
     closed = Closed(
         name=called, experiment=observed.experiment, findings=observed.findings, options=options, verdict=verdict,
@@ -228,11 +238,11 @@ def _up(context: click.Context, text: str, recipe: ExperimentRecipe | None) -> U
 def _setup(setup: Setup, material: str | None, size: str | None, pins: str | None) -> Setup:
     """A setup with what the command line says instead."""
     from measure.observe import Hold, sheet
-    from sim.material import named, names
+    from sim.material import MATERIALS, named
 
     if material is not None:
-        if material not in names():
-            raise UnknownNameError.of("material", material, names(), where="--material")
+        if material not in MATERIALS.names():
+            raise UnknownNameError.of("material", material, MATERIALS.names(), where="--material")
         setup = replace(setup, material=named(material))
     if size is not None:
         try:
@@ -266,6 +276,13 @@ def refuse(findings: Iterable[Finding]) -> None:
         if finding.severity is Severity.ERROR:
             raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
         say(f"{finding.severity.value}: {told(finding)}")
+
+
+def doubted(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
+    """The verdict with the remarks on its data; with those in its words that may themselves be what was found."""
+    doubts = [told(finding) for finding in findings if finding.kind in _DOUBTFUL]
+    beware = f" Beware, this may be an error of the data: {'; '.join(doubts)}." if doubts else ""
+    return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, told(f)) for f in findings))
 
 
 def told(finding: Finding) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.errors import UsageError
+from flagdata.ingest.anemometer import WindOptions
 from flagdata.lake import Lake
 from measure.observe import Observation, Up
 from measure.observe.recipe import RecordingSource, WindSource, blown, opened
@@ -29,6 +30,7 @@ class Reading:
         axis: along which the air goes; None for what a log's directions and `north` say.
         north: where north lies, from +x towards +y [rad].
         offset: from a log's first sample to the first frame [s]; None if nothing is said.
+        sensor, zone: how a log's file is read, where it does not say so itself: see `WindOptions`.
     """
 
     rate: float | None = None
@@ -38,6 +40,8 @@ class Reading:
     axis: tuple[float, float, float] | None = (1.0, 0.0, 0.0)
     north: float | None = None
     offset: float | None = None
+    sensor: str | None = None
+    zone: str | None = None
 
 
 def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None) -> list[Observation]:
@@ -63,18 +67,31 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
         raise UsageError(
             f"{len(winds)} winds for {len(found)} recordings", where="--wind", fix="give one, or one for each recording"
         )
+    if not any(map(_is_log, winds)):
+        for name in ("offset", "sensor", "zone"):
+            if getattr(reading, name) is not None:
+                raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")
     each = [_wind(wind, reading) for wind in (winds if len(winds) == len(found) else [*winds[:1]] * len(found))]
     return _distinct(
         [blown(seen, wind, _HERE, lake) for seen, wind in zip(found, each or [None] * len(found), strict=True)]
     )
 
 
-def _wind(text: str, reading: Reading) -> WindSource:
+def _is_log(text: str) -> bool:
+    """Whether a wind is something other than a speed."""
     try:
-        speed = float(text)
+        float(text)
     except ValueError:
+        return True
+    return False
+
+
+def _wind(text: str, reading: Reading) -> WindSource:
+    if _is_log(text):
         placement = LogPlacement(axis=reading.axis, north=reading.north, offset=reading.offset)
-        return WindSource(log=text, placement=placement)
+        options = WindOptions(recipe=reading.sensor, zone=reading.zone)
+        return WindSource(log=text, placement=placement, options=options)
+    speed = float(text)
     if reading.axis is None:
         raise UsageError("a speed without a direction", where=f"--wind {text}", fix="give --axis, not --north")
     x, y, z = (speed * np.array(reading.axis) / float(np.linalg.norm(reading.axis))).tolist()

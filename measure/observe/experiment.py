@@ -11,7 +11,7 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from measure.observe import cloth, noise
-from measure.observe.checks import attachment, frames, shape, surroundings
+from measure.observe.checks import attachment, frames, inertia, shape, surroundings
 from measure.observe.gaps import fill_positions
 from measure.observe.interpolation import onto
 from measure.observe.observation import Known, Observation
@@ -128,6 +128,7 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
         found += surroundings.check_sides(recording)
         surroundings.check_accelerations(recording, specimen)
         found += surroundings.check_strength(recording, specimen)
+        found += inertia.check_inertia(recording, specimen)
     attachment.check_places(experiment.recordings, specimen)
     return tuple(found)
 
@@ -155,8 +156,9 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats,
 def _trajectory(seen: Observation, low: Floats) -> Trajectory:
     where = f"recording {seen.name!r}"
     if seen.wind is None:
-        raise InputError("no wind is known", where=where, fix="give its velocity, or an anemometer's log")
-    rate = (len(seen.times) - 1) / float(seen.times[-1] - seen.times[0])
+        raise InputError("no wind is known", where=where, fix="give its velocity, or an anemometer's log (--wind)")
+    # Rounded, so that recordings of one rate and of different lengths have the same one to the last bit.
+    rate = float(f"{(len(seen.times) - 1) / float(seen.times[-1] - seen.times[0]):.9g}")
     return Trajectory(
         name=seen.name, markers=seen.markers - low, positions=seen.positions, rate=rate, wind=seen.wind,
         noise=_noise(seen), source=seen.source,
@@ -168,7 +170,10 @@ def _material(known: Sequence[Known], setup: Setup) -> Material:
         return setup.material
     given = [k.material for k in known if k.material is not None]
     if not given:
-        raise InputError("the material is not known", where="cloth", fix="name one of the catalog, or a file")
+        raise InputError(
+            "the material is not known, or not one of the catalog", where="cloth",
+            fix="name one of the catalog (--material), or a file in a recipe ([material] file)",
+        )  # fmt: skip
     first = given[0]
     for other in given[1:]:
         same = (first.density, first.damping) == (other.density, other.damping)
@@ -191,7 +196,7 @@ def _pins(known: Sequence[Known], setup: Setup, low: Floats) -> Hold | Floats:
     if not given:
         raise InputError(
             "where the cloth is held is not known", where="cloth",
-            fix=f"name its pins: {', '.join(Hold)}, or their rest coordinates",
+            fix=f"name its pins (--pins): {', '.join(Hold)}, or their rest coordinates",
         )  # fmt: skip
     for other in given[1:]:
         if other.shape != given[0].shape or not np.allclose(other, given[0]):

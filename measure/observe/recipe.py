@@ -11,7 +11,8 @@
     [[recording]]       source: an artifact's id, a folder of meshes, or a marker table; take (a recording of a table
                         that holds several), name, rate, unit, rest-unit, noise
     [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x towards +y); or log
-                        (an artifact's id or an anemometer's file) with axis or north, and offset or start (ISO 8601)
+                        (an artifact's id or an anemometer's file) with axis or north, and offset or start (ISO 8601);
+                        sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not say them
 
 All values are SI and radians. What a recording's own description says may be left out. Paths are relative to the file.
 """
@@ -26,6 +27,7 @@ from pathlib import Path
 from flagdata import timebase
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.findings import Finding
+from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
@@ -45,11 +47,12 @@ from sim.run.tables import Table
 
 @dataclass(frozen=True, kw_only=True)
 class WindSource:
-    """A constant velocity [m/s], or a log and how it lies beside the recording."""
+    """A constant velocity [m/s], or a log, how it is read if it is a file, and how it lies beside the recording."""
 
     velocity: tuple[float, float, float] | None = None
     log: str = ""
     placement: LogPlacement | None = None
+    options: WindOptions | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +134,7 @@ def parse(path: Path) -> ExperimentRecipe:
     test = top.table("test")
     recipe = ExperimentRecipe(
         title=top.text("title", path.stem) or path.stem, up=top.choice("up", Up.Z), folder=folder,
-        setup=_setup(top, folder), recordings=tuple(_recording(table) for table in top.tables("recording")),
+        setup=_setup(top, folder), recordings=tuple(_recording(table, folder) for table in top.tables("recording")),
         level=test.number("level", 0.0, above=0.0) if "level" in test else None,
         nulls=test.whole("nulls", 0, least=1) if "nulls" in test else None,
     )  # fmt: skip
@@ -234,7 +237,7 @@ def _material_file(path: Path) -> Material:
         raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
 
 
-def _recording(table: Table) -> RecordingSource:
+def _recording(table: Table, folder: Path) -> RecordingSource:
     source = table.text("source", None)
     if not source:
         raise InputError("no source is named", where=table.where, fix="add source, an artifact's id or a path")
@@ -243,13 +246,13 @@ def _recording(table: Table) -> RecordingSource:
         rate=table.number("rate", 0.0, above=0.0) if "rate" in table else None,
         unit=table.text("unit", "m") or "m", rest_unit=table.text("rest-unit", None),
         noise=table.number("noise", 0.0, least=0.0) if "noise" in table else None,
-        wind=_wind(table.table("wind")) if "wind" in table else None,
+        wind=_wind(table.table("wind"), folder) if "wind" in table else None,
     )  # fmt: skip
     table.done()
     return recording
 
 
-def _wind(table: Table) -> WindSource:
+def _wind(table: Table, folder: Path) -> WindSource:
     velocity, log = table.numbers("velocity"), table.text("log", "") or ""
     given = [bool(velocity), "speed" in table, bool(log)]
     if sum(given) != 1:
@@ -262,8 +265,12 @@ def _wind(table: Table) -> WindSource:
             offset=table.number("offset", 0.0) if "offset" in table else None,
             start=timebase.parse(start, where=f"{table.where} start") if start is not None else None,
         )  # fmt: skip
+        sensor = table.text("sensor", None)
+        if sensor is not None and (folder / sensor).is_file():
+            sensor = str(folder / sensor)
+        options = WindOptions(recipe=sensor, zone=table.text("zone", None))
         table.done()
-        return WindSource(log=log, placement=placement)
+        return WindSource(log=log, placement=placement, options=options)
     if not velocity:
         speed, toward = table.number("speed", 0.0, least=0.0), table.number("toward", 0.0)
         velocity = (speed * math.cos(toward), speed * math.sin(toward), 0.0)
@@ -354,7 +361,11 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
     placement = source.placement or LogPlacement()
     path = folder / source.log
     if path.is_file():
-        return wind.from_log(path, placement)
+        return wind.from_log(path, placement, source.options)
+    if source.options not in (None, WindOptions()):
+        raise UsageError(
+            "an artifact's wind was read before", where=source.log, fix="leave the sensor and the zone out"
+        )  # fmt: skip
     if lake is None:
         raise NotFoundError("no such log", where=source.log, fix="check the path, or open a lake for ids")
     return wind.from_artifact(lake, lake.artifact(source.log), placement)

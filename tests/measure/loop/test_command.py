@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,16 @@ import pytest
 
 from flagdata.cli import main
 from flagdata.errors import NotFoundError, UsageError
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.markers.store import ingest_markers
 from flagdata.lake import Lake
+from measure.loop.command import doubted
 from measure.loop.sources import Reading, read
+from measure.loop.verdict import Conclusion
 from measure.observe import Up
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag
+from tests.measure.report.verdicts import Size, verdict
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +80,49 @@ def test_winds_are_one_for_all_or_one_each(table: Path, capsys: pytest.CaptureFi
     assert (code, told["what"]) == (2, "3 winds for 2 recordings")
 
 
-@pytest.mark.parametrize("option", ["--wind=4", "--axis=1,0,0", "--rate=25", "--unit=mm", "--up=y", "--noise=0.001"])
+@pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])
+def test_what_is_said_of_a_log_is_not_ignored_where_there_is_none(
+    table: Path, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, told = said([str(table), "--rate", str(RATE), "--wind", "4", option], capsys)
+    assert (code, told["where"]) == (2, option.partition("=")[0])
+
+
+def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -> None:
+    """Its first frame at the log's second sample, whose speed is 5."""
+    log = tmp_path / "log.csv"
+    log.write_text("time,wind_speed\n2026-05-14 09:30:00,4\n2026-05-14 09:30:01,5\n2026-05-14 09:30:02,6\n")
+    reading = Reading(rate=RATE, offset=1.0, sensor="generic-csv", zone="+02:00")
+    calm, _ = read([str(table)], [str(log)], reading, None)
+    assert calm.wind is not None
+    np.testing.assert_allclose(calm.wind.at(np.array([0.0, 0.5])), [[5, 0, 0], [5.5, 0, 0]])
+
+
+def test_a_warning_that_may_be_what_was_found_is_said_with_the_verdict() -> None:
+    whole = verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2))
+    doubt = Finding(kind="inertia-does-not-fit", severity=Severity.WARNING, what="it moves as in 8 m/s", where="flag")
+    other = replace(doubt, kind="cloth-not-covered", what="no marker near", severity=Severity.NOTE)
+    told = doubted(whole, (doubt, other))
+    assert told.words == f"{whole.words} Beware, this may be an error of the data: flag: it moves as in 8 m/s."
+    assert told.findings == (
+        ("inertia-does-not-fit", "flag: it moves as in 8 m/s"), ("cloth-not-covered", "flag: no marker near"),
+    )  # fmt: skip
+    assert doubted(whole, (other,)).words == whole.words
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        "--wind=4",
+        "--axis=1,0,0",
+        "--rate=25",
+        "--unit=mm",
+        "--up=y",
+        "--noise=0.001",
+        "--sensor=generic-csv",
+        "--zone=UTC",
+    ],
+)
 def test_beside_a_recipe_with_recordings_no_option_is_ignored(
     table: Path, tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
