@@ -279,11 +279,11 @@ def _strengths(
 
 
 def _words(setting: Setting, column: EffectColumn, value: float, density: float) -> str:
-    """What a strength is; of mass, how much."""
+    """What a strength of this sign is; of mass, how much."""
     if not isinstance(column, TermColumn):
         return column.name
     if column.term.field != MASS:
-        return column.term.words
+        return column.term.words if value >= 0 else f"the opposite of {column.term.words}"
     specimen = setting.experiment.specimen
     cloth = setting.forecaster.system(setting.segments.select([0]), [setting.nominal])[0].cloth
     share = column.term.at.of(Flat(cloth=cloth))[:, 0, 0].double().numpy()
