@@ -123,12 +123,17 @@ def p_interval(test: NullTest) -> Estimate | None:
 
 
 def control_warnings(verdict: Verdict) -> list[str]:
-    """Where the wrong effect helps as much as the named one, the attribution fails: one sentence each."""
-    return [
-        f"{_begun(c.what)}: the control {c.control_name} does as well as the named effect: the attribution fails there."
-        for c in verdict.comparisons
-        if c.control is not None and known(c.control) and known(c.after) and c.control.value <= c.after.value
-    ]
+    """Where the wrong effect helps as much as the named one, or cannot be told from it: one sentence each."""
+    found = []
+    for c in verdict.comparisons:
+        if c.control is None or not known(c.control) or not known(c.after):
+            continue
+        if c.control.value <= c.after.value:
+            what = f"the control {c.control_name} does as well as the named effect: the attribution fails there"
+            found.append(f"{_begun(c.what)}: {what}.")
+        elif c.apart is not None and c.apart.low <= 0:
+            found.append(f"{_begun(c.what)}: the control {c.control_name} cannot be told from the named effect there.")
+    return found
 
 
 def reduction_warnings(verdict: Verdict) -> list[str]:

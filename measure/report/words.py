@@ -87,6 +87,8 @@ def _compared(comparison: Comparison, after_label: str) -> str:
         parts.append(f"oracle {estimate_text(comparison.oracle, shown=shown)}")
     if known(comparison.control):
         parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
+        if known(comparison.apart):
+            parts[-1] += f", worse by {estimate_text(comparison.apart, shown=shown)}"
     parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
     return _joined(parts)
 

@@ -84,8 +84,16 @@ def test_a_control_that_does_as_well_as_the_named_effect_is_pointed_out() -> Non
     first = whole.comparisons[0]
     failing = replace(whole, comparisons=(replace(first, control=first.after), *whole.comparisons[1:]))
     (warning,) = sentences.control_warnings(failing)
-    assert first.what in warning
+    assert warning.lower().startswith(first.what)
     assert "attribution fails" in warning
+
+
+def test_a_control_that_cannot_be_told_from_the_named_effect_is_pointed_out() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    near, far = (replace(whole.comparisons[0], apart=about(0.0003, half)) for half in (0.0004, 0.0002))
+    (warning,) = sentences.control_warnings(replace(whole, comparisons=(near, far)))
+    assert "cannot be told from the named effect" in warning
+    assert "worse by 0.3 mm [−0.1, 0.7]" in words(replace(whole, comparisons=(near,))).replace("\n    ", " ")
 
 
 def test_a_reduction_whose_interval_holds_zero_is_pointed_out() -> None:
