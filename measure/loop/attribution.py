@@ -7,13 +7,14 @@ wrong effect, and cross-validation alone does not control false positives.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn, FieldColumn
 from measure.loop.inference import Evidence, Fit, fluctuation, fluctuation_gains, gains
@@ -36,6 +37,8 @@ _APART = 3.0
 """A rival whose squared z is lower by more than the square of this fits worse, whatever its held-out gain's error."""
 _SEEN = ("tilted-pole",)
 """Never named beside another effect: it shows at the attachments, whose observed places are the model's."""
+_RUN_AGAIN = 2
+"""Of each of two orders."""
 _BEYOND = 3.0
 """A strength so many times what is expected of it, beyond its error, is not physical."""
 _BETTER = 1.5
@@ -82,15 +85,21 @@ class Judgement:
     p_value: float
 
 
-def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgement:
-    """Weigh the library against the evidence of all recordings, at a level of the global test."""
+def judge(
+    evidence: Evidence, reference: Reference, *, level: float, again: Mapping[int, Rerun] | None = None
+) -> Judgement:
+    """Weigh the library against the evidence of all recordings, at a level of the global test.
+
+    Args:
+        again: of columns whose models were run again, which counts in place of the linear evidence.
+    """
     statistics = reference.statistics(evidence, names())
     statistic, p_value = float(statistics.max()), reference.p_global(statistics, evidence.fit(()).left)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     smooth = [i + _FIRST for i, c in enumerate(columns()) if isinstance(c, FieldColumn)]
     held_out = gains(evidence, [[i] for i, _ in effects])
     weighed = [
-        _weigh(evidence, reference, column, effect, own, statistics)
+        _weigh(evidence, reference, column, effect, own, statistics, (again or {}).get(column))
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[-1]))])
@@ -124,6 +133,13 @@ def judge(evidence: Evidence, reference: Reference, *, level: float) -> Judgemen
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
+
+
+def finalists(judgement: Judgement) -> tuple[int, ...]:
+    """Columns that are run again: the first by held-out gains, and the largest statistics."""
+    able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
+    strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
+    return tuple(dict.fromkeys(w.column for w in (*able[:_RUN_AGAIN], *strongest[:_RUN_AGAIN])))
 
 
 def withdrawn(judgement: Judgement) -> Judgement:
@@ -191,13 +207,23 @@ def _leftover(evidence: Evidence, reference: Reference, active: Sequence[int]) -
 
 
 def _weigh(
-    evidence: Evidence, reference: Reference, column: int, effect: EffectColumn, gained: Floats, statistics: Floats
+    evidence: Evidence,
+    reference: Reference,
+    column: int,
+    effect: EffectColumn,
+    linear: Floats,
+    statistics: Floats,
+    again: Rerun | None,
 ) -> Weighed:
     fit = evidence.fit([column])
     value, _ = fit.of(column)
     # The standard error is that which makes the nulls' mean squared z 1.
     statistic = float(statistics[column])
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
+    z = value / error if error > 0 else 0.0
+    gained, leftover = linear, again.leftover if again is not None else _leftover(evidence, reference, fit.active)
+    if again is not None:
+        gained, value = again.gains, again.coefficient
     null = effect.described.null
     by_recording = []
     for index in np.unique(evidence.recording):
@@ -209,9 +235,9 @@ def _weigh(
         candidate=Candidate(
             effect=effect.effect, parameter=effect.parameter, null=null,
             strength=estimate(null + value, error, effect.unit),
-            z=value / error if error > 0 else 0.0, p_value=reference.p_alone(statistic, column),
+            z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic), gain=float(gained.sum()),
-            gain_error=_total_error(gained), behind=0.0, leftover=_leftover(evidence, reference, fit.active),
+            gain_error=_total_error(gained), behind=0.0, leftover=leftover,
             by_recording=tuple(by_recording),
         ),
     )  # fmt: skip

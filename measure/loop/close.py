@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,18 +22,29 @@ from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
+from measure.loop.again import Fits, run_again
 from measure.loop.alignment import aligned
-from measure.loop.attribution import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, estimate, judge, tied, withdrawn
+from measure.loop.attribution import (
+    EQUIVALENT,
+    GUST_COLUMN,
+    Judgement,
+    Weighed,
+    estimate,
+    finalists,
+    judge,
+    tied,
+    withdrawn,
+)
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
-from measure.loop.comparison import Predictions, Trial, compare, folds, predict
+from measure.loop.comparison import Predictions, Trial, Yardstick, compare, folds, left_out, predict
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, NullModel
+from measure.loop.inference import Evidence
 from measure.loop.model import Model
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank, Reference
-from measure.loop.refine import DivergedError, Refined, refine
+from measure.loop.refine import Refined
 from measure.loop.residuals import residuals
-from measure.loop.statistics import statistics
+from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, NullTest, Parameter, Verdict
 from measure.loop.words import assumptions, proposal, sentence, separating
 from measure.observe.trajectory import Experiment, Trajectory
@@ -125,17 +136,28 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     tell = stage or (lambda what, done, total: None)
     setting = Setting.of(experiment)
     tell("sensitivities", 0, 1)
-    found = statistics(setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns())
+    found, projection = projected(
+        setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns()
+    )
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
     null = bank.model()
-    evidence = Evidence.of(found, setting.speeds[setting.recording], null)
+    speeds = setting.speeds[setting.recording]
+    evidence = Evidence.of(found, speeds, null)
     reference = bank.reference(
         len(setting.segments), noise=max(s.noise for s in setting.segments.items), seed=options.seed
     )
+    fits = Fits(
+        forecaster=setting.forecaster, segments=setting.segments, evidence=evidence, null=null, speeds=speeds
+    )  # fmt: skip
+    yardstick = Yardstick(found=found, projection=projection, null=null, speeds=speeds)
     judgement = judge(evidence, reference, level=options.level)
-    solved = Solved(setting=setting, evidence=evidence, null=null, reference=reference, judgement=judgement)
-    trial = _trial(solved, options, tell)
+    if judgement.conclusion is not Conclusion.SUFFICIENT:
+        tell("before and after", 0, 1)
+        again = run_again(fits, yardstick, reference, finalists(judgement))
+        judgement = judge(evidence, reference, level=options.level, again=again)
+    solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
+    trial = _trial(solved, yardstick, options, tell)
     partly = judgement.conclusion is Conclusion.PARTLY
     diverges = solved.larger is None and bool(judgement.named) and GUST_COLUMN not in judgement.named
     if diverges or trial.failed or (trial.tied and partly):
@@ -151,30 +173,24 @@ class Solved:
     """A judged experiment, with the models fitted to it beyond the linear.
 
     Attributes:
-        judgement: on the linear evidence, before the models were run again.
+        judgement: before the wrong-effect control was run beside it.
     """
 
     setting: Setting
-    evidence: Evidence
-    null: NullModel
+    fits: Fits
     reference: Reference
     judgement: Judgement
 
-    @cached_property
+    @property
     def base(self) -> Refined:
         """The base model."""
-        return self._refined(())
+        return self.fits.base
 
-    @cached_property
+    @property
     def larger(self) -> Refined | None:
         """With the effects that act; None where none does, its course is unknown (gusts), or its cloth diverges."""
         named = self.acting
-        if not named or GUST_COLUMN in named:
-            return None
-        try:
-            return self._refined(named)
-        except DivergedError:
-            return None
+        return None if not named or GUST_COLUMN in named else self.fits.of(named)
 
     @property
     def acting(self) -> tuple[int, ...]:
@@ -187,20 +203,11 @@ class Solved:
         """The best effect that was not named, and the model with it."""
         taken = (*self.judgement.named, GUST_COLUMN)
         for wrong in self.judgement.ranking:
-            if wrong.column in taken or not wrong.admissible:
-                continue
-            try:
-                return wrong, self._refined((wrong.column,))
-            except DivergedError:
-                continue
+            if wrong.column not in taken and wrong.admissible:
+                fitted = self.fits.of((wrong.column,))
+                if fitted is not None:
+                    return wrong, fitted
         return None
-
-    def _refined(self, chosen: Sequence[int]) -> Refined:
-        setting = self.setting
-        speeds = setting.speeds[setting.recording]
-        return refine(
-            setting.forecaster, setting.segments, self.evidence, self.null, speeds, chosen, weighed=banks.columns()
-        )
 
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
@@ -242,7 +249,7 @@ def _null_duration(segments: Segments) -> float:
     return (each * round(segments.duration / segments.period) + segments.first + 1) * segments.period
 
 
-def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
+def _trial(solved: Solved, yardstick: Yardstick, options: Options, tell: Stage) -> Trial:
     """Before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
     if larger is None:
@@ -253,23 +260,25 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     made: list[Comparison] = []
     helped: list[Floats] = []
     apart: list[Floats] = []
-    left_out = folds(setting.segments, [float(u) for u in setting.speeds])
-    for place, fold in enumerate(left_out):
-        own = setting.segments.select(np.flatnonzero(fold.outside))
-        models = [solved.base.without(fold.outside), larger.without(fold.outside)]
-        models += [] if control is None else [control[1].without(fold.outside)]
-        squared = [predict(setting.forecaster, own, model).squared for model in models]
+    frames = len(setting.segments.items[0].positions) - setting.segments.first
+    every = folds(setting.segments, [float(u) for u in setting.speeds])
+    for place, fold in enumerate(every):
+        fitted = [solved.base, larger] if control is None else [solved.base, larger, control[1]]
+        tried = [
+            left_out(setting.forecaster, setting.segments, model.without(fold.outside), yardstick, fold.outside)
+            for model in fitted
+        ]
         near = np.isin(floor[0], np.unique(setting.recording[fold.outside]))
         made.append(
             compare(
-                fold, frames=len(own) * (len(own.items[0].positions) - own.first), before=squared[0], after=squared[1],
-                control=None if control is None else squared[2], floor=floor[1][near],
+                fold, frames=int(fold.outside.sum()) * frames, before=tried[0], after=tried[1],
+                control=None if control is None else tried[2], floor=floor[1][near],
                 control_name="" if control is None else control[0].candidate.effect,
             )
         )  # fmt: skip
-        if len(left_out) == 1 or place < len(setting.speeds):  # the late thirds are in the recordings as well
-            helped.append(squared[0] - squared[1])
-            apart += [] if control is None else [squared[2] - squared[1]]
+        if len(every) == 1 or place < len(setting.speeds):  # the late thirds are in the recordings as well
+            helped.append(tried[0].misfit - tried[1].misfit)
+            apart += [] if control is None else [tried[2].misfit - tried[1].misfit]
     return Trial(comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None)
 
 
@@ -312,7 +321,7 @@ def _verdict(
     smooth = [i + len(THETA) for i, c in enumerate(banks.columns()) if isinstance(c, FieldColumn)]
     return replace(
         verdict, words=sentence(verdict), separating=separating(verdict),
-        proposal=proposal(verdict, solved.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
+        proposal=proposal(verdict, solved.fits.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
     )  # fmt: skip
 
 
@@ -339,7 +348,7 @@ def _ranking(solved: Solved, judgement: Judgement, larger: Refined | None) -> tu
         if larger is not None and weighed.column in solved.acting:
             place = solved.acting.index(weighed.column)
             column, coefficient = larger.model.effects[place]
-            linear = solved.evidence.fit([weighed.column]).of(weighed.column)[1]
+            linear = solved.fits.evidence.fit([weighed.column]).of(weighed.column)[1]
             error = larger.errors[len(THETA) + place] * weighed.error / linear
             candidate = replace(candidate, strength=estimate(column.described.null + coefficient, error, column.unit))
         made.append(candidate)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
+from measure.loop.statistics import Projection, Statistics
 from measure.loop.verdict import Comparison, Estimate
 
 Floats = NDArray[np.float64]
@@ -35,8 +37,8 @@ class Trial:
 
     Attributes:
         comparisons: one a fold.
-        helped: (segment,) squared distance before less after, each segment of the recordings left out in turn (of a
-            single recording: of its last third) [m²].
+        helped: (segment,) half misfit before less after (see `Yardstick`), each segment of the recordings left out in
+            turn (of a single recording: of its last third).
         apart: (segment,) control less after; None without a control.
     """
 
@@ -78,6 +80,30 @@ class Predictions:
         return (self.errors**2).sum(axis=2).mean(axis=(0, 1))
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Yardstick:
+    """Measures models by the directions of the statistics, with what the model's numerics leave taken out.
+
+    A squared distance of markers is mostly what the fit's mesh cannot show, and its bias by the mesh is larger than
+    what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
+
+    Attributes:
+        found: statistics at the nominal model.
+        projection: their directions.
+        null: the null model.
+        speeds: (segment,) of the wind [m/s].
+    """
+
+    found: Statistics
+    projection: Projection
+    null: NullModel
+    speeds: Floats
+
+    def evidence(self, errors: torch.Tensor) -> Evidence:
+        """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
+        return Evidence.of(replace(self.found, r=self.projection.of(errors)), self.speeds, self.null)
+
+
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
     """Each recording left out in turn, where there are two or more, and the last third of every recording."""
     recording = np.array([s.recording for s in segments.items])
@@ -106,6 +132,25 @@ def predict(
     return Predictions(errors=_array(errors), predicted=_array(predicted))
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeftOut:
+    """What a model leaves of segments it was not fitted to: (segment,) mean squared distances [m²], half misfits."""
+
+    squared: Floats
+    misfit: Floats
+
+
+def left_out(
+    forecaster: Forecaster, segments: Segments, model: Model, yardstick: Yardstick, outside: NDArray[np.bool_]
+) -> LeftOut:
+    """Of a model fitted to the other segments."""
+    errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
+    squared = _array(errors[..., torch.as_tensor(outside, device=errors.device)])
+    return LeftOut(
+        squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=yardstick.evidence(errors).left_out(outside)
+    )  # fmt: skip
+
+
 def _array(values: torch.Tensor) -> Floats:
     return values.double().cpu().numpy()
 
@@ -114,27 +159,33 @@ def compare(
     fold: Fold,
     *,
     frames: int,
-    before: Floats,
-    after: Floats,
-    control: Floats | None,
+    before: LeftOut,
+    after: LeftOut,
+    control: LeftOut | None,
     control_name: str,
     floor: Floats,
 ) -> Comparison:
     """Errors of the segments left out.
 
     Args:
-        before, after, control: (segment,) mean squared distances [m²].
-        floor: (segment,) the same of data simulated from the larger model, which it predicts with other numerics.
+        floor: (segment,) mean squared distances of data simulated from the larger model, which it predicts with other
+            numerics [m²].
     """
-    low = min(float(floor.mean()), float(before.mean()))
-    gained = float(before.mean() - after.mean())
-    room = float(before.mean()) - low
+    old, new = before.squared, after.squared
+    low = min(float(floor.mean()), float(old.mean()))
+    gained = float(old.mean() - new.mean())
+    room = float(old.mean()) - low
     return Comparison(
-        what=fold.words, frames=frames, before=root(before), after=root(after), reduction=paired(before, after),
-        floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(before.mean()) else None,
-        control=None if control is None else root(control), control_name=control_name,
-        apart=None if control is None else paired(control, after),
+        what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
+        floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(old.mean()) else None,
+        control=None if control is None else root(control.squared), control_name=control_name,
+        apart=None if control is None else _mean(control.misfit - after.misfit),
     )  # fmt: skip
+
+
+def _mean(values: Floats) -> Estimate:
+    value, reach = float(values.mean()), _reach(values)
+    return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=_LEVEL)
 
 
 def root(squared: Floats) -> Estimate:

@@ -214,6 +214,15 @@ class Evidence:
         drops[active] = 0.0
         return drops[: self.columns]
 
+    def left_out(self, outside: NDArray[np.bool_]) -> Floats:
+        """(segment,) half misfits of some segments of a model that was fitted before, its r being those left by it:
+        the numerics' shifts are fitted to the others."""
+        shifts = list(range(self.columns, self.score.shape[1]))
+        inside = self.select(~outside)
+        curvature = inside.curvature.sum(axis=0)[np.ix_(shifts, shifts)] + np.eye(len(shifts))
+        value = np.linalg.solve(curvature, inside.score.sum(axis=0)[shifts])
+        return self.select(outside).misfit(shifts, value) / 2
+
     def misfit(self, active: Chosen, value: Floats) -> Floats:
         """(segment,) what coefficients leave of each segment."""
         places = list(active)
@@ -236,7 +245,7 @@ class Fit:
         return float(self.value[place]), float(np.sqrt(self.covariance[place, place]))
 
 
-def _folds(recording: NDArray[np.int64]) -> NDArray[np.int64]:
+def left_together(recording: NDArray[np.int64]) -> NDArray[np.int64]:
     """(segment,) what is left out together: a recording, or each half of a single one."""
     if len(np.unique(recording)) > 1:
         return recording
@@ -249,7 +258,7 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
     Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the
     left-out segments' half misfits are compared with the base model's, fitted to the same.
     """
-    folds = _folds(evidence.recording)
+    folds = left_together(evidence.recording)
     result = np.zeros((len(choices), len(folds)))
     for index in np.unique(folds):
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)
@@ -294,7 +303,7 @@ def fluctuation(evidence: Evidence, column: int, beside: Chosen = ()) -> Fluctua
 
 def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
     """(segment,) log likelihood of each left-out recording's segments under the others' fluctuation, over none."""
-    folds = _folds(evidence.recording)
+    folds = left_together(evidence.recording)
     result = np.zeros(len(folds))
     for index in np.unique(folds):
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)

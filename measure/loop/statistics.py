@@ -11,7 +11,7 @@ E r = μ + R δ, with μ what the model's own numerics leave.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +77,27 @@ class Statistics:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Projection:
+    """The directions that statistics are taken along, kept: other models' errors have r along the same ones.
+
+    Attributes:
+        directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
+        scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
+    """
+
+    directions: Tensor
+    scale: Tensor
+
+    def of(self, errors: Tensor) -> Floats:
+        """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
+        parts = [
+            direction @ _weighed(errors[..., place], self.scale[:, place]).to(direction.dtype)
+            for place, direction in enumerate(self.directions)
+        ]
+        return torch.stack(parts).double().cpu().numpy()
+
+
 def statistics(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> Statistics:
@@ -84,9 +105,31 @@ def statistics(
 
     The columns of the result are `THETA`'s, then those given.
     """
+    return Statistics.joined([found for found, _, _ in _pieces(forecaster, segments, calibrations, columns)])
+
+
+def projected(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> tuple[Statistics, Projection]:
+    """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
+    parts: list[Statistics] = []
+    directions: list[Tensor] = []
+    scales: list[Tensor] = []
+    for found, changes, scale in _pieces(forecaster, segments, calibrations, columns):
+        parts.append(found)
+        scales.append(scale)
+        for place in range(scale.shape[1]):
+            moved = torch.stack([(change[..., place] / scale[None, :, place, None]).reshape(-1) for change in changes])
+            directions.append(moved / moved.norm(dim=1, keepdim=True))
+    return Statistics.joined(parts), Projection(directions=torch.stack(directions), scale=torch.cat(scales, dim=1))
+
+
+def _pieces(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> Iterator[tuple[Statistics, list[Tensor], Tensor]]:
+    """Statistics of some segments at a time, with the sensitivities and the scale of their errors."""
     recording = np.array([s.recording for s in segments.items])
     # Segments of one recording share weights, and so stay in one chunk.
-    parts: list[Statistics] = []
     for chosen in _chunks(recording):
         own = segments.select(chosen)
         starts = [calibrations[i] for i in chosen]
@@ -94,8 +137,7 @@ def statistics(
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.calibration_sensitivities(own, starts, base)
         changes += [forecaster.sensitivity(column, own, starts, base) for column in columns]
-        parts.append(reduced(base, changes, recording[chosen], noise))
-    return Statistics.joined(parts)
+        yield reduced(base, changes, recording[chosen], noise), changes, _scale(base, recording[chosen], noise)
 
 
 def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -108,26 +150,39 @@ def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
+def _scale(base: Tensor, recording: NDArray[np.int64], noise: Floats) -> Tensor:
+    """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m]."""
+    mean = (base**2).mean((0, 2))
+    scale = torch.empty_like(mean)
+    for index in np.unique(recording):
+        own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
+        squared = mean[:, own].mean(1)
+        noisy = _NOISE * float(noise[recording == index][0]) ** 2
+        scale[:, own] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
+    return scale
+
+
+def _weighed(error: Tensor, scale: Tensor) -> Tensor:
+    """(frame · marker · 3,) errors (frame, marker, 3) over their scale (marker,), long ones clipped."""
+    error = error / scale[None, :, None]
+    size = error.norm(dim=2, keepdim=True) / 3**0.5
+    return (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1)
+
+
 def reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64], noise: Floats) -> Statistics:
     """Of segments with their errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m]."""
     mean = (base**2).mean((0, 2))  # (marker, segment)
     r = np.empty((len(recording), len(changes)))
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
-    for index in np.unique(recording):
-        own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
-        squared = mean[:, own].mean(1)
-        noisy = _NOISE * float(noise[recording == index][0]) ** 2
-        scale = torch.maximum(squared - noisy, squared / 4).sqrt()[None, :, None]
-        for place in own.tolist():
-            error = base[..., place] / scale
-            size = error.norm(dim=2, keepdim=True) / 3**0.5
-            error = (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1).double()
-            moved = (stacked[..., place] / scale).reshape(len(changes), -1).double()
-            inner = (moved @ moved.T).cpu().numpy()
-            length = np.sqrt(np.diag(inner))
-            r[place] = (moved @ error).cpu().numpy() / length
-            response[place] = inner / length[:, None]
+    scale = _scale(base, recording, noise)
+    for place in range(len(recording)):
+        error = _weighed(base[..., place], scale[:, place]).double()
+        moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
+        inner = (moved @ moved.T).cpu().numpy()
+        length = np.sqrt(np.diag(inner))
+        r[place] = (moved @ error).cpu().numpy() / length
+        response[place] = inner / length[:, None]
     return Statistics(
         recording=recording, r=r, response=response, error=mean.mean(0).double().cpu().numpy() * 3,
         marker_error=mean.T.double().cpu().numpy() * 3,

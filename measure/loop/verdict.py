@@ -77,7 +77,8 @@ class Comparison:
         share: E_red = (before − after) / (before − oracle, or floor); None where before is not above it.
         control: after, with the same freedom spent on the best wrong effect.
         control_name: which.
-        apart: paired, control − after [m].
+        apart: mean half misfit of a segment by the control less that by the effect, paired, what the model's numerics
+            leave taken out: natural units of log likelihood.
     """
 
     what: str

@@ -1,0 +1,110 @@
+"""The first candidates fitted beyond the linear and run again, before one of them is named.
+
+Strong effects are far from linear: a lift of 1.4 shows as 0.3 where sensitivities are taken at none, and predicts
+unseen recordings worse than nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.loop.bank import columns, names
+from measure.loop.comparison import Yardstick, left_out
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Evidence, NullModel, left_together
+from measure.loop.reference import Reference
+from measure.loop.refine import DivergedError, Refined, refine
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fits:
+    """Models of one experiment beyond the linear, each fitted once.
+
+    Attributes:
+        evidence: linear, where the fits begin.
+        null: the null model.
+        speeds: (segment,) of the wind [m/s].
+    """
+
+    forecaster: Forecaster
+    segments: Segments
+    evidence: Evidence
+    null: NullModel
+    speeds: Floats
+    _made: dict[tuple[int, ...], Refined | None] = field(default_factory=dict)
+
+    def of(self, chosen: Sequence[int]) -> Refined | None:
+        """The base model with some columns of the library; None if its cloth diverges."""
+        key = tuple(chosen)
+        if key not in self._made:
+            try:
+                self._made[key] = refine(
+                    self.forecaster, self.segments, self.evidence, self.null, self.speeds, key, weighed=columns()
+                )
+            except DivergedError:
+                self._made[key] = None
+        return self._made[key]
+
+    @property
+    def base(self) -> Refined:
+        """Without any.
+
+        Raises:
+            DivergedError: see `refine`.
+        """
+        made = self.of(())
+        if made is None:
+            raise DivergedError("the base model's cloth does not stay one", fix="check cloth, pins and wind")
+        return made
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rerun:
+    """A candidate run again.
+
+    Attributes:
+        coefficient: fitted to all recordings.
+        gains: (segment,) held-out gain: see `inference.gains`.
+        leftover: p-value of the global test on what it leaves.
+    """
+
+    coefficient: float
+    gains: Floats
+    leftover: float
+
+
+def run_again(fits: Fits, yardstick: Yardstick, reference: Reference, candidates: Sequence[int]) -> dict[int, Rerun]:
+    """Column → what its model does; columns whose cloth diverges are left out."""
+    together = left_together(fits.evidence.recording)
+    parts = [together == index for index in np.unique(together)]
+
+    def left(model: Refined, outside: NDArray[np.bool_]) -> Floats:
+        return left_out(fits.forecaster, fits.segments, model.without(outside), yardstick, outside).misfit
+
+    before = [left(fits.base, outside) for outside in parts]
+    made: dict[int, Rerun] = {}
+    for column in candidates:
+        fitted = fits.of((column,))
+        if fitted is None:
+            continue
+        gains = np.zeros(len(together))
+        for outside, old in zip(parts, before, strict=True):
+            gains[outside] = old - left(fitted, outside)
+        made[column] = Rerun(
+            coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
+            leftover=_leftover(fits, yardstick, reference, fitted, column),
+        )  # fmt: skip
+    return made
+
+
+def _leftover(fits: Fits, yardstick: Yardstick, reference: Reference, fitted: Refined, column: int) -> float:
+    errors, _ = fits.forecaster.run(*fitted.model.system(fits.forecaster, fits.segments), fits.segments)
+    evidence = yardstick.evidence(errors)
+    statistics = reference.statistics(evidence, names(), [column])
+    return reference.p_global(statistics, evidence.fit([column]).left)
