@@ -84,10 +84,10 @@ def run_again(fits: Fits, yardstick: Yardstick, reference: Reference, candidates
     together = left_together(fits.evidence.recording)
     parts = [together == index for index in np.unique(together)]
 
-    def left(model: Refined, outside: NDArray[np.bool_]) -> Floats:
-        return left_out(fits.forecaster, fits.segments, model.without(outside), yardstick, outside).misfit
+    def left(fitted: Refined, outside: NDArray[np.bool_], chosen: Sequence[int]) -> Floats:
+        return left_out(fits.forecaster, fits.segments, fitted.without(outside), yardstick, outside, chosen).misfit
 
-    before = [left(fits.base, outside) for outside in parts]
+    before = [left(fits.base, outside, ()) for outside in parts]
     made: dict[int, Rerun] = {}
     for column in candidates:
         fitted = fits.of((column,))
@@ -95,7 +95,7 @@ def run_again(fits: Fits, yardstick: Yardstick, reference: Reference, candidates
             continue
         gains = np.zeros(len(together))
         for outside, old in zip(parts, before, strict=True):
-            gains[outside] = old - left(fitted, outside)
+            gains[outside] = old - left(fitted, outside, (column,))
         made[column] = Rerun(
             coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
             leftover=_leftover(fits, yardstick, reference, fitted, column),

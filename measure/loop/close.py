@@ -263,10 +263,11 @@ def _trial(solved: Solved, yardstick: Yardstick, options: Options, tell: Stage) 
     frames = len(setting.segments.items[0].positions) - setting.segments.first
     every = folds(setting.segments, [float(u) for u in setting.speeds])
     for place, fold in enumerate(every):
-        fitted = [solved.base, larger] if control is None else [solved.base, larger, control[1]]
+        fitted = [(solved.base, ()), (larger, solved.acting)]
+        fitted += [] if control is None else [(control[1], (control[0].column,))]
         tried = [
-            left_out(setting.forecaster, setting.segments, model.without(fold.outside), yardstick, fold.outside)
-            for model in fitted
+            left_out(setting.forecaster, setting.segments, model.without(fold.outside), yardstick, fold.outside, chosen)
+            for model, chosen in fitted
         ]
         near = np.isin(floor[0], np.unique(setting.recording[fold.outside]))
         made.append(

@@ -141,13 +141,19 @@ class LeftOut:
 
 
 def left_out(
-    forecaster: Forecaster, segments: Segments, model: Model, yardstick: Yardstick, outside: NDArray[np.bool_]
+    forecaster: Forecaster,
+    segments: Segments,
+    model: Model,
+    yardstick: Yardstick,
+    outside: NDArray[np.bool_],
+    chosen: Sequence[int],
 ) -> LeftOut:
-    """Of a model fitted to the other segments."""
+    """Of a model fitted to the other segments, by its few columns' directions; by the yardstick's, which are all of
+    them, its calibration and chosen columns take one more linear step, on those others as well."""
     errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
     squared = _array(errors[..., torch.as_tensor(outside, device=errors.device)])
     return LeftOut(
-        squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=yardstick.evidence(errors).left_out(outside)
+        squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=yardstick.evidence(errors).left_out(outside, chosen)
     )  # fmt: skip
 
 

@@ -214,14 +214,10 @@ class Evidence:
         drops[active] = 0.0
         return drops[: self.columns]
 
-    def left_out(self, outside: NDArray[np.bool_]) -> Floats:
-        """(segment,) half misfits of some segments of a model that was fitted before, its r being those left by it:
-        the numerics' shifts are fitted to the others."""
-        shifts = list(range(self.columns, self.score.shape[1]))
-        inside = self.select(~outside)
-        curvature = inside.curvature.sum(axis=0)[np.ix_(shifts, shifts)] + np.eye(len(shifts))
-        value = np.linalg.solve(curvature, inside.score.sum(axis=0)[shifts])
-        return self.select(outside).misfit(shifts, value) / 2
+    def left_out(self, outside: NDArray[np.bool_], chosen: Chosen = ()) -> Floats:
+        """(segment,) half misfits of some segments, when the nuisances and chosen columns are fitted to the others."""
+        fit = self.select(~outside).fit(chosen)
+        return self.select(outside).misfit(fit.active, fit.value) / 2
 
     def misfit(self, active: Chosen, value: Floats) -> Floats:
         """(segment,) what coefficients leave of each segment."""
