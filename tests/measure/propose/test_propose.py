@@ -10,17 +10,13 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.loop.columns import THETA, Column, EffectColumn
-from measure.loop.inference import NullModel, Nulls
+from measure.loop.columns import Column, EffectColumn
 from measure.loop.reference import NullBank
 from measure.loop.verdict import Estimate
 from measure.observe.trajectory import Experiment, Specimen, WindTrack
 from measure.propose.effect_file import write
-from measure.propose.family import Family
-from measure.propose.lens import evidence
 from measure.propose.outcome import Decision, Outcome, Retest
 from measure.propose.propose import Options, made_ready, weigh
-from measure.propose.search import search
 from measure.propose.words import words
 from sim.effects.field import FieldEffect, Seen
 from sim.effects.files import load
@@ -34,32 +30,6 @@ def silent(what: str, done: int, total: int) -> None:
 @pytest.fixture(scope="module")
 def found(pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, lens: tuple[Column, ...]) -> Outcome:
     return weigh(made_ready(pushed), columns, bank, lens, options=Options(), stage=silent)
-
-
-def test_nineteen_of_twenty_nulls_give_no_proposal(
-    nulls: tuple[Nulls, float], bank: NullBank, columns: tuple[EffectColumn, ...]
-) -> None:
-    """Every kind of numerics in turn against the nulls of the others."""
-    whole, rows = nulls[0], len(bank.columns)
-    labels = (*(name for name, _, _ in THETA), *(column.name for column in columns))
-    kept = [*range(len(THETA)), *range(rows, rows + len(columns))]
-    pool = list(range(len(THETA), len(labels)))
-    tried = taken = 0
-    for kind in np.unique(whole.numerics):
-        inside = whole.numerics != kind
-        others, own = bank.nulls.select(inside), whole.select(~inside)
-        response = own.statistics.response[:, :rows][:, :, kept]
-        seen = replace(own.statistics, r=own.clean[:, :rows], response=response)
-        model = NullModel.fit(others)
-        pairs = [np.isin(seen.recording, pair) for pair in np.unique(seen.recording).reshape(-1, 2)]
-        # The responses of pairs are alike: the family of the first stands for those of one kind.
-        family = Family.of(others, seen.select(pairs[0]), noise=float(own.noise[0]), seed=0)
-        for chosen in pairs:
-            data = evidence(seen.select(chosen), own.speeds[chosen], model)
-            steps = search(data, family, labels, pool, level=0.03)
-            tried, taken = tried + 1, taken + steps[0].taken
-    assert tried == 24
-    assert taken <= tried / 20
 
 
 def test_a_planted_push_is_kept(found: Outcome) -> None:
