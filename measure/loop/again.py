@@ -7,17 +7,18 @@ unseen recordings worse than nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from measure.loop.bank import columns, names
-from measure.loop.comparison import Yardstick, left_out
+from measure.loop.comparison import left_out
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, NullModel, left_together
+from measure.loop.inference import left_together
 from measure.loop.reference import Reference
 from measure.loop.refine import DivergedError, Refined, refine
+from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 
@@ -27,16 +28,12 @@ class Fits:
     """Models of one experiment beyond the linear, each fitted once.
 
     Attributes:
-        evidence: linear, where the fits begin.
-        null: the null model.
-        speeds: (segment,) of the wind [m/s].
+        yardstick: the measure; its statistics at the nominal model are where the fits begin.
     """
 
     forecaster: Forecaster
     segments: Segments
-    evidence: Evidence
-    null: NullModel
-    speeds: Floats
+    yardstick: Yardstick
     _made: dict[tuple[int, ...], Refined | None] = field(default_factory=dict)
 
     def of(self, chosen: Sequence[int]) -> Refined | None:
@@ -44,9 +41,7 @@ class Fits:
         key = tuple(chosen)
         if key not in self._made:
             try:
-                self._made[key] = refine(
-                    self.forecaster, self.segments, self.evidence, self.null, self.speeds, key, weighed=columns()
-                )
+                self._made[key] = refine(self.forecaster, self.segments, self.yardstick, key, weighed=columns())
             except DivergedError:
                 self._made[key] = None
         return self._made[key]
@@ -79,15 +74,15 @@ class Rerun:
     leftover: float
 
 
-def run_again(fits: Fits, yardstick: Yardstick, reference: Reference, candidates: Sequence[int]) -> dict[int, Rerun]:
+def run_again(fits: Fits, reference: Reference, candidates: Sequence[int]) -> dict[int, Rerun]:
     """Column → what its model does; columns whose cloth diverges are left out."""
-    together = left_together(fits.evidence.recording)
+    together = left_together(fits.yardstick.found.recording)
     parts = [together == index for index in np.unique(together)]
 
-    def left(fitted: Refined, outside: NDArray[np.bool_], chosen: Sequence[int]) -> Floats:
-        return left_out(fits.forecaster, fits.segments, fitted.without(outside), yardstick, outside, chosen).misfit
+    def left(fitted: Refined, outside: NDArray[np.bool_]) -> Floats:
+        return left_out(fits.forecaster, fits.segments, fitted, fits.yardstick, outside).misfit
 
-    before = [left(fits.base, outside, ()) for outside in parts]
+    before = [left(fits.base, outside) for outside in parts]
     made: dict[int, Rerun] = {}
     for column in candidates:
         fitted = fits.of((column,))
@@ -95,16 +90,16 @@ def run_again(fits: Fits, yardstick: Yardstick, reference: Reference, candidates
             continue
         gains = np.zeros(len(together))
         for outside, old in zip(parts, before, strict=True):
-            gains[outside] = old - left(fitted, outside, (column,))
+            gains[outside] = old - left(fitted, outside)
         made[column] = Rerun(
             coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
-            leftover=_leftover(fits, yardstick, reference, fitted, column),
+            leftover=_leftover(fits, reference, fitted, column),
         )  # fmt: skip
     return made
 
 
-def _leftover(fits: Fits, yardstick: Yardstick, reference: Reference, fitted: Refined, column: int) -> float:
+def _leftover(fits: Fits, reference: Reference, fitted: Refined, column: int) -> float:
     errors, _ = fits.forecaster.run(*fitted.model.system(fits.forecaster, fits.segments), fits.segments)
-    evidence = yardstick.evidence(errors)
+    evidence = fits.yardstick.evidence(replace(fitted.statistics, r=fits.yardstick.projection.of(errors)))
     statistics = reference.statistics(evidence, names(), [column])
     return reference.p_global(statistics, evidence.fit([column]).left)

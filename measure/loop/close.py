@@ -36,7 +36,7 @@ from measure.loop.attribution import (
     withdrawn,
 )
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
-from measure.loop.comparison import Predictions, Trial, Yardstick, compare, folds, left_out, predict
+from measure.loop.comparison import Predictions, Trial, compare, folds, left_out, predict
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence
 from measure.loop.model import Model
@@ -47,6 +47,7 @@ from measure.loop.residuals import residuals
 from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, NullTest, Parameter, Verdict
 from measure.loop.words import assumptions, proposal, sentence, separating
+from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment, Trajectory
 from sim.integrate.split import SplitEuler
 
@@ -141,23 +142,20 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     )
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
-    null = bank.model()
     speeds = setting.speeds[setting.recording]
-    evidence = Evidence.of(found, speeds, null)
     reference = bank.reference(
         len(setting.segments), noise=max(s.noise for s in setting.segments.items), seed=options.seed
     )
-    fits = Fits(
-        forecaster=setting.forecaster, segments=setting.segments, evidence=evidence, null=null, speeds=speeds
-    )  # fmt: skip
-    yardstick = Yardstick(found=found, projection=projection, null=null, speeds=speeds)
+    yardstick = Yardstick(found=found, projection=projection, null=bank.model(), speeds=speeds)
+    evidence = yardstick.evidence(found)
+    fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
     judgement = judge(evidence, reference, level=options.level)
     if judgement.conclusion is not Conclusion.SUFFICIENT:
         tell("before and after", 0, 1)
-        again = run_again(fits, yardstick, reference, finalists(judgement))
+        again = run_again(fits, reference, finalists(judgement))
         judgement = judge(evidence, reference, level=options.level, again=again)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
-    trial = _trial(solved, yardstick, options, tell)
+    trial = _trial(solved, options, tell)
     partly = judgement.conclusion is Conclusion.PARTLY
     diverges = solved.larger is None and bool(judgement.named) and GUST_COLUMN not in judgement.named
     if diverges or trial.failed or (trial.tied and partly):
@@ -180,6 +178,11 @@ class Solved:
     fits: Fits
     reference: Reference
     judgement: Judgement
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """Of the nominal model."""
+        return self.fits.yardstick.evidence(self.fits.yardstick.found)
 
     @property
     def base(self) -> Refined:
@@ -249,7 +252,7 @@ def _null_duration(segments: Segments) -> float:
     return (each * round(segments.duration / segments.period) + segments.first + 1) * segments.period
 
 
-def _trial(solved: Solved, yardstick: Yardstick, options: Options, tell: Stage) -> Trial:
+def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     """Before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
     if larger is None:
@@ -263,11 +266,10 @@ def _trial(solved: Solved, yardstick: Yardstick, options: Options, tell: Stage) 
     frames = len(setting.segments.items[0].positions) - setting.segments.first
     every = folds(setting.segments, [float(u) for u in setting.speeds])
     for place, fold in enumerate(every):
-        fitted = [(solved.base, ()), (larger, solved.acting)]
-        fitted += [] if control is None else [(control[1], (control[0].column,))]
+        fitted = [solved.base, larger] if control is None else [solved.base, larger, control[1]]
         tried = [
-            left_out(setting.forecaster, setting.segments, model.without(fold.outside), yardstick, fold.outside, chosen)
-            for model, chosen in fitted
+            left_out(setting.forecaster, setting.segments, model, solved.fits.yardstick, fold.outside)
+            for model in fitted
         ]
         near = np.isin(floor[0], np.unique(setting.recording[fold.outside]))
         made.append(
@@ -322,7 +324,7 @@ def _verdict(
     smooth = [i + len(THETA) for i, c in enumerate(banks.columns()) if isinstance(c, FieldColumn)]
     return replace(
         verdict, words=sentence(verdict), separating=separating(verdict),
-        proposal=proposal(verdict, solved.fits.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
+        proposal=proposal(verdict, solved.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
     )  # fmt: skip
 
 
@@ -349,7 +351,7 @@ def _ranking(solved: Solved, judgement: Judgement, larger: Refined | None) -> tu
         if larger is not None and weighed.column in solved.acting:
             place = solved.acting.index(weighed.column)
             column, coefficient = larger.model.effects[place]
-            linear = solved.fits.evidence.fit([weighed.column]).of(weighed.column)[1]
+            linear = solved.evidence.fit([weighed.column]).of(weighed.column)[1]
             error = larger.errors[len(THETA) + place] * weighed.error / linear
             candidate = replace(candidate, strength=estimate(column.described.null + coefficient, error, column.unit))
         made.append(candidate)

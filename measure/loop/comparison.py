@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
-from measure.loop.statistics import Projection, Statistics
+from measure.loop.refine import Refined
 from measure.loop.verdict import Comparison, Estimate
+from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 _LEVEL = 0.9
@@ -37,8 +37,8 @@ class Trial:
 
     Attributes:
         comparisons: one a fold.
-        helped: (segment,) half misfit before less after (see `Yardstick`), each segment of the recordings left out in
-            turn (of a single recording: of its last third).
+        helped: (segment,) half misfit before less after (see `measure.loop.yardstick`), each segment of the recordings
+            left out in turn (of a single recording: of its last third).
         apart: (segment,) control less after; None without a control.
     """
 
@@ -80,30 +80,6 @@ class Predictions:
         return (self.errors**2).sum(axis=2).mean(axis=(0, 1))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Yardstick:
-    """Measures models by the directions of the statistics, with what the model's numerics leave taken out.
-
-    A squared distance of markers is mostly what the fit's mesh cannot show, and its bias by the mesh is larger than
-    what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
-
-    Attributes:
-        found: statistics at the nominal model.
-        projection: their directions.
-        null: the null model.
-        speeds: (segment,) of the wind [m/s].
-    """
-
-    found: Statistics
-    projection: Projection
-    null: NullModel
-    speeds: Floats
-
-    def evidence(self, errors: torch.Tensor) -> Evidence:
-        """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
-        return Evidence.of(replace(self.found, r=self.projection.of(errors)), self.speeds, self.null)
-
-
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
     """Each recording left out in turn, where there are two or more, and the last third of every recording."""
     recording = np.array([s.recording for s in segments.items])
@@ -132,6 +108,10 @@ def predict(
     return Predictions(errors=_array(errors), predicted=_array(predicted))
 
 
+def _array(values: torch.Tensor) -> Floats:
+    return values.double().cpu().numpy()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LeftOut:
     """What a model leaves of segments it was not fitted to: (segment,) mean squared distances [m²], half misfits."""
@@ -143,22 +123,18 @@ class LeftOut:
 def left_out(
     forecaster: Forecaster,
     segments: Segments,
-    model: Model,
+    fitted: Refined,
     yardstick: Yardstick,
     outside: NDArray[np.bool_],
-    chosen: Sequence[int],
 ) -> LeftOut:
-    """Of a model fitted to the other segments, by its few columns' directions; by the yardstick's, which are all of
-    them, its calibration and chosen columns take one more linear step, on those others as well."""
+    """Of a model, fitted to the other segments alone."""
+    model = fitted.without(outside)
     errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
     squared = _array(errors[..., torch.as_tensor(outside, device=errors.device)])
+    evidence = yardstick.evidence(replace(fitted.statistics, r=yardstick.projection.of(errors)))
     return LeftOut(
-        squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=yardstick.evidence(errors).left_out(outside, chosen)
+        squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=evidence.left_out(outside, fitted.chosen)
     )  # fmt: skip
-
-
-def _array(values: torch.Tensor) -> Floats:
-    return values.double().cpu().numpy()
 
 
 def compare(

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from flagdata.errors import FlagdataError
 from measure.loop.columns import PRIOR, THETA, Calibration, Column, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, NullModel
+from measure.loop.inference import Evidence
 from measure.loop.model import Model
-from measure.loop.statistics import Statistics, reduced
+from measure.loop.statistics import Statistics
+from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 
@@ -37,66 +38,63 @@ class Refined:
 
     Attributes:
         model: fitted to all segments.
+        chosen: its columns beside the calibrated parameters.
         errors: standard errors of its calibrated parameters and strengths, as Σ has them.
-        statistics: at the model before the last step, `origin`, of all segments.
+        statistics: at the model before the last step, `origin`, of all segments; responses to its own columns as there.
         origin: that model.
-        null: the null model of its columns.
-        speeds: (segment,) of the wind [m/s].
+        yardstick: the measure.
         stays: whether another round would hardly move it.
     """
 
     model: Model
+    chosen: tuple[int, ...]
     errors: tuple[float, ...]
     statistics: Statistics
     origin: Model
-    null: NullModel
-    speeds: Floats
+    yardstick: Yardstick
     stays: bool
 
     def without(self, outside: NDArray[np.bool_]) -> Model:
         """The same model fitted to the other segments alone, one step from `origin`."""
-        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin)
+        evidence = self.yardstick.evidence(self.statistics).select(~outside)
+        step, _ = _step(evidence, self.chosen, self.origin)
         return self.origin.moved(_cut(step))
 
 
 def refine(
     forecaster: Forecaster,
     segments: Segments,
-    evidence: Evidence,
-    null: NullModel,
-    speeds: Floats,
+    yardstick: Yardstick,
     chosen: Sequence[int],
     *,
     weighed: Sequence[Column],
 ) -> Refined:
     """Fit the calibrated parameters and chosen columns to segments, from the linear fit on.
 
-    Every round uses the errors along the fitted columns alone, with their part of the null model.
-
     Args:
-        speeds: (segment,) of the wind [m/s].
-        weighed: the evidence's columns, but for the calibrated parameters.
+        weighed: the columns of the statistics, but for the calibrated parameters.
 
     Raises:
         DivergedError: the model's cloth does not stay one, at an eighth of the effects' strengths neither.
     """
-    fit = evidence.fit(chosen)
+    fit = yardstick.evidence(yardstick.found).fit(chosen)
     own = [weighed[c - len(THETA)] for c in chosen]
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=Calibration(), effects=effects).moved(_cut(np.array(values, dtype=np.float64)))
-    part = _part(null, [*range(len(THETA)), *chosen])
-    reached = _round(forecaster, segments, model, part, speeds)
+    reached = _round(forecaster, segments, model, yardstick, tuple(chosen))
     for _ in range(_ROUNDS - 1):
         if reached.stays:
             break
-        reached = _round(forecaster, segments, reached.model, part, speeds)
+        reached = _round(forecaster, segments, reached.model, yardstick, tuple(chosen))
     return reached
 
 
-def _round(forecaster: Forecaster, segments: Segments, origin: Model, null: NullModel, speeds: Floats) -> Refined:
+def _round(
+    forecaster: Forecaster, segments: Segments, origin: Model, yardstick: Yardstick, chosen: tuple[int, ...]
+) -> Refined:
     for _ in range(_HALVINGS):
-        found = _linearised(forecaster, segments, origin)
+        found = _linearised(forecaster, segments, origin, yardstick, chosen)
         if np.isfinite(found.r).all() and np.isfinite(found.response).all():
             break
         origin = replace(origin, effects=tuple((column, strength / 2) for column, strength in origin.effects))
@@ -105,10 +103,10 @@ def _round(forecaster: Forecaster, segments: Segments, origin: Model, null: Null
             "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
             fix="look at the recordings' residuals: no model of the library is near them",
         )  # fmt: skip
-    step, errors = _step(found, null, speeds, origin)
+    step, errors = _step(yardstick.evidence(found), chosen, origin)
     return Refined(
-        model=origin.moved(_cut(step)), errors=tuple(float(e) for e in errors), statistics=found, origin=origin,
-        null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < _STAYS),
+        model=origin.moved(_cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
+        origin=origin, yardstick=yardstick, stays=bool(np.abs(step / errors).max() < _STAYS),
     )  # fmt: skip
 
 
@@ -117,28 +115,25 @@ def _cut(step: Floats) -> tuple[float, ...]:
     return tuple(float(v) for v in np.clip(step, -longest, longest))
 
 
-def _part(null: NullModel, places: list[int]) -> NullModel:
-    return NullModel(
-        coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
-        shifts=null.shifts[:, places],
-    )  # fmt: skip
+def _linearised(
+    forecaster: Forecaster, segments: Segments, model: Model, yardstick: Yardstick, chosen: tuple[int, ...]
+) -> Statistics:
+    """Statistics at a model, with the responses to its own columns there."""
 
+    def left(at: Model) -> Floats:
+        return yardstick.projection.of(forecaster.errors(*at.system(forecaster, segments), segments))
 
-def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
-    base = forecaster.errors(*model.system(forecaster, segments), segments)
+    r = left(model)
+    response = yardstick.found.response.copy()
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
-    changes = []
-    for place, size in enumerate(sizes):
+    for place, (column, size) in enumerate(zip([*range(len(THETA)), *chosen], sizes, strict=True)):
         moved = model.moved(tuple(size if k == place else 0.0 for k in range(len(sizes))))
-        changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / size)
-    noise = np.array([s.noise for s in segments.items])
-    return reduced(base, changes, np.array([s.recording for s in segments.items]), noise)
+        response[:, :, column] = (r - left(moved)) / size
+    return replace(yardstick.found, r=r, response=response)
 
 
-def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
+def _step(evidence: Evidence, chosen: Sequence[int], model: Model) -> tuple[Floats, Floats]:
     """Of generalised least squares from here, under the prior about the nominal calibration; with standard errors."""
-    count = found.r.shape[1]
-    chosen = range(len(THETA), count)
-    fit = Evidence.of(found, speeds, null).fit(chosen, centre=Calibration().steps_from(model.calibration))
-    value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
+    fit = evidence.fit(chosen, centre=Calibration().steps_from(model.calibration))
+    value, error = zip(*(fit.of(column) for column in (*range(len(THETA)), *chosen)), strict=True)
     return np.array(value), np.array(error)

@@ -1,0 +1,35 @@
+"""Measures models by the directions of the statistics, with what the fit's numerics leave taken out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.loop.inference import Evidence, NullModel
+from measure.loop.statistics import Projection, Statistics
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Yardstick:
+    """A squared distance of markers is mostly what the fit's mesh cannot show, and its bias by the mesh is larger than
+    what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
+
+    Attributes:
+        found: statistics at the nominal model.
+        projection: their directions.
+        null: the null model.
+        speeds: (segment,) of the wind [m/s].
+    """
+
+    found: Statistics
+    projection: Projection
+    null: NullModel
+    speeds: Floats
+
+    def evidence(self, statistics: Statistics) -> Evidence:
+        """Of all segments."""
+        return Evidence.of(statistics, self.speeds, self.null)
