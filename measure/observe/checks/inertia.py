@@ -23,9 +23,9 @@ _PERIOD = 0.03  # s: frames closer than this are left out, since differences of 
 _LINE = 0.02  # of the cloth's size: pins that are further from a line have reactions with a moment about it
 _FACTORS = np.geomspace(1 / 12, 12, 241)  # of the wind, in steps of 2 %
 _EXPLAINED = 0.4  # of the moment's variance: a balance that explains less says nothing of the wind
-# The wind that the motion shows over the one given. In 72 recordings with and without strong effects (3 to 8 m/s, 25 and
-# 60 Hz, 0 to 4 mm of noise) it is 0.81 to 1.09, and once 1.36: no false alarm, at most 4 % at 95 %. With the rate twice
-# or half the true one, or km/h for m/s and the reverse, 25 of them give 1.68 and more or 0.54 and less: all are told.
+# The wind that the motion shows over the one given. In 72 recordings with and without strong effects (3 to 8 m/s, 25
+# and 60 Hz, 0 to 4 mm of noise) it is 0.81 to 1.09, once 1.36, once nothing: no false alarm, at most 4.1 % (95 %). With
+# the rate twice or half the true one, km/h for m/s or the reverse, 25 of them give 1.68 or more, 0.54 or less: told.
 _SHOWN = (0.65, 1.5)
 _SWING = (0.4, 2.0)  # energy of motion over that from height; released reference runs give 0.77 to 0.87
 _CALM = 0.5  # m/s
