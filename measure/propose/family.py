@@ -26,8 +26,8 @@ Floats = NDArray[np.float64]
 _GROUPS = 400
 _NOTHING = 1e-6
 """Mean share below which a term is never seen."""
-_ALIKE = 1e-3
-"""Difference of the markers' noise that does not matter [m]."""
+_ALIKE = 5e-4
+"""Difference of the markers' noise that does not matter [m]: with more, quieter nulls fall outside the level."""
 _LEAST = 24
 """Groups of nulls as noisy as the data, below which all are taken."""
 

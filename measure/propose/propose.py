@@ -164,7 +164,8 @@ def weigh(
     names = tuple(column.name for column in tried.columns)
     beside = list(range(len(THETA), len(THETA) + len(known)))
     others = list(range(len(THETA) + len(known), len(THETA) + len(names)))
-    pool = others[len(controls) :]
+    physical = [column for column in others if _admissible(tried.columns[column - len(THETA)], own, column, beside)]
+    pool = [column for column in others[len(controls) :] if column in physical]
     labels = (*(name for name, _, _ in THETA), *names)
     steps = search(own, family, labels, pool, beside=beside, level=options.level)
     stage("terms", 1, 1)
@@ -182,7 +183,7 @@ def weigh(
         stage("test on untouched data", 0, 1)
         before, after = fitted(beside), fitted([*beside, *(step.column for step in taken)])
         kinds = {_kind(tried.columns[step.column - len(THETA)]) for step in taken}
-        unlike = [column for column in others if _kind(tried.columns[column - len(THETA)]) not in kinds]
+        unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
         instead = wrong(own, unlike, [step.column for step in taken], beside)
         tested = retest(
             setting, untouched, before.model, after.model, words=parts.words, seed=options.seed,
@@ -193,10 +194,16 @@ def weigh(
         decision, reason = tested.decided
         stage("test on untouched data", 1, 1)
     return Outcome(
-        decision=decision, reason=reason, steps=steps, tried=len(pool), ranking=_ranking(own, family, labels, pool),
-        strengths=strengths, retest=tested, level=options.level, nulls=bank.words, proposed_from=data_hash(seen),
-        tested_on=data_hash(untouched), known=tuple(column.name for column in known), seed=options.seed,
+        decision=decision, reason=reason, steps=steps, tried=len(others) - len(controls),
+        ranking=_ranking(own, family, labels, pool), strengths=strengths, retest=tested, level=options.level,
+        nulls=bank.words, proposed_from=data_hash(seen), tested_on=data_hash(untouched), known=tuple(column.name for column in known), seed=options.seed,
     )  # fmt: skip
+
+
+def _admissible(column: EffectColumn, own: Evidence, place: int, beside: Sequence[int]) -> bool:
+    """Whether the strength that fits makes sense."""
+    least, most = column.described.admissible
+    return least <= column.described.null + own.fit([*beside, place]).of(place)[0] <= most
 
 
 def _kind(column: EffectColumn) -> str:

@@ -19,7 +19,7 @@ from sim.cloth import Cloth
 from sim.effects import Effect
 from sim.effects.effect import ClothEffect
 from sim.effects.field import FieldEffect, Flat, Seen, heavier
-from sim.effects.parameter import EVERYTHING, Parameter, Role, Value, strength
+from sim.effects.parameter import EVERYTHING, NOT_NEGATIVE, Parameter, Role, Value, strength
 
 MASS = "mass"
 """The field of terms that are no forces: the cloth is heavier."""
@@ -272,7 +272,7 @@ class TermColumn(EffectColumn):
 
     @cached_property
     def described(self) -> Parameter:
-        admissible = (_LIGHTEST, float("inf")) if self.term.field == MASS else EVERYTHING
+        admissible = NOT_NEGATIVE if self.term.field == MASS else EVERYTHING  # nothing takes mass away
         return Parameter(
             role=Role.STRENGTH, unit=FIELDS[self.term.field].unit, prior=(-self.step, self.step), source=_SOURCE,
             admissible=admissible, null=0.0,
