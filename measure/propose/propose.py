@@ -196,7 +196,8 @@ def weigh(
     return Outcome(
         decision=decision, reason=reason, steps=steps, tried=len(others) - len(controls),
         ranking=_ranking(own, family, labels, pool), strengths=strengths, retest=tested, level=options.level,
-        nulls=bank.words, proposed_from=data_hash(seen), tested_on=data_hash(untouched), known=tuple(column.name for column in known), seed=options.seed,
+        nulls=bank.words, proposed_from=data_hash(seen), tested_on=data_hash(untouched),
+        known=tuple(column.name for column in known), seed=options.seed,
     )  # fmt: skip
 
 
