@@ -18,6 +18,7 @@ from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn, FieldColumn
 from measure.loop.inference import Evidence, Fit, fluctuation, fluctuation_gains, gains
+from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
 from measure.loop.verdict import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
@@ -302,7 +303,9 @@ def _total_error(values: Floats) -> float:
 
 def _reason(best: Weighed, other: Weighed) -> str:
     if not other.admissible:
-        return f"its strength would be {other.candidate.strength.value:.2g} {other.candidate.strength.unit}: unphysical"
+        strength = other.candidate.strength
+        unit = "" if strength.unit == "1" else f" {strength.unit}"
+        return f"its strength would be {number(strength.value)}{unit}: not physical"
     if other.gains.sum() <= 0:
         return "it predicts unseen recordings no better than the base model"
     return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"

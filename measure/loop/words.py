@@ -10,10 +10,10 @@ import numpy as np
 from measure.loop.bank import columns
 from measure.loop.columns import THETA, FieldColumn
 from measure.loop.inference import Fit
+from measure.loop.quantity import number, probability, with_error, with_level
+from measure.loop.titles import readable, titles
 from measure.loop.verdict import Conclusion, Verdict
 from measure.observe.trajectory import Experiment
-from measure.report.quantity import number, probability, with_error, with_level
-from measure.report.sentences import readable, titles
 
 _SEPARATES: dict[frozenset[str], str] = {
     frozenset({"tangential-linear-drag", "tangential-quadratic-drag"}): "a second wind speed, twice as fast: one drag "

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from measure.loop.quantity import display, number
 from measure.loop.verdict import NullTest, Residual
 from measure.report.chart import Chart, Linear, Logarithmic
-from measure.report.quantity import display, number
 from measure.report.sentences import critical_value
 
 _LEFT, _RIGHT, _TOP = 62.0, 628.0, 34.0

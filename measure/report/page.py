@@ -12,9 +12,11 @@ from typing import Any
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 
+from measure.loop import quantity
+from measure.loop.titles import readable
 from measure.loop.verdict import Conclusion, Estimate, Residual, Verdict
 from measure.pages.render import render
-from measure.report import cloth, figures, motion, quantity, rows, sentences
+from measure.report import cloth, figures, motion, rows, sentences
 
 _TONES = {
     Conclusion.SUFFICIENT: "settled",
@@ -184,5 +186,5 @@ _FILTERS = {
     "share": _share,
     "with_error": _with_error,
     "known": quantity.known,
-    "readable": sentences.readable,
+    "readable": readable,
 }

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 
 from scipy.stats import binomtest
 
+from measure.loop.quantity import known, level_text, number, probability
+from measure.loop.titles import title, titles
 from measure.loop.verdict import Candidate, Conclusion, Estimate, NullTest, Verdict
-from measure.report.quantity import known, level_text, number, probability
 
 _LEVEL = 0.9
 
@@ -29,26 +30,6 @@ def heading(verdict: Verdict) -> str:
 def listed(names: Sequence[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "an unnamed effect"
-
-
-def titles(verdict: Verdict) -> tuple[str, ...]:
-    """What the verdict names, in its order; an effect of which several parameters were weighed with its parameter."""
-    found: list[str] = []
-    for name in verdict.named:
-        own = [c for c in verdict.ranking if c.effect == name]
-        acting = [c for c in own if not c.why_not]
-        found += [title(c.effect, c.parameter) for c in acting] if acting and len(own) > 1 else [name]
-    return tuple(found)
-
-
-def title(effect: str, parameter: str) -> str:
-    """An effect by one of its parameters."""
-    return f"{effect} ({readable(parameter)})"
-
-
-def readable(name: str) -> str:
-    """A parameter's name as it is written in a sentence."""
-    return name.replace("_", " ")
 
 
 def after_label(verdict: Verdict) -> str:

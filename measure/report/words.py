@@ -5,9 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from measure.loop.verdict import Candidate, Comparison, Verdict
-from measure.report import sentences
-from measure.report.quantity import (
+from measure.loop.quantity import (
     display,
     estimate_text,
     in_errors,
@@ -18,6 +16,9 @@ from measure.report.quantity import (
     with_error,
     with_level,
 )
+from measure.loop.titles import readable
+from measure.loop.verdict import Candidate, Comparison, Verdict
+from measure.report import sentences
 
 _WIDTH = 100
 _RUNNERS_UP = 3
@@ -67,7 +68,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
 def _weighed(candidate: Candidate) -> str:
     gain = with_error(candidate.gain, candidate.gain_error)
     parts = [
-        f"{sentences.readable(candidate.parameter)} {with_level(candidate.strength)}",
+        f"{readable(candidate.parameter)} {with_level(candidate.strength)}",
         f"z = {in_errors(candidate.z)}, p = {probability(candidate.p_family)} in the family",
         f"held-out gain {gain} nat",
         f"p = {probability(candidate.leftover)} for what it leaves",

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from measure.loop.titles import titles
 from measure.loop.verdict import Conclusion, NullTest
 from measure.report import sentences
 from measure.report.words import words
@@ -70,7 +71,7 @@ def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
     assert sentences.heading(whole) == "The base model lacked tilted-pole (lean angle)"
     assert "  not tilted-pole (sway): far behind" in words(whole).splitlines()
     both = replace(whole, conclusion=Conclusion.ONE_OF, ranking=(lean, replace(sway, why_not=""), *whole.ranking[2:]))
-    assert sentences.titles(both) == ("tilted-pole (lean angle)", "tilted-pole (sway)")
+    assert titles(both) == ("tilted-pole (lean angle)", "tilted-pole (sway)")
 
 
 def test_a_base_model_that_is_not_rejected_is_not_called_true() -> None:

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from measure.loop.verdict import Estimate
-from measure.report.quantity import (
+from measure.loop.quantity import (
     display,
     estimate_text,
     in_errors,
@@ -17,6 +16,7 @@ from measure.report.quantity import (
     with_error,
     with_level,
 )
+from measure.loop.verdict import Estimate
 
 
 def estimate(value: float, low: float, high: float, unit: str = "1", level: float = 0.9) -> Estimate:
