@@ -1,0 +1,67 @@
+"""When a named effect has failed on unseen data, when its control is as good, and when it stands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from measure.loop.comparison import Trial, paired
+from measure.loop.verdict import Comparison, Estimate
+
+RNG = np.random.default_rng(1)
+NOISE = RNG.standard_normal(12)
+NOISE = (NOISE - NOISE.mean()) / NOISE.std(ddof=1)
+
+
+def around(mean: float) -> np.ndarray:
+    """Twelve segments of this mean and standard deviation 1: a standard error of the sum of √12."""
+    return mean + NOISE
+
+
+def trial(helped: float, apart: float | None) -> Trial:
+    one = Estimate(value=1.0, low=0.9, high=1.1, unit="m", level=0.9)
+    comparison = Comparison(
+        what="unseen", frames=1, before=one, after=one, reduction=one, floor=one, oracle=None, share=None, control=None,
+        control_name="",
+    )  # fmt: skip
+    return Trial(
+        comparisons=(comparison,), helped=around(helped), apart=None if apart is None else around(apart)
+    )  # fmt: skip
+
+
+# Two standard errors of the sum of twelve are 2 √12 = 12 · 0.577.
+@pytest.mark.parametrize(
+    ("helped", "apart", "failed", "tied"),
+    [
+        (1.0, 0.6, False, False),
+        (1.0, 0.55, False, True),
+        (1.0, -0.55, False, True),
+        (1.0, -0.6, True, True),
+        (-0.1, 0.6, True, False),
+        (1.0, None, False, False),
+    ],
+)
+def test_two_standard_errors_decide(helped: float, apart: float | None, failed: bool, tied: bool) -> None:
+    found = trial(helped, apart)
+    assert (found.failed, found.tied) == (failed, tied)
+
+
+def test_errors_that_are_not_finite_have_failed() -> None:
+    helped = around(1.0)
+    helped[3] = np.nan
+    assert Trial(comparisons=trial(1.0, 1.0).comparisons, helped=helped).failed
+
+
+def test_no_trial_neither_fails_nor_ties() -> None:
+    assert not Trial().failed
+    assert not Trial().tied
+
+
+def test_a_paired_reduction_is_the_difference_of_roots_with_students_interval() -> None:
+    before, after = np.full(12, 4e-4), np.full(12, 1e-4) + 1e-5 * NOISE
+    found = paired(before, after)
+    assert found.value == pytest.approx(0.02 - 0.01, rel=1e-12)
+    # d√x = dx/(2√x), here by the secant between the two roots: 1/(0.02 + 0.01).
+    reach = student.ppf(0.95, 11) * 1e-5 / 12**0.5 / 0.03
+    assert found.high - found.value == pytest.approx(reach, rel=1e-9)

@@ -1,0 +1,55 @@
+"""Directions that are kept say of other errors what the statistics say of the base model's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from measure.loop.columns import Calibration, EffectColumn
+from measure.loop.forecast import Forecaster, Segments
+from measure.loop.statistics import projected, statistics
+from measure.observe.trajectory import Trajectory
+
+COLUMNS = (
+    EffectColumn(effect="lift", parameter="coefficient", step=0.3),
+    EffectColumn(effect="added-mass", parameter="mass", step=0.05),
+)
+
+
+@pytest.fixture(scope="module")
+def segments(own_recording: Trajectory) -> Segments:
+    return Segments.of([own_recording])
+
+
+def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, segments: Segments) -> None:
+    nominal = [Calibration(density=1.1)] * len(segments)
+    found, projection = projected(forecaster, segments, nominal, COLUMNS)
+    errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    np.testing.assert_allclose(projection.of(errors), found.r, rtol=1e-9, atol=1e-12)
+    alone = statistics(forecaster, segments, nominal, COLUMNS)
+    np.testing.assert_array_equal(alone.r, found.r)
+    np.testing.assert_array_equal(alone.response, found.response)
+
+
+def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecaster, segments: Segments) -> None:
+    nominal = [Calibration()] * len(segments)
+    found, projection = projected(forecaster, segments, nominal, COLUMNS)
+    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    column = 4
+    moved = forecaster.sensitivity(COLUMNS[1], segments, nominal, base)
+    # So small a coefficient that no error is clipped.
+    small = 1e-3 * projection.scale.min() / moved.abs().max()
+    expected = float(small) * found.response[:, :, column]
+    np.testing.assert_allclose(projection.of(small * moved), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_what_is_not_along_any_direction_does_not_count(forecaster: Forecaster, segments: Segments) -> None:
+    found, projection = projected(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
+    shape = (-1, *projection.scale.shape[:1], 3)
+    directions = projection.directions[0]
+    noise = torch.randn(directions.shape[1], dtype=directions.dtype, generator=torch.Generator().manual_seed(1))
+    span, _ = torch.linalg.qr(directions.T)
+    orthogonal = (noise - span @ (span.T @ noise)).reshape(shape) * projection.scale[None, :, 0, None]
+    errors = torch.stack([0.1 * orthogonal] * len(segments), dim=-1)
+    assert np.abs(projection.of(errors)[0]).max() < 1e-9 * np.abs(found.r).max() + 1e-9
