@@ -55,7 +55,8 @@ class Course:
         bin: duration of a stretch [s].
         times: of the middles of the stretches, of each recording from its first frame [s].
         amplitudes: of each recording, in the unit of the strength.
-        by_recording: mean amplitude of each, with its interval.
+        by_recording: mean amplitude of each, with the interval of its scatter in time; what the fit's numerics leave in
+            a recording is in the value, not in the interval.
         speeds: of the wind, of each recording [m/s].
         fluctuation: standard deviation of the amplitudes about their recording's mean, their errors included.
         lines: of each recording, from amplitudes of single frames.

@@ -40,7 +40,7 @@ def test_a_planted_push_is_kept(found: Outcome) -> None:
     assert found.retest.control is not None
     assert found.retest.apart is not None
     assert found.retest.apart.value > 0
-    assert found.retest.floor.value < found.retest.before.value
+    assert found.retest.floor.value > 0
     assert any(strength.name.startswith("leftward") for strength in found.strengths)
     assert "kept" in words(found)
 
@@ -66,9 +66,10 @@ def test_a_steady_force_is_seen_to_be_steady(found: Outcome) -> None:
     strength = next(s for s in found.strengths if s.name.startswith("leftward"))
     course = strength.course
     assert len(course.by_recording) == 4
-    for mean in course.by_recording:
-        assert mean.low < strength.estimate.high
-        assert mean.high > strength.estimate.low
+    means = [mean.value for mean in course.by_recording]
+    # A force that grew with the wind's square would differ by (6/3.5)² = 2.9 between the recordings; a steady one, by
+    # what the numerics leave in each: less than the square root of that.
+    assert max(means) / min(means) < 6 / 3.5
 
 
 def test_a_recording_in_calm_air_is_refused(pushed: Experiment) -> None:
