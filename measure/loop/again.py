@@ -100,6 +100,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int]) -> di
 
 def _leftover(fits: Fits, reference: Reference, fitted: Refined, column: int) -> float:
     errors, _ = fits.forecaster.run(*fitted.model.system(fits.forecaster, fits.segments), fits.segments)
-    evidence = fits.yardstick.evidence(replace(fitted.statistics, r=fits.yardstick.projection.of(errors)))
+    found = replace(fits.yardstick.found, r=fits.yardstick.projection.of(errors))
+    evidence = fits.yardstick.evidence(found)
     statistics = reference.statistics(evidence, names(), [column])
     return reference.p_global(statistics, evidence.fit([column]).left)

@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model
-from measure.loop.refine import Refined
+from measure.loop.refine import Refined, finished
 from measure.loop.verdict import Comparison, Estimate
 from measure.loop.yardstick import Yardstick
 
@@ -128,10 +128,10 @@ def left_out(
     outside: NDArray[np.bool_],
 ) -> LeftOut:
     """Of a model, fitted to the other segments alone."""
-    model = fitted.without(outside)
+    model = finished(forecaster, segments, yardstick, fitted.without(outside), fitted.chosen, ~outside)
     errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
     squared = _array(errors[..., torch.as_tensor(outside, device=errors.device)])
-    evidence = yardstick.evidence(replace(fitted.statistics, r=yardstick.projection.of(errors)))
+    evidence = yardstick.evidence(replace(yardstick.found, r=yardstick.projection.of(errors)))
     return LeftOut(
         squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=evidence.left_out(outside, fitted.chosen)
     )  # fmt: skip

@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 from flagdata.errors import FlagdataError
 from measure.loop.columns import PRIOR, THETA, Calibration, Column, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence
+from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
-from measure.loop.statistics import Statistics
+from measure.loop.statistics import Statistics, reduced
 from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 
 _ROUNDS = 3
+_FEW = 8
+"""Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the columns' place."""
 _HALVINGS = 4
 _STAYS = 0.3
 """Standard errors below which a step is not worth another round."""
@@ -40,9 +42,10 @@ class Refined:
         model: fitted to all segments.
         chosen: its columns beside the calibrated parameters.
         errors: standard errors of its calibrated parameters and strengths, as Σ has them.
-        statistics: at the model before the last step, `origin`, of all segments; responses to its own columns as there.
+        statistics: at the model before the last step, `origin`, of all segments.
         origin: that model.
-        yardstick: the measure.
+        null: the null model of its columns.
+        speeds: (segment,) of the wind [m/s].
         stays: whether another round would hardly move it.
     """
 
@@ -51,13 +54,13 @@ class Refined:
     errors: tuple[float, ...]
     statistics: Statistics
     origin: Model
-    yardstick: Yardstick
+    null: NullModel
+    speeds: Floats
     stays: bool
 
     def without(self, outside: NDArray[np.bool_]) -> Model:
         """The same model fitted to the other segments alone, one step from `origin`."""
-        evidence = self.yardstick.evidence(self.statistics).select(~outside)
-        step, _ = _step(evidence, self.chosen, self.origin)
+        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin)
         return self.origin.moved(_cut(step))
 
 
@@ -71,6 +74,8 @@ def refine(
 ) -> Refined:
     """Fit the calibrated parameters and chosen columns to segments, from the linear fit on.
 
+    Every round uses the errors along the fitted columns alone, with their part of the null model.
+
     Args:
         weighed: the columns of the statistics, but for the calibrated parameters.
 
@@ -82,19 +87,46 @@ def refine(
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=Calibration(), effects=effects).moved(_cut(np.array(values, dtype=np.float64)))
-    reached = _round(forecaster, segments, model, yardstick, tuple(chosen))
+    part = _part(yardstick.null, [*range(len(THETA)), *chosen])
+    reached = _round(forecaster, segments, model, part, yardstick.speeds, tuple(chosen))
     for _ in range(_ROUNDS - 1):
         if reached.stays:
             break
-        reached = _round(forecaster, segments, reached.model, yardstick, tuple(chosen))
-    return reached
+        reached = _round(forecaster, segments, reached.model, part, yardstick.speeds, tuple(chosen))
+    every = np.ones(len(segments), dtype=bool)
+    return replace(reached, model=finished(forecaster, segments, yardstick, reached.model, chosen, every))
+
+
+def finished(
+    forecaster: Forecaster,
+    segments: Segments,
+    yardstick: Yardstick,
+    model: Model,
+    chosen: Sequence[int],
+    inside: NDArray[np.bool_],
+) -> Model:
+    """A model after one linear step by the yardstick's directions, which are all, fitted to some segments.
+
+    By its own few directions a fit follows effects far from where they are linear, but cannot tell some of them from
+    what numerics leave; by all, it can.
+    """
+    errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
+    evidence = yardstick.evidence(replace(yardstick.found, r=yardstick.projection.of(errors))).select(inside)
+    fit = evidence.fit(chosen, centre=Calibration().steps_from(model.calibration))
+    step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
+    return model.moved(_cut(step)) if np.isfinite(step).all() else model
 
 
 def _round(
-    forecaster: Forecaster, segments: Segments, origin: Model, yardstick: Yardstick, chosen: tuple[int, ...]
+    forecaster: Forecaster,
+    segments: Segments,
+    origin: Model,
+    null: NullModel,
+    speeds: Floats,
+    chosen: tuple[int, ...],
 ) -> Refined:
     for _ in range(_HALVINGS):
-        found = _linearised(forecaster, segments, origin, yardstick, chosen)
+        found = _linearised(forecaster, segments, origin)
         if np.isfinite(found.r).all() and np.isfinite(found.response).all():
             break
         origin = replace(origin, effects=tuple((column, strength / 2) for column, strength in origin.effects))
@@ -103,10 +135,10 @@ def _round(
             "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
             fix="look at the recordings' residuals: no model of the library is near them",
         )  # fmt: skip
-    step, errors = _step(yardstick.evidence(found), chosen, origin)
+    step, errors = _step(found, null, speeds, origin)
     return Refined(
         model=origin.moved(_cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
-        origin=origin, yardstick=yardstick, stays=bool(np.abs(step / errors).max() < _STAYS),
+        origin=origin, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < _STAYS),
     )  # fmt: skip
 
 
@@ -115,25 +147,28 @@ def _cut(step: Floats) -> tuple[float, ...]:
     return tuple(float(v) for v in np.clip(step, -longest, longest))
 
 
-def _linearised(
-    forecaster: Forecaster, segments: Segments, model: Model, yardstick: Yardstick, chosen: tuple[int, ...]
-) -> Statistics:
-    """Statistics at a model, with the responses to its own columns there."""
+def _part(null: NullModel, places: list[int]) -> NullModel:
+    return NullModel(
+        coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
+        shifts=null.shifts[:_FEW, places],
+    )  # fmt: skip
 
-    def left(at: Model) -> Floats:
-        return yardstick.projection.of(forecaster.errors(*at.system(forecaster, segments), segments))
 
-    r = left(model)
-    response = yardstick.found.response.copy()
+def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
+    base = forecaster.errors(*model.system(forecaster, segments), segments)
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
-    for place, (column, size) in enumerate(zip([*range(len(THETA)), *chosen], sizes, strict=True)):
+    changes = []
+    for place, size in enumerate(sizes):
         moved = model.moved(tuple(size if k == place else 0.0 for k in range(len(sizes))))
-        response[:, :, column] = (r - left(moved)) / size
-    return replace(yardstick.found, r=r, response=response)
+        changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / size)
+    noise = np.array([s.noise for s in segments.items])
+    return reduced(base, changes, np.array([s.recording for s in segments.items]), noise)
 
 
-def _step(evidence: Evidence, chosen: Sequence[int], model: Model) -> tuple[Floats, Floats]:
+def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
     """Of generalised least squares from here, under the prior about the nominal calibration; with standard errors."""
-    fit = evidence.fit(chosen, centre=Calibration().steps_from(model.calibration))
-    value, error = zip(*(fit.of(column) for column in (*range(len(THETA)), *chosen)), strict=True)
+    count = found.r.shape[1]
+    chosen = range(len(THETA), count)
+    fit = Evidence.of(found, speeds, null).fit(chosen, centre=Calibration().steps_from(model.calibration))
+    value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
     return np.array(value), np.array(error)

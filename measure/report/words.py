@@ -89,7 +89,7 @@ def _compared(comparison: Comparison, after_label: str) -> str:
     if known(comparison.control):
         parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
         if known(comparison.apart):
-            parts[-1] += f", worse by {estimate_text(comparison.apart, shown=shown)}"
+            parts[-1] += f", worse by {estimate_text(comparison.apart)} nat a segment"
     parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
     return _joined(parts)
 
