@@ -7,7 +7,7 @@ unseen recordings worse than nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +100,6 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int]) -> di
 
 def _leftover(fits: Fits, reference: Reference, fitted: Refined, column: int) -> float:
     errors, _ = fits.forecaster.run(*fitted.model.system(fits.forecaster, fits.segments), fits.segments)
-    found = replace(fits.yardstick.found, r=fits.yardstick.projection.of(errors))
-    evidence = fits.yardstick.evidence(found)
+    evidence = fits.yardstick.of(errors)
     statistics = reference.statistics(evidence, names(), [column])
     return reference.p_global(statistics, evidence.fit([column]).left)

@@ -17,6 +17,7 @@ from scipy.stats import norm
 from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn, FieldColumn
+from measure.loop.comparison import total_error
 from measure.loop.inference import Evidence, Fit, fluctuation, fluctuation_gains, gains
 from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
@@ -178,7 +179,7 @@ def _second(
     strengths = [_beside(evidence, fit, w) for w in (best, chosen)]
     plausible = all(_plausible(_described(w), *strength) for w, strength in zip((best, chosen), strengths, strict=True))
     value, error = strengths[1]
-    lasting = gained.sum() > _FAR * _total_error(gained) and abs(value) > _FAR * error
+    lasting = gained.sum() > _FAR * total_error(gained) and abs(value) > _FAR * error
     return chosen if lasting and plausible and _leftover(evidence, reference, fit.active) > level else None
 
 
@@ -238,7 +239,7 @@ def _weigh(
             strength=estimate(null + value, error, effect.unit),
             z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic), gain=float(gained.sum()),
-            gain_error=_total_error(gained), behind=0.0, leftover=leftover,
+            gain_error=total_error(gained), behind=0.0, leftover=leftover,
             by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
@@ -259,7 +260,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
             effect="gusts", parameter="intensity", null=described.null,
             strength=estimate(found.deviation / 2, found.error / 2, described.unit), z=math.sqrt(statistic),
             p_value=reference.p_alone(statistic, len(names())), p_family=reference.p_family(statistic),
-            gain=float(gained.sum()), gain_error=_total_error(gained), behind=0.0,
+            gain=float(gained.sum()), gain_error=total_error(gained), behind=0.0,
             leftover=reference.p_left(evidence.fit(()).left - 2 * found.likelihood), by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
@@ -292,13 +293,8 @@ def _behind(best: Weighed, other: Weighed) -> float:
     if other is best or other.column == best.column:
         return 0.0
     difference = best.gains - other.gains
-    error = _total_error(difference)
+    error = total_error(difference)
     return float(difference.sum() / error) if error > 0 else 0.0
-
-
-def _total_error(values: Floats) -> float:
-    """Standard error of a sum over segments."""
-    return float(np.std(values, ddof=1) * math.sqrt(len(values))) if len(values) > 1 else math.inf
 
 
 def _reason(best: Weighed, other: Weighed) -> str:

@@ -12,16 +12,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import UsageError
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
+from measure.loop import supply
 from measure.loop.again import Fits, run_again
 from measure.loop.alignment import aligned
 from measure.loop.attribution import (
@@ -48,7 +48,7 @@ from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 from measure.loop.words import assumptions, proposal, sentence, separating
 from measure.loop.yardstick import Yardstick
-from measure.observe.trajectory import Experiment, Trajectory
+from measure.observe.trajectory import Experiment
 from sim.integrate.split import SplitEuler
 
 Floats = NDArray[np.float64]
@@ -216,41 +216,8 @@ class Solved:
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
     if options.bank is not None:
-        bank = banks.load(options.bank, words=f"over priors, from {options.bank.name}")
-        if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
-            raise InputError(
-                f"its segments last {bank.duration:g} s, those of the recordings {setting.segments.duration:.2g} s",
-                where=str(options.bank), fix="record for longer, or leave the bank out",
-            )  # fmt: skip
-        return bank
-    first: Trajectory = setting.experiment.recordings[0]
-    batches = [
-        banks.prior_batch(
-            setting.experiment.specimen, markers=first.markers, rate=first.rate,
-            duration=_null_duration(setting.segments), noise=first.noise,
-            speeds=(0.9 * float(setting.speeds.min()), 1.1 * float(setting.speeds.max())),
-            seed=child_seed(options.seed, "null", index),
-        )
-        for index in range(math.ceil(options.nulls / banks.BATCH))
-    ]  # fmt: skip
-    done = 0
-
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        tell("nulls", done, len(batches))
-
-    with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
-        banks.build(Path(folder), batches, workers=options.workers, progress=count)
-        total = banks.BATCH * len(batches)
-        words = f"{total} recordings of {len(batches)} meshes and methods, over the priors of the cloth"
-        return banks.load(Path(folder), words=words)
-
-
-def _null_duration(segments: Segments) -> float:
-    """Of a null recording, so that those of one cloth hold as many segments as the data [s]."""
-    each = max(2, math.ceil(len(segments) / banks.WINDS))
-    return (each * round(segments.duration / segments.period) + segments.first + 1) * segments.period
+        return supply.given(options.bank, setting)
+    return supply.simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell)
 
 
 def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:

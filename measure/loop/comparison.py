@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -59,10 +59,10 @@ class Trial:
 
 
 def _above(values: Floats) -> bool:
-    return bool(values.sum() > _FAR * _total_error(values))
+    return bool(values.sum() > _FAR * total_error(values))
 
 
-def _total_error(values: Floats) -> float:
+def total_error(values: Floats) -> float:
     """Standard error of a sum over segments."""
     return float(np.std(values, ddof=1)) * math.sqrt(len(values)) if len(values) > 1 else math.inf
 
@@ -77,7 +77,7 @@ class Predictions:
     @property
     def squared(self) -> Floats:
         """(segment,) mean squared distance [m²]."""
-        return (self.errors**2).sum(axis=2).mean(axis=(0, 1))
+        return _squared(self.errors)
 
 
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
@@ -130,11 +130,14 @@ def left_out(
     """Of a model, fitted to the other segments alone."""
     model = finished(forecaster, segments, yardstick, fitted.without(outside), fitted.chosen, ~outside)
     errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
-    squared = _array(errors[..., torch.as_tensor(outside, device=errors.device)])
-    evidence = yardstick.evidence(replace(yardstick.found, r=yardstick.projection.of(errors)))
     return LeftOut(
-        squared=(squared**2).sum(axis=2).mean(axis=(0, 1)), misfit=evidence.left_out(outside, fitted.chosen)
+        squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, fitted.chosen)
     )  # fmt: skip
+
+
+def _squared(errors: Floats) -> Floats:
+    """(segment,) mean squared distance [m²]."""
+    return (errors**2).sum(axis=2).mean(axis=(0, 1))
 
 
 def compare(

@@ -111,7 +111,7 @@ def finished(
     what numerics leave; by all, it can.
     """
     errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
-    evidence = yardstick.evidence(replace(yardstick.found, r=yardstick.projection.of(errors))).select(inside)
+    evidence = yardstick.of(errors).select(inside)
     fit = evidence.fit(chosen, centre=Calibration().steps_from(model.calibration))
     step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
     return model.moved(_cut(step)) if np.isfinite(step).all() else model

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.statistics import Projection, Statistics
@@ -29,6 +30,10 @@ class Yardstick:
     projection: Projection
     null: NullModel
     speeds: Floats
+
+    def of(self, errors: Tensor) -> Evidence:
+        """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
+        return self.evidence(replace(self.found, r=self.projection.of(errors)))
 
     def evidence(self, statistics: Statistics) -> Evidence:
         """Of all segments."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
+from measure.loop import supply
 from measure.loop.attribution import estimate
 from measure.loop.close import FEWEST_NULLS, Setting, Stage
 from measure.loop.columns import THETA, Column, EffectColumn
@@ -25,7 +26,6 @@ from measure.loop.inference import Evidence, NullModel, gains
 from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics
 from measure.observe.trajectory import Experiment
-from measure.propose import nulls
 from measure.propose.course import course
 from measure.propose.family import Family
 from measure.propose.fit import Fitted, fit
@@ -104,9 +104,9 @@ def propose(
     tell = stage or (lambda what, done, total: None)
     setting = made_ready(experiment)
     if options.bank is not None:
-        bank = nulls.given(options.bank, setting)
+        bank = supply.given(options.bank, setting)
     else:
-        bank = nulls.simulated(
+        bank = supply.simulated(
             setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
         )  # fmt: skip
     return weigh(
@@ -149,7 +149,7 @@ def weigh(
     Raises:
         InputError: nulls of segments of another length; too few segments.
     """
-    nulls.check(bank, setting)
+    supply.check(bank, setting)
     parts = split(setting.segments, setting.speeds)
     seen = setting.segments.select(np.flatnonzero(parts.seen))
     untouched = setting.segments.select(np.flatnonzero(~parts.seen))

@@ -11,22 +11,9 @@ import torch
 from measure.loop.columns import Calibration
 from measure.loop.forecast import Forecaster, Segments
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
-from sim import handles
 from sim.integrate.split import SplitEuler
-from sim.material import named
-from sim.mesh import grid
 
 RATE = 25.0
-
-
-@pytest.fixture(scope="session")
-def specimen() -> Specimen:
-    """0.75 m × 0.5 m of a knit on 9 × 7 vertices, held at the corners of its hoist."""
-    mesh = grid(width=0.75, height=0.5, columns=8, rows=6)
-    return Specimen(
-        mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
-        anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]),
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -20,12 +20,9 @@ from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics
 from measure.observe.trajectory import Experiment, Specimen
 from measure.propose.terms import Term, columns_of
-from sim import handles
 from sim.cloth import Cloth
 from sim.effects.effect import Effect, ForceEffect
 from sim.effects.parameter import Value, strength
-from sim.material import named
-from sim.mesh import grid
 
 RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)
 KINDS, CLOTHS, RECORDINGS = 6, 2, 8
@@ -51,16 +48,6 @@ class SidePush(ForceEffect):
 def below(rest: np.ndarray) -> Tensor:
     """(vertex,) share of the push."""
     return torch.sigmoid(torch.as_tensor((0.25 - rest[:, 1]) / 0.06))
-
-
-@pytest.fixture(scope="session")
-def specimen() -> Specimen:
-    """0.75 m × 0.5 m of a knit on 9 × 7 vertices, held at the corners of its hoist."""
-    mesh = grid(width=0.75, height=0.5, columns=8, rows=6)
-    return Specimen(
-        mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
-        anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]),
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
-from measure.loop.close import Setting, Stage
 from measure.loop.reference import NullBank
+
+if TYPE_CHECKING:
+    from measure.loop.close import Setting, Stage
 
 
 def given(folder: Path, setting: Setting) -> NullBank:
@@ -21,11 +24,11 @@ def given(folder: Path, setting: Setting) -> NullBank:
         FlagdataError: as `measure.loop.bank.load`.
     """
     bank = banks.load(folder, words=f"over priors, from {folder.name}")
-    check(bank, setting)
+    check(bank, setting, where=str(folder))
     return bank
 
 
-def check(bank: NullBank, setting: Setting) -> None:
+def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
     """Refuse nulls that do not fit the recordings.
 
     Raises:
@@ -34,12 +37,13 @@ def check(bank: NullBank, setting: Setting) -> None:
     if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
         raise InputError(
             f"its segments last {bank.duration:.2g} s, those of the recordings {setting.segments.duration:.2g} s",
-            where="null bank", fix="simulate nulls for these recordings: leave the bank out",
+            where=where, fix="simulate nulls for these recordings: leave the bank out; or record for longer",
         )  # fmt: skip
 
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
-    """Null recordings over the priors of the cloth, of the winds of an experiment."""
+    """Null recordings over the priors of the cloth, of the winds of an experiment; those of one cloth hold as many
+    segments as the data."""
     first, segments = setting.experiment.recordings[0], setting.segments
     each = max(2, math.ceil(len(segments) / banks.WINDS))
     batches = [
@@ -60,5 +64,6 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
 
     with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
         banks.build(Path(folder), batches, workers=workers, progress=count)
-        words = f"{banks.BATCH * len(batches)} recordings of {len(batches)} meshes and methods, over the priors"
+        total = banks.BATCH * len(batches)
+        words = f"{total} recordings of {len(batches)} meshes and methods, over the priors of the cloth"
         return banks.load(Path(folder), words=words)
