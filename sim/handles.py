@@ -57,6 +57,8 @@ class Handles:
 
     def offset(self, time: float) -> NDArray[np.float64]:
         """(3,) displacement of the anchors at a time [m]."""
+        if len(self.times) == 1:
+            return np.array(self.offsets[0])
         keys = np.asarray(self.offsets)
         return np.array([np.interp(time, self.times, keys[:, axis]) for axis in range(3)])
 

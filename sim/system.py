@@ -288,8 +288,8 @@ class System:
 
     def drive(self, start: float, end: float) -> Drive:
         """Wind and handles between two times [s], taken as linear."""
-        first, last = self.targets(start), self.targets(end)
         offset = (self.offset(start), self.offset(end))
+        first, last = (self.anchors + moved[:, None] for moved in offset)
         return Drive(
             wind=(self.wind.velocity(start), self.wind.velocity(end)),
             targets=(first, last),
@@ -348,6 +348,11 @@ class System:
     def base(self) -> System:
         """The part that the compiled kernel knows: the base model with ties and loads, in the undisturbed wind."""
         return replace(self, air=self.air.plain, effects=(), flows=(), frictions=())
+
+    @cached_property
+    def alone(self) -> System:
+        """The base model without ties and loads."""
+        return replace(self.base, loads=(), ties=())
 
     def extra_force(
         self,

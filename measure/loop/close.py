@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,11 +18,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.provenance import code_version
-from flagdata.rng import child_seed
 from measure.loop import bank as banks
 from measure.loop import supply
 from measure.loop.again import Fits, run_again
-from measure.loop.alignment import aligned
 from measure.loop.attribution import (
     EQUIVALENT,
     GUST_COLUMN,
@@ -37,25 +34,19 @@ from measure.loop.attribution import (
 )
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
 from measure.loop.comparison import Predictions, Trial, compare, folds, left_out, predict
-from measure.loop.forecast import Forecaster, Segments
+from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
-from measure.loop.model import Model
-from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank, Reference
 from measure.loop.refine import Refined
 from measure.loop.residuals import residuals
+from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 from measure.loop.words import assumptions, proposal, sentence, separating
 from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment
-from sim.integrate.split import SplitEuler
 
 Floats = NDArray[np.float64]
-Stage = Callable[[str, int, int], object]
-"""Called with what is under way, how much is done, and of how much."""
-
-_FLOOR_DURATION = 4.5  # s: two segments of each recording
 _FLOOR_COPIES = 4
 _KINDS = 12
 FEWEST_NULLS = _KINDS * banks.BATCH
@@ -94,34 +85,6 @@ class Options:
                 where="close-loop",
                 fix=f"give {FEWEST_NULLS} or more, and 1 or more",
             )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Setting:
-    """An experiment made ready: in one frame, cut into segments, with the model that predicts them."""
-
-    experiment: Experiment
-    segments: Segments
-    forecaster: Forecaster
-    nominal: Calibration
-
-    @classmethod
-    def of(cls, experiment: Experiment) -> Setting:
-        """Raises InputError: recordings that cannot be used together, or are too short."""
-        turned = aligned(experiment)
-        segments = Segments.of(turned.recordings)
-        forecaster = Forecaster(specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler())
-        return cls(experiment=turned, segments=segments, forecaster=forecaster, nominal=Calibration())
-
-    @property
-    def speeds(self) -> Floats:
-        """(recording,) mean logged wind [m/s]."""
-        return np.array([r.wind.speed for r in self.experiment.recordings])
-
-    @property
-    def recording(self) -> NDArray[np.int64]:
-        """(segment,) index of each one's recording."""
-        return np.array([s.recording for s in self.segments.items])
 
 
 def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Verdict:
@@ -227,7 +190,9 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
         return Trial()
     tell("before and after", 0, 1)
     control = solved.control
-    floor = _floor(setting, larger.model, options)
+    floor = numerical_floor(
+        setting, np.arange(len(setting.speeds)), larger.model, copies=_FLOOR_COPIES, seed=options.seed
+    )
     made: list[Comparison] = []
     helped: list[Floats] = []
     apart: list[Floats] = []
@@ -251,21 +216,6 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
             helped.append(tried[0].misfit - tried[1].misfit)
             apart += [] if control is None else [tried[2].misfit - tried[1].misfit]
     return Trial(comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None)
-
-
-def _floor(setting: Setting, model: Model, options: Options) -> tuple[NDArray[np.int64], Floats]:
-    """Recording and mean squared error of segments simulated from a model and predicted by it: what numerics leave."""
-    count = len(setting.experiment.recordings)
-    first = setting.experiment.recordings[0]
-    batch = NullBatch(
-        specimen=setting.experiment.specimen, markers=first.markers, rate=first.rate, duration=_FLOOR_DURATION,
-        noise=first.noise, calibrations=(model.calibration,) * (count * _FLOOR_COPIES),
-        speeds=tuple(float(u) for u in np.tile(setting.speeds, _FLOOR_COPIES)),
-        seed=child_seed(options.seed, "floor"), effects=model.acting,
-    )  # fmt: skip
-    segments = Segments.of(batch.simulate())
-    squared = predict(setting.forecaster, segments, model).squared
-    return np.array([s.recording % count for s in segments.items]), squared
 
 
 def _verdict(

@@ -19,7 +19,8 @@ from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
     from measure.loop.artifacts import Closed, Kept
-    from measure.loop.close import Options, Stage
+    from measure.loop.close import Options
+    from measure.loop.setting import Stage
     from measure.loop.verdict import Verdict
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe

@@ -129,10 +129,22 @@ def left_out(
 ) -> LeftOut:
     """Of a model, fitted to the other segments alone."""
     model = finished(forecaster, segments, yardstick, fitted.without(outside), fitted.chosen, ~outside)
+    return measured(forecaster, segments, model, yardstick, outside, fitted.chosen)
+
+
+def measured(
+    forecaster: Forecaster,
+    segments: Segments,
+    model: Model,
+    yardstick: Yardstick,
+    outside: NDArray[np.bool_],
+    chosen: Sequence[int] = (),
+) -> LeftOut:
+    """Of a model as it is; what it leaves along the nuisances and chosen columns is fitted to the other segments."""
     errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
     return LeftOut(
-        squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, fitted.chosen)
-    )  # fmt: skip
+        squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, chosen)
+    )
 
 
 def _squared(errors: Floats) -> Floats:
@@ -164,11 +176,12 @@ def compare(
         what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
         floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(old.mean()) else None,
         control=None if control is None else root(control.squared), control_name=control_name,
-        apart=None if control is None else _mean(control.misfit - after.misfit),
+        apart=None if control is None else a_segment(control.misfit - after.misfit),
     )  # fmt: skip
 
 
-def _mean(values: Floats) -> Estimate:
+def a_segment(values: Floats) -> Estimate:
+    """Mean of misfits over segments, with Student's interval [nat]."""
     value, reach = float(values.mean()), _reach(values)
     return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=_LEVEL)
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import torch
 
-from measure.loop.close import Setting
 from measure.loop.columns import Calibration
 from measure.loop.comparison import folds
+from measure.loop.setting import Setting
 from measure.observe.trajectory import Experiment
 from sim.effects import Effect, apply
 

@@ -89,6 +89,15 @@ class Projection:
     directions: Tensor
     scale: Tensor
 
+    @classmethod
+    def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
+        """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
+        directions: list[Tensor] = []
+        for place in range(scale.shape[1]):
+            moved = torch.stack([(change[..., place] / scale[None, :, place, None]).reshape(-1) for change in changes])
+            directions.append(moved / moved.norm(dim=1, keepdim=True))
+        return cls(directions=torch.stack(directions), scale=scale)
+
     def of(self, errors: Tensor) -> Floats:
         """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
         parts = [
@@ -113,15 +122,15 @@ def projected(
 ) -> tuple[Statistics, Projection]:
     """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
-    directions: list[Tensor] = []
-    scales: list[Tensor] = []
+    pieces: list[Projection] = []
     for found, changes, scale in _pieces(forecaster, segments, calibrations, columns):
         parts.append(found)
-        scales.append(scale)
-        for place in range(scale.shape[1]):
-            moved = torch.stack([(change[..., place] / scale[None, :, place, None]).reshape(-1) for change in changes])
-            directions.append(moved / moved.norm(dim=1, keepdim=True))
-    return Statistics.joined(parts), Projection(directions=torch.stack(directions), scale=torch.cat(scales, dim=1))
+        pieces.append(Projection.along(changes, scale))
+    whole = Projection(
+        directions=torch.cat([piece.directions for piece in pieces]),
+        scale=torch.cat([piece.scale for piece in pieces], dim=1),
+    )
+    return Statistics.joined(parts), whole
 
 
 def _pieces(
@@ -137,7 +146,7 @@ def _pieces(
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.calibration_sensitivities(own, starts, base)
         changes += [forecaster.sensitivity(column, own, starts, base) for column in columns]
-        yield reduced(base, changes, recording[chosen], noise), changes, _scale(base, recording[chosen], noise)
+        yield reduced(base, changes, recording[chosen], noise), changes, error_scale(base, recording[chosen], noise)
 
 
 def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -150,7 +159,7 @@ def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def _scale(base: Tensor, recording: NDArray[np.int64], noise: Floats) -> Tensor:
+def error_scale(base: Tensor, recording: NDArray[np.int64], noise: Floats) -> Tensor:
     """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m]."""
     mean = (base**2).mean((0, 2))
     scale = torch.empty_like(mean)
@@ -175,7 +184,7 @@ def reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64
     r = np.empty((len(recording), len(changes)))
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
-    scale = _scale(base, recording, noise)
+    scale = error_scale(base, recording, noise)
     for place in range(len(recording)):
         error = _weighed(base[..., place], scale[:, place]).double()
         moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
 from measure.loop.reference import NullBank
-
-if TYPE_CHECKING:
-    from measure.loop.close import Setting, Stage
+from measure.loop.setting import Setting, Stage
 
 
 def given(folder: Path, setting: Setting) -> NullBank:

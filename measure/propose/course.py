@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from measure.loop.close import Setting
 from measure.loop.columns import EffectColumn
 from measure.loop.model import Model
+from measure.loop.setting import Setting
 from measure.loop.verdict import Estimate
 from measure.propose.outcome import Course, Line
 from sim.effects import apply

@@ -21,7 +21,8 @@ from measure.loop.columns import THETA, Calibration, Column
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
-from measure.loop.statistics import Statistics, reduced
+from measure.loop.statistics import Projection, Statistics, error_scale, reduced
+from measure.loop.yardstick import Yardstick
 from measure.propose.sensitivities import of_columns
 
 Floats = NDArray[np.float64]
@@ -58,6 +59,30 @@ class Lens:
             directions=(*along, *(found[column.name] for column in weighed)),
         )  # fmt: skip
 
+    def select(self, chosen: NDArray[np.int64]) -> Lens:
+        """Of some segments."""
+        return replace(
+            self, segments=self.segments.select(chosen), base=self.base[..., chosen],
+            directions=tuple(direction[..., chosen] for direction in self.directions),
+        )  # fmt: skip
+
+    def yardstick(self, null: NullModel, of_recordings: Floats) -> Yardstick:
+        """The measure of any model's errors along the lens, of speeds by recording [m/s]."""
+        recording, noise = self._recording, self._noise
+        return Yardstick(
+            found=reduced(self.base, self.directions, recording, noise),
+            projection=Projection.along(self.directions, error_scale(self.base, recording, noise)),
+            null=null, speeds=self.speeds(of_recordings),
+        )  # fmt: skip
+
+    @property
+    def _recording(self) -> NDArray[np.int64]:
+        return np.array([s.recording for s in self.segments.items])
+
+    @property
+    def _noise(self) -> Floats:
+        return np.array([s.noise for s in self.segments.items])
+
     @property
     def calibrated(self) -> Statistics:
         """Of the calibrated parameters, at the nominal model."""
@@ -88,15 +113,13 @@ class Lens:
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
         """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
-        recording = np.array([s.recording for s in self.segments.items])
-        noise = np.array([s.noise for s in self.segments.items])
-        found = reduced(base, [*self.directions, *changes], recording, noise)
+        found = reduced(base, [*self.directions, *changes], self._recording, self._noise)
         count = len(self.directions)
         return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
 
     def speeds(self, of_recordings: Floats) -> Floats:
         """(segment,) of the wind [m/s], of speeds by recording."""
-        return of_recordings[np.array([s.recording for s in self.segments.items])]
+        return of_recordings[self._recording]
 
 
 def evidence(found: Statistics, speeds: Floats, null: NullModel) -> Evidence:

@@ -92,18 +92,22 @@ class Strength:
 
 @dataclass(frozen=True, kw_only=True)
 class Retest:
-    """Models before and after on segments that neither choice nor fit has seen: root mean square error [m].
+    """Models before and after on segments that neither choice nor fit has seen.
+
+    Errors are root mean squares [m]. What decides is the half misfit along the lens, in which the bias of the fit's
+    mesh, most of a squared distance, is taken out as nulls know it [nat a segment].
 
     Attributes:
         what: which data.
         segments: how many.
         before, after: of each model.
         reduction: paired, before − after.
+        helped: the same of half misfits.
         floor: of the larger model on data simulated from it with other numerics: differences below are not effects.
         share: of what the model before leaves above the floor, in squares, that the proposal takes away; None where it
             leaves nothing above.
         control: after, with the same freedom spent on terms of other directions; None where there are none.
-        apart: paired, control − after.
+        apart: paired, control − after, of half misfits.
         control_names: of those terms.
     """
 
@@ -112,6 +116,7 @@ class Retest:
     before: Estimate
     after: Estimate
     reduction: Estimate
+    helped: Estimate
     floor: Estimate
     share: float | None
     control: Estimate | None
@@ -120,15 +125,15 @@ class Retest:
 
     @property
     def decided(self) -> tuple[Decision, str]:
-        """Whether the proposal is kept, and why: errors must fall beyond their interval, and below the control's."""
-        if self.reduction.low <= 0:
-            return Decision.REJECTED, "errors on untouched data are not lower beyond their interval"
-        lower = "errors on untouched data are lower, beyond their interval"
+        """Whether the proposal is kept, and why: misfits must fall beyond their interval, and below the control's."""
+        if self.helped.low <= 0:
+            return Decision.REJECTED, "the misfit on untouched data is not lower beyond its interval"
+        lower = "the misfit on untouched data is lower, beyond its interval"
         if self.apart is None:
             return Decision.KEPT, f"{lower}; there was no term of another direction to compare with"
         wrong = " and ".join(self.control_names)
         if self.apart.value <= 0:
-            return Decision.REJECTED, f"{lower}, but the same freedom spent on {wrong} lowers them as much"
+            return Decision.REJECTED, f"{lower}, but the same freedom spent on {wrong} lowers it as much"
         if self.apart.low <= 0:
             return Decision.KEPT, f"{lower}; its form is open: {wrong} cannot be told from it"
         return Decision.KEPT, f"{lower}, and lower than with the same freedom spent on {wrong}"

@@ -20,10 +20,11 @@ from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
 from measure.loop import supply
 from measure.loop.attribution import estimate
-from measure.loop.close import FEWEST_NULLS, Setting, Stage
+from measure.loop.close import FEWEST_NULLS
 from measure.loop.columns import THETA, Column, EffectColumn
 from measure.loop.inference import Evidence, NullModel, gains
 from measure.loop.reference import NullBank
+from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import Statistics
 from measure.observe.trajectory import Experiment
 from measure.propose.course import course
@@ -151,15 +152,14 @@ def weigh(
     """
     supply.check(bank, setting)
     parts = split(setting.segments, setting.speeds)
-    seen = setting.segments.select(np.flatnonzero(parts.seen))
-    untouched = setting.segments.select(np.flatnonzero(~parts.seen))
     null = bank.model()
     stage("terms", 0, 1)
-    lens = Lens.of(setting.forecaster, seen, weighed)
+    whole = Lens.of(setting.forecaster, setting.segments, weighed)
+    lens = whole.select(np.flatnonzero(parts.seen))
     speeds = lens.speeds(setting.speeds)
     tried = _tried(lens, null, speeds, candidates, [*known, *controls])
     own = evidence(tried.found, speeds, null)
-    noise = max(segment.noise for segment in seen.items)
+    noise = max(segment.noise for segment in lens.segments.items)
     family = Family.of(bank.nulls, tried.found, noise=noise, seed=options.seed)
     names = tuple(column.name for column in tried.columns)
     beside = list(range(len(THETA), len(THETA) + len(known)))
@@ -186,7 +186,8 @@ def weigh(
         unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
         instead = wrong(own, unlike, [step.column for step in taken], beside)
         tested = retest(
-            setting, untouched, before.model, after.model, words=parts.words, seed=options.seed,
+            setting, whole.yardstick(null, setting.speeds), parts.seen, before.model, after.model, words=parts.words,
+            seed=options.seed,
             control=fitted([*beside, *instead]).model if instead else None,
             control_names=[labels[column] for column in instead],
         )  # fmt: skip
@@ -196,7 +197,8 @@ def weigh(
     return Outcome(
         decision=decision, reason=reason, steps=steps, tried=len(others) - len(controls),
         ranking=_ranking(own, family, labels, pool), strengths=strengths, retest=tested, level=options.level,
-        nulls=bank.words, proposed_from=data_hash(seen), tested_on=data_hash(untouched),
+        nulls=bank.words, proposed_from=data_hash(lens.segments),
+        tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.seen))),
         known=tuple(column.name for column in known), seed=options.seed,
     )  # fmt: skip
 

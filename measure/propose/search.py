@@ -7,13 +7,13 @@ best is taken, if it does so beyond chance; the next is sought in what is left.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from measure.loop.columns import PRIOR, THETA
+from measure.loop.comparison import total_error
 from measure.loop.inference import Evidence, gains
 from measure.propose.family import Family
 
@@ -102,10 +102,10 @@ def _best(
     tied = [
         place
         for place in range(len(looked))
-        if (increments[leader] - increments[place]).sum() <= _TIED * _error(increments[leader] - increments[place])
+        if (increments[leader] - increments[place]).sum() <= _TIED * total_error(increments[leader] - increments[place])
     ]
     place = max(tied, key=lambda p: float(statistics[looked[p]]))
-    gain, error = float(increments[place].sum()), _error(increments[place])
+    gain, error = float(increments[place].sum()), total_error(increments[place])
     reason = ""
     if not significant:
         reason = "nulls show as much"
@@ -146,8 +146,3 @@ def _cosines(evidence: Evidence, beside: Sequence[int]) -> np.ndarray:
     left = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
     size = np.sqrt(np.maximum(np.diag(left), 1e-9 * np.diag(total)))
     return left / np.outer(size, size)
-
-
-def _error(values: np.ndarray) -> float:
-    """Standard error of a sum over segments."""
-    return float(np.std(values, ddof=1) * math.sqrt(len(values))) if len(values) > 1 else math.inf

@@ -38,11 +38,11 @@ def _tested(tested: Retest) -> list[str]:
     floor = f"  numerics alone leave {interval(tested.floor)}"
     if tested.share is not None:
         floor += f": of what is above, in squares, {100 * tested.share:.0f} % is gone"
-    lines = [errors, floor]
+    lines = [errors, floor, f"  misfit: {interval(tested.helped)} nat a segment less than before"]
     if tested.control is not None and tested.apart is not None:
         lines.append(
             f"  instead with {' and '.join(tested.control_names)}: {interval(tested.control)}, "
-            f"which is {interval(tested.apart)} more than with the proposal"
+            f"whose misfit is {interval(tested.apart)} nat a segment more than the proposal's"
         )
     return lines
 

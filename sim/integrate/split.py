@@ -40,7 +40,7 @@ class SplitEuler:
         Raises:
             UsageError: ties that pull apart (`slack`), which an impulse cannot follow.
         """
-        plain = replace(system.base, loads=(), ties=())
+        plain = system.alone
         if not (system.extra or system.loads or system.ties):
             return self.base.advance(plain, state, duration)
         steps = max(1, math.ceil(duration / self.base.step - 1e-9))

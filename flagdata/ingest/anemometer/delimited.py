@@ -38,7 +38,8 @@ class Delimited:
             format="delimited",
             score=0.3,
             reasons=("no recipe of the catalog names these columns", *proposal.reasons),
-            fix="save the draft that --sniff prints, complete it, and name it: --recipe FILE.toml",
+            fix="save the draft that `flagdata ingest --sniff` prints, complete it, and name it: "
+            "--recipe FILE.toml of ingest, --sensor FILE.toml of close-loop",
             draft=proposal.toml,
         )
 

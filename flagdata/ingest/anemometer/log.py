@@ -116,7 +116,8 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         raise InputError(
             f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),
             fix=(guesses[0].fix if guesses else None)
-            or "describe it by a recipe (--recipe FILE.toml) or name its format (--as)",
+            or "describe it by a recipe (--recipe FILE.toml of ingest, --sensor FILE.toml of close-loop), or name "
+            "its format (--as of ingest)",
         )  # fmt: skip
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons

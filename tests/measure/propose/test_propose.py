@@ -35,7 +35,7 @@ def found(pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank,
 def test_a_planted_push_is_kept(found: Outcome) -> None:
     assert found.decision is Decision.KEPT, words(found)
     assert found.retest is not None
-    assert found.retest.reduction.low > 0
+    assert found.retest.helped.low > 0
     # Beside terms of another direction, and above what the numerics leave.
     assert found.retest.control is not None
     assert found.retest.apart is not None
@@ -80,11 +80,12 @@ def test_a_recording_in_calm_air_is_refused(pushed: Experiment) -> None:
 
 
 def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decision, str]:
-    """The decision for a reduction with a lower end, and a control with a difference and its lower end [m]."""
+    """The decision for a gain with a lower end, and a control with a difference and its lower end [nat]."""
     some = Estimate(value=0.01, low=0.009, high=0.011, unit="m")
-    control = None if apart is None else Estimate(value=apart[0], low=apart[1], high=0.01, unit="m")
+    control = None if apart is None else Estimate(value=apart[0], low=apart[1], high=0.01, unit="1")
     return Retest(
-        what="", segments=6, before=some, after=some, reduction=replace(some, low=low), floor=some, share=None,
+        what="", segments=6, before=some, after=some, reduction=some, floor=some, share=None,
+        helped=replace(some, low=low),
         control=None if apart is None else some, apart=control, control_names=("drag",),
     ).decided  # fmt: skip
 

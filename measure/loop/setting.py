@@ -1,0 +1,47 @@
+"""An experiment made ready for the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.loop.alignment import aligned
+from measure.loop.columns import Calibration
+from measure.loop.forecast import Forecaster, Segments
+from measure.observe.trajectory import Experiment
+from sim.integrate.split import SplitEuler
+
+Floats = NDArray[np.float64]
+Stage = Callable[[str, int, int], object]
+"""Called with what is under way, how much is done, and of how much."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setting:
+    """An experiment made ready: in one frame, cut into segments, with the model that predicts them."""
+
+    experiment: Experiment
+    segments: Segments
+    forecaster: Forecaster
+    nominal: Calibration
+
+    @classmethod
+    def of(cls, experiment: Experiment) -> Setting:
+        """Raises InputError: recordings that cannot be used together, or are too short."""
+        turned = aligned(experiment)
+        segments = Segments.of(turned.recordings)
+        forecaster = Forecaster(specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler())
+        return cls(experiment=turned, segments=segments, forecaster=forecaster, nominal=Calibration())
+
+    @property
+    def speeds(self) -> Floats:
+        """(recording,) mean logged wind [m/s]."""
+        return np.array([r.wind.speed for r in self.experiment.recordings])
+
+    @property
+    def recording(self) -> NDArray[np.int64]:
+        """(segment,) index of each one's recording."""
+        return np.array([s.recording for s in self.segments.items])
