@@ -18,7 +18,8 @@ from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn, FieldColumn
 from measure.loop.comparison import total_error
-from measure.loop.inference import Evidence, Fit, fluctuation, fluctuation_gains, gains
+from measure.loop.fluctuation import fluctuation, fluctuation_gains
+from measure.loop.inference import Evidence, Fit, gains
 from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
 from measure.loop.verdict import Candidate, Conclusion, Estimate
@@ -59,6 +60,7 @@ class Weighed:
         candidate: as reported.
         error: standard error of the strength.
         gains: (segment,) held-out gain.
+        recording: (segment,) of each.
         admissible: whether the fitted strength makes physical sense: see `_plausible`.
     """
 
@@ -66,6 +68,7 @@ class Weighed:
     candidate: Candidate
     error: float
     gains: Floats
+    recording: NDArray[np.int64]
     admissible: bool
 
 
@@ -121,11 +124,10 @@ def judge(
         return judgement(Conclusion.SUFFICIENT, (), {w.column: "the base model is not rejected" for w in ranking})
     best = ranking[0]
     reasons = {w.column: _reason(best, w) for w in ranking[1:]}
-    field = float(statistics[smooth].max())
     if not best.admissible or best.gains.sum() <= 0:
         reasons[best.column] = "no effect of the library predicts unseen recordings better than the base model"
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    if best.candidate.z**2 * _BETTER < field:
+    if _field_leads(evidence, best, smooth, statistics):
         reasons[best.column] = "a smooth force field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
@@ -137,6 +139,16 @@ def judge(
     return judgement(Conclusion.PARTLY, (best,), reasons)
 
 
+def _field_leads(evidence: Evidence, best: Weighed, smooth: Sequence[int], statistics: Floats) -> bool:
+    """Whether a mode of the corrective field says that the library has no answer.
+
+    A pressure that fluctuates pushes steady modes by chance: against gusts, the mode must also predict better.
+    """
+    mode = max(smooth, key=lambda column: float(statistics[column]))
+    larger = best.candidate.z**2 * _BETTER < float(statistics[mode])
+    return larger and (best.column != GUST_COLUMN or gains(evidence, [[mode]]).sum() > best.gains.sum())
+
+
 def finalists(judgement: Judgement) -> tuple[int, ...]:
     """Columns that are run again: the first by held-out gains, and the largest statistics."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
@@ -144,9 +156,12 @@ def finalists(judgement: Judgement) -> tuple[int, ...]:
     return tuple(dict.fromkeys(w.column for w in (*able[:_RUN_AGAIN], *strongest[:_RUN_AGAIN])))
 
 
-def withdrawn(judgement: Judgement) -> Judgement:
-    """The same, once the effect named has failed on unseen data."""
-    reason = "run again on unseen recordings, it does not help more than the wrong-effect control"
+NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
+NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
+
+
+def withdrawn(judgement: Judgement, reason: str) -> Judgement:
+    """The same, once the effect named has failed, for one of the reasons above."""
     ranking = tuple(
         replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in judgement.named else w
         for w in judgement.ranking
@@ -168,19 +183,23 @@ def _second(
     evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:
     """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
-    strength is not nothing."""
+    strength is not nothing. Beside gusts, the pressure is free in every segment."""
+    place = names().index(GUSTS)
+    taken: list[Weighed] = [best]
     if best.column == GUST_COLUMN:
-        return None
-    others = [w for w in ranking if w.column not in (best.column, GUST_COLUMN) and w.candidate.effect not in _SEEN]
-    pairs = gains(evidence, [[best.column], *([best.column, w.column] for w in others)])
+        evidence, reference, taken = evidence.freed(place), reference.beside(), []
+    known = [w.column for w in taken]
+    skipped = {GUST_COLUMN, best.column, *([] if taken else [place])}
+    others = [w for w in ranking if w.column not in skipped and w.candidate.effect not in _SEEN]
+    pairs = gains(evidence, [known, *([*known, w.column] for w in others)])
     order = np.argsort(-pairs[1:].sum(axis=1))
     chosen, gained = others[order[0]], pairs[1 + order[0]] - pairs[0]
-    fit = evidence.fit([best.column, chosen.column])
-    strengths = [_beside(evidence, fit, w) for w in (best, chosen)]
-    plausible = all(_plausible(_described(w), *strength) for w, strength in zip((best, chosen), strengths, strict=True))
-    value, error = strengths[1]
-    lasting = gained.sum() > _FAR * total_error(gained) and abs(value) > _FAR * error
-    return chosen if lasting and plausible and _leftover(evidence, reference, fit.active) > level else None
+    fit = evidence.fit([*known, chosen.column])
+    strengths = [_beside(evidence, fit, w) for w in (*taken, chosen)]
+    likely = [_plausible(_described(w), *strength) for w, strength in zip((*taken, chosen), strengths, strict=True)]
+    value, error = strengths[-1]
+    lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _FAR * error
+    return chosen if lasting and all(likely) and _leftover(evidence, reference, fit.active) > level else None
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
@@ -233,13 +252,14 @@ def _weigh(
         single, claimed = own.of(column)
         by_recording.append(estimate(single, claimed * error / fit.of(column)[1], effect.unit))
     return Weighed(
-        column=column, error=error, gains=gained, admissible=_plausible(effect.described, value, error),
+        column=column, error=error, gains=gained, recording=evidence.recording,
+        admissible=_plausible(effect.described, value, error),
         candidate=Candidate(
             effect=effect.effect, parameter=effect.parameter, null=null,
             strength=estimate(null + value, error, effect.unit),
             z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic), gain=float(gained.sum()),
-            gain_error=total_error(gained), behind=0.0, leftover=leftover,
+            gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
             by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
@@ -255,15 +275,20 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
         own = fluctuation(evidence.select(evidence.recording == index), place)
         by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
     return Weighed(
-        column=GUST_COLUMN, gains=gained, admissible=True, error=found.error / 2,
+        column=GUST_COLUMN, gains=gained, recording=evidence.recording, admissible=True, error=found.error / 2,
         candidate=Candidate(
             effect="gusts", parameter="intensity", null=described.null,
             strength=estimate(found.deviation / 2, found.error / 2, described.unit), z=math.sqrt(statistic),
             p_value=reference.p_alone(statistic, len(names())), p_family=reference.p_family(statistic),
-            gain=float(gained.sum()), gain_error=total_error(gained), behind=0.0,
-            leftover=reference.p_left(evidence.fit(()).left - 2 * found.likelihood), by_recording=tuple(by_recording),
+            gain=float(gained.sum()), gain_error=total_error(gained, evidence.recording), behind=0.0,
+            leftover=_beside_gusts(evidence, reference), by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
+
+
+def _beside_gusts(evidence: Evidence, reference: Reference) -> float:
+    """p-value of the global test where the pressure is free in every segment."""
+    return _leftover(evidence.freed(names().index(GUSTS)), reference.beside(), ())
 
 
 def estimate(value: float, error: float, unit: str) -> Estimate:
@@ -293,7 +318,7 @@ def _behind(best: Weighed, other: Weighed) -> float:
     if other is best or other.column == best.column:
         return 0.0
     difference = best.gains - other.gains
-    error = total_error(difference)
+    error = total_error(difference, best.recording)
     return float(difference.sum() / error) if error > 0 else 0.0
 
 

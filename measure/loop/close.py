@@ -24,6 +24,8 @@ from measure.loop.again import Fits, run_again
 from measure.loop.attribution import (
     EQUIVALENT,
     GUST_COLUMN,
+    NO_HELP,
+    NOT_APART,
     Judgement,
     Weighed,
     estimate,
@@ -119,13 +121,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
         again = run_again(fits, reference, finalists(judgement))
         judgement = judge(evidence, reference, level=options.level, again=again)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
-    trial = _trial(solved, options, tell)
-    partly = judgement.conclusion is Conclusion.PARTLY
-    diverges = solved.larger is None and bool(judgement.named) and GUST_COLUMN not in judgement.named
-    if diverges or trial.failed or (trial.tied and partly):
-        judgement, trial = withdrawn(judgement), Trial()
-    elif trial.tied and solved.control is not None and len(judgement.named) == 1:
-        judgement = tied(judgement, solved.control[0])
+    judgement, trial = _settled(solved, options, tell)
     tell("before and after", 1, 1)
     return _verdict(solved, judgement, bank, trial, options, began)
 
@@ -165,6 +161,23 @@ class Solved:
         named = self.judgement.named
         return named if self.judgement.conclusion is Conclusion.EFFECT else named[:1]
 
+    def strength(self, weighed: Weighed, larger: Refined) -> Estimate:
+        """Of an acting effect beyond the linear: its error is as much larger than Σ says as where it is linear."""
+        place = self.acting.index(weighed.column)
+        column, coefficient = larger.model.effects[place]
+        linear = self.evidence.fit([weighed.column]).of(weighed.column)[1]
+        error = larger.errors[len(THETA) + place] * weighed.error / linear
+        return estimate(column.described.null + coefficient, error, column.unit)
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether the effect that is said to act might be none, by the interval of its strength."""
+        larger, first = self.larger, self.judgement.ranking[0]
+        if larger is None or self.judgement.conclusion is Conclusion.ONE_OF:
+            return False
+        found = self.strength(first, larger)
+        return found.low <= first.candidate.null <= found.high
+
     @cached_property
     def control(self) -> tuple[Weighed, Refined] | None:
         """The best effect that was not named, and the model with it."""
@@ -183,6 +196,21 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
     return supply.simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell)
 
 
+def _settled(solved: Solved, options: Options, tell: Stage) -> tuple[Judgement, Trial]:
+    """The judgement after the models were run again, with what they did."""
+    judgement = solved.judgement
+    if solved.doubtful:
+        return withdrawn(judgement, NOT_APART), Trial()
+    trial = _trial(solved, options, tell)
+    partly = judgement.conclusion is Conclusion.PARTLY
+    diverges = solved.larger is None and bool(judgement.named) and GUST_COLUMN not in judgement.named
+    if diverges or trial.failed or (trial.tied and partly):
+        return withdrawn(judgement, NO_HELP), Trial()
+    if trial.tied and solved.control is not None and len(judgement.named) == 1:
+        return tied(judgement, solved.control[0]), trial
+    return judgement, trial
+
+
 def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     """Before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
@@ -196,6 +224,7 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     made: list[Comparison] = []
     helped: list[Floats] = []
     apart: list[Floats] = []
+    places: list[NDArray[np.int64]] = []
     frames = len(setting.segments.items[0].positions) - setting.segments.first
     every = folds(setting.segments, [float(u) for u in setting.speeds])
     for place, fold in enumerate(every):
@@ -214,8 +243,12 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
         )  # fmt: skip
         if len(every) == 1 or place < len(setting.speeds):  # the late thirds are in the recordings as well
             helped.append(tried[0].misfit - tried[1].misfit)
+            places.append(np.full(len(helped[-1]), place))
             apart += [] if control is None else [tried[2].misfit - tried[1].misfit]
-    return Trial(comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None)
+    return Trial(
+        comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None,
+        recording=np.concatenate(places),
+    )  # fmt: skip
 
 
 def _verdict(
@@ -267,11 +300,7 @@ def _ranking(solved: Solved, judgement: Judgement, larger: Refined | None) -> tu
     for weighed in judgement.ranking:
         candidate = weighed.candidate
         if larger is not None and weighed.column in solved.acting:
-            place = solved.acting.index(weighed.column)
-            column, coefficient = larger.model.effects[place]
-            linear = solved.evidence.fit([weighed.column]).of(weighed.column)[1]
-            error = larger.errors[len(THETA) + place] * weighed.error / linear
-            candidate = replace(candidate, strength=estimate(column.described.null + coefficient, error, column.unit))
+            candidate = replace(candidate, strength=solved.strength(weighed, larger))
         made.append(candidate)
     return tuple(made)
 

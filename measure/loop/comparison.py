@@ -40,31 +40,41 @@ class Trial:
         helped: (segment,) half misfit before less after (see `measure.loop.yardstick`), each segment of the recordings
             left out in turn (of a single recording: of its last third).
         apart: (segment,) control less after; None without a control.
+        recording: (segment,) what was left out together with each.
     """
 
     comparisons: tuple[Comparison, ...] = ()
     helped: Floats = field(default_factory=lambda: np.zeros(0))
     apart: Floats | None = None
+    recording: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def failed(self) -> bool:
         """Whether the effect does not lower the errors, or the control lowers them more, by two standard errors."""
-        worse = self.apart is not None and _above(-self.apart)
+        worse = self.apart is not None and _above(-self.apart, self.recording)
         return bool(self.comparisons) and (worse or not self.helped.sum() > 0)
 
     @property
     def tied(self) -> bool:
         """Whether the control cannot be told from the effect: by less than two standard errors."""
-        return bool(self.comparisons) and self.apart is not None and not _above(self.apart)
+        return bool(self.comparisons) and self.apart is not None and not _above(self.apart, self.recording)
 
 
-def _above(values: Floats) -> bool:
-    return bool(values.sum() > _FAR * total_error(values))
+def _above(values: Floats, recording: NDArray[np.int64]) -> bool:
+    return bool(values.sum() > _FAR * total_error(values, recording))
 
 
-def total_error(values: Floats) -> float:
-    """Standard error of a sum over segments."""
-    return float(np.std(values, ddof=1)) * math.sqrt(len(values)) if len(values) > 1 else math.inf
+def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
+    """Standard error of a sum over segments (segment,) that are drawn within recordings.
+
+    Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
+    single segment, segments are taken to be drawn from all.
+    """
+    own = [values[recording == index] for index in np.unique(recording)]
+    strata = own if min(len(part) for part in own) > 1 else [values]
+    if len(strata[0]) < 2:
+        return math.inf
+    return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in strata))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

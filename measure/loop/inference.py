@@ -203,6 +203,20 @@ class Evidence:
         value = covariance @ score[active]
         return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))
 
+    def freed(self, column: int) -> Evidence:
+        """With a coefficient of a column that is free in every segment: what is left across it."""
+        own = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
+        along, slope = self.curvature[:, column], self.score[:, column]
+        curvature = self.curvature - along[:, :, None] * along[:, None, :] / own[:, None, None]
+        score = self.score - along * (slope / own)[:, None]
+        # Nothing is left of the column itself: it stays as one of which nothing is known.
+        curvature[:, column, :] = curvature[:, :, column] = score[:, column] = 0.0
+        curvature[:, column, column] = 1.0
+        return Evidence(
+            recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
+            columns=self.columns,
+        )  # fmt: skip
+
     def drops(self, beside: Chosen = ()) -> Floats:
         """(column,) how much each column, added to the nuisances and to some more, lowers the squared distance."""
         active = [*self.nuisance, *beside]
@@ -264,66 +278,3 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
             fit = inside.fit(chosen)
             result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
     return result
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fluctuation:
-    """A coefficient that differs from segment to segment, normally distributed about that of the fit.
-
-    Attributes:
-        deviation: its standard deviation, in units of its column.
-        error: of the deviation, from the curvature of the likelihood.
-        likelihood: log likelihood ratio against a coefficient that does not differ.
-    """
-
-    deviation: float
-    error: float
-    likelihood: float
-
-
-def fluctuation(evidence: Evidence, column: int, beside: Chosen = ()) -> Fluctuation:
-    """How much a column's coefficient fluctuates, beside the nuisances and some columns more.
-
-    Errors are taken to be as large as this set's are.
-    """
-    score, curvature = _beside(evidence, column, beside)
-    grid: Floats = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
-    likelihood = _fluctuating(grid[:, None], score, curvature).sum(axis=1)
-    best = int(np.argmax(likelihood))
-    deviation = float(np.sqrt(grid[best]))
-    # Of τ where information is a normal variance's: Σ h²/(1 + τ² h)²/2 for τ², 4 τ² times that for τ.
-    information = 2 * grid[best] * float((curvature**2 / (1 + grid[best] * curvature) ** 2).sum())
-    error = information**-0.5 if information > 0 else float(np.sqrt(1 / np.sqrt((curvature**2).sum())))
-    return Fluctuation(deviation=deviation, error=error, likelihood=float(likelihood[best]))
-
-
-def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
-    """(segment,) log likelihood of each left-out recording's segments under the others' fluctuation, over none."""
-    folds = left_together(evidence.recording)
-    result = np.zeros(len(folds))
-    for index in np.unique(folds):
-        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
-        fit = inside.fit(())
-        active = list(fit.active)
-        score = outside.score[:, column] - outside.curvature[:, column][:, active] @ fit.value
-        deviation = fluctuation(inside, column).deviation
-        result[folds == index] = _fluctuating(
-            np.full(len(score), deviation**2, dtype=np.float64), score, outside.curvature[:, column, column]
-        )
-    return result
-
-
-def _beside(evidence: Evidence, column: int, beside: Chosen) -> tuple[Floats, Floats]:
-    """(segment,) score and curvature of a column beside fitted ones, in units of what those leave."""
-    fit = evidence.fit(beside)
-    active = list(fit.active)
-    score = evidence.score[:, column] - evidence.curvature[:, column][:, active] @ fit.value
-    curvature = evidence.curvature[:, column, column]
-    size = fit.left / (len(score) * evidence.columns)
-    return score / size, curvature / size
-
-
-def _fluctuating(variance: Floats, score: Floats, curvature: Floats) -> Floats:
-    """log N(r; 0, Σ + τ² R Rᵀ) − log N(r; 0, Σ), by the matrix determinant lemma."""
-    grown = 1 + variance * curvature
-    return -np.log(grown) / 2 + variance * score**2 / grown / 2

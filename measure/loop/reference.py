@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
-from measure.loop.inference import Evidence, NullModel, Nulls, fluctuation
+from measure.loop.fluctuation import fluctuation
+from measure.loop.inference import Evidence, NullModel, Nulls
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
 _LEAST = 24
 _KINDS = 4
+"""Null recordings below which no test at 2 % can be held, and of how many kinds of numerics."""
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
-"""Null recordings below which no test at 2 % can be held."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,9 +67,7 @@ class NullBank:
         """
         rng = stream(seed, "null", "groups")
         each = math.ceil(_GROUPS / len(np.unique(self.nulls.experiment)))
-        shares: list[Floats] = []
-        left: list[float] = []
-        noises: list[float] = []
+        plain, beside_gusts = _Groups(), _Groups()
         for kind in np.unique(self.nulls.numerics):
             own = self.nulls.numerics == kind
             outside = self.nulls.select(own)
@@ -84,10 +83,24 @@ class NullBank:
                             fix="simulate longer nulls, or give shorter recordings",
                         )  # fmt: skip
                     picked = evidence.select(chosen)
-                    shares.append(unscaled(picked, self.columns))
-                    left.append(picked.fit(()).left)
-                    noises.append(float(outside.noise[inside][0]))
-        return Reference.of(np.array(shares), np.array(left), np.array(noises), noise)
+                    own_noise = float(outside.noise[inside][0])
+                    plain.add(picked, self.columns, own_noise)
+                    beside_gusts.add(picked.freed(self.columns.index(GUSTS)), self.columns, own_noise)
+        return Reference.of(plain, noise, beside_gusts=Reference.of(beside_gusts, noise))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Groups:
+    """Statistics of null groups, as they are gathered."""
+
+    shares: list[Floats] = field(default_factory=list)
+    left: list[float] = field(default_factory=list)
+    noises: list[float] = field(default_factory=list)
+
+    def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float) -> None:
+        self.shares.append(unscaled(evidence, columns))
+        self.left.append(evidence.fit(()).left)
+        self.noises.append(noise)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,27 +110,30 @@ class Reference:
     A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the mean share of
     nulls with about the same noise of the markers: 1 in the mean if nothing is missing. Sets whose errors are larger
     all over are so no larger here, nor are those whose noise alone moves a column. One more statistic stands for gusts:
-    the likelihood ratio of a wind pressure that fluctuates.
+    the likelihood ratio of a wind pressure that fluctuates, over one that differs by a constant.
 
     Attributes:
         scaled: (group, column), gusts the last.
         spread: (column,) mean share of nulls as noisy as the data.
         left: (group,) squared distance the base model leaves, over its median of nulls as noisy.
         usual: that median for nulls as noisy as the data.
+        beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
     """
 
     scaled: Floats
     spread: Floats
     left: Floats
     usual: float
+    beside_gusts: Reference | None = None
 
     @classmethod
-    def of(cls, shares: Floats, left: Floats, noises: Floats, noise: float) -> Reference:
-        """Of groups (group, column), (group,) and their noise [m], for data of some noise.
+    def of(cls, groups: _Groups, noise: float, *, beside_gusts: Reference | None = None) -> Reference:
+        """For data of some noise [m].
 
         Raises:
             InputError: no nulls of such noise.
         """
+        shares, left, noises = np.array(groups.shares), np.array(groups.left), np.array(groups.noises)
         scaled, relative = np.empty_like(shares), np.empty_like(left)
         for level in np.unique(noises):
             near = np.abs(noises - level) <= _ALIKE
@@ -131,8 +147,18 @@ class Reference:
             )  # fmt: skip
         return cls(
             scaled=scaled, spread=np.maximum(shares[near].mean(axis=0), _NOTHING), left=relative,
-            usual=float(np.median(left[near])),
+            usual=float(np.median(left[near])), beside_gusts=beside_gusts,
         )  # fmt: skip
+
+    def beside(self) -> Reference:
+        """That of evidence with a pressure that is free in every segment.
+
+        Raises:
+            UsageError: this is it.
+        """
+        if self.beside_gusts is None:
+            raise UsageError("it is beside gusts itself", where="reference", fix="ask that of the bank")
+        return self.beside_gusts
 
     @cached_property
     def largest(self) -> Floats:

@@ -99,13 +99,14 @@ def _best(
     held_out = gains(evidence, [list(chosen), *([*chosen, column] for column in looked)])
     increments = held_out[1:] - held_out[0]
     leader = int(np.argmax(increments.sum(axis=1)))
+    behind = increments[leader] - increments
     tied = [
         place
         for place in range(len(looked))
-        if (increments[leader] - increments[place]).sum() <= _TIED * total_error(increments[leader] - increments[place])
+        if behind[place].sum() <= _TIED * total_error(behind[place], evidence.recording)
     ]
     place = max(tied, key=lambda p: float(statistics[looked[p]]))
-    gain, error = float(increments[place].sum()), total_error(increments[place])
+    gain, error = float(increments[place].sum()), total_error(increments[place], evidence.recording)
     reason = ""
     if not significant:
         reason = "nulls show as much"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from measure.loop.comparison import Trial, paired
+from measure.loop.comparison import Trial, paired, total_error
 from measure.loop.verdict import Comparison, Estimate
 
 RNG = np.random.default_rng(1)
@@ -26,7 +26,8 @@ def trial(helped: float, apart: float | None) -> Trial:
         control_name="",
     )  # fmt: skip
     return Trial(
-        comparisons=(comparison,), helped=around(helped), apart=None if apart is None else around(apart)
+        comparisons=(comparison,), helped=around(helped), apart=None if apart is None else around(apart),
+        recording=np.zeros(12, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -51,6 +52,20 @@ def test_errors_that_are_not_finite_have_failed() -> None:
     helped = around(1.0)
     helped[3] = np.nan
     assert Trial(comparisons=trial(1.0, 1.0).comparisons, helped=helped).failed
+
+
+def test_what_differs_between_recordings_is_no_error() -> None:
+    """Three recordings of four segments with a standard deviation of 1 each about means far apart: √(3 · 4)."""
+    own = np.array([-1.0, 1.0, -1.0, 1.0]) * np.sqrt(3 / 4)
+    values = np.concatenate([own, 50 + own, -20 + own])
+    assert total_error(values, np.repeat([0, 1, 2], 4)) == pytest.approx(np.sqrt(12), rel=1e-12)
+
+
+def test_of_a_recording_with_one_segment_the_error_is_that_of_all() -> None:
+    values = np.array([1.0, 3.0, 8.0])
+    # Standard deviation √13 of 1, 3, 8 about 4; times √3.
+    assert total_error(values, np.array([0, 0, 1])) == pytest.approx(np.sqrt(39), rel=1e-12)
+    assert total_error(values[:1], np.array([0])) == np.inf
 
 
 def test_no_trial_neither_fails_nor_ties() -> None:

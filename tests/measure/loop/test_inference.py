@@ -9,7 +9,8 @@ from scipy.stats import chi2, kstest, uniform
 
 from flagdata.errors import InputError
 from measure.loop.columns import PRIOR, THETA
-from measure.loop.inference import Evidence, NullModel, Nulls, fluctuation, gains
+from measure.loop.fluctuation import fluctuation
+from measure.loop.inference import Evidence, NullModel, Nulls, gains
 from measure.loop.reference import GUSTS, NullBank
 from measure.loop.statistics import Statistics
 
@@ -177,6 +178,57 @@ def test_a_fluctuation_is_found_with_its_size(world: World, null: NullModel) -> 
         found.append(fluctuation(moved, 5).deviation)
     # Twelve segments a draw: their spread of 20 % averages to 4 % over 40.
     assert np.mean(found) == pytest.approx(0.5, rel=0.2)
+
+
+def test_a_constant_does_not_fluctuate(world: World, null: NullModel) -> None:
+    """Of a strength that is the same in all segments, a likelihood ratio no larger than that of nulls."""
+    constant = [fluctuation(world.data(null, effect(0.5)), 5).likelihood for _ in range(40)]
+    nothing = [fluctuation(world.data(null, effect(0.0)), 5).likelihood for _ in range(40)]
+    assert np.mean(constant) < np.mean(nothing) + 3 * np.std(nothing) / np.sqrt(len(nothing))
+
+
+def test_what_is_left_beside_a_free_coefficient_is_that_of_a_coefficient_for_every_segment(
+    world: World, null: NullModel
+) -> None:
+    """Least squares of the nuisances and of column 5 in each segment, written out in full."""
+    evidence = world.data(null, effect(0.4))
+    nuisance, count = evidence.nuisance, len(evidence.recording)
+    total, score, energy = evidence._total()  # pyright: ignore[reportPrivateUsage]
+    across = evidence.curvature[:, nuisance, 5].T
+    curvature = np.block(
+        [[total[np.ix_(nuisance, nuisance)], across], [across.T, np.diag(evidence.curvature[:, 5, 5])]]
+    )  # fmt: skip
+    right = np.concatenate([score[nuisance], evidence.score[:, 5]])
+    assert len(right) == len(nuisance) + count
+    left = energy - right @ np.linalg.solve(curvature, right)
+    freed = evidence.freed(5)
+    assert freed.fit(()).left == pytest.approx(left, rel=1e-9)
+    assert freed.drops()[5] == 0
+    assert fluctuation(freed, 5).likelihood == pytest.approx(0, abs=1e-9)
+
+
+def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
+    world = World(5)
+    columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
+    bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
+    reference, null, place = bank.reference(12, noise=0.0, seed=1), bank.model(), COLUMNS - 1
+    before, after = [], []
+    for _ in range(30):
+        evidence = world.data(null, effect(0.0))
+        extra = world.rng.normal(0, 1.5, len(evidence.recording))
+        moved = Evidence(
+            recording=evidence.recording, curvature=evidence.curvature, columns=evidence.columns,
+            score=evidence.score + extra[:, None] * evidence.curvature[:, :, place],
+            energy=evidence.energy + 2 * extra * evidence.score[:, place]
+            + extra**2 * evidence.curvature[:, place, place],
+        )  # fmt: skip
+        freed = moved.freed(place)
+        beside = reference.beside()
+        before.append(reference.p_global(reference.statistics(moved, columns), moved.fit(()).left))
+        after.append(beside.p_global(beside.statistics(freed, columns), freed.fit(()).left))
+    assert np.median(before) < 0.02
+    # As of nulls, whose p-values are uniform: 30 of them have a median of 0.5 ± 0.09.
+    assert np.median(after) > 0.25
 
 
 def test_nulls_fluctuate_little(world: World, null: NullModel) -> None:
