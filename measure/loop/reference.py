@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,6 +22,52 @@ _KINDS = 4
 """Null recordings below which no test at 2 % can be held, and of how many kinds of numerics."""
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeftOutKind:
+    """Null experiments of one kind of numerics, and a null model that has not seen it.
+
+    Attributes:
+        model: learnt from all other kinds.
+        outside: the nulls of this kind.
+        groups: places among them, of one experiment each.
+    """
+
+    model: NullModel
+    outside: Nulls
+    groups: tuple[NDArray[np.int64], ...]
+
+
+def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOutKind]:
+    """Groups like data, of each kind in turn: so many segments of recordings of one experiment.
+
+    Args:
+        nulls: what the null models learn from.
+        pool: those of them that groups are made of.
+
+    Raises:
+        InputError: an experiment has fewer segments.
+    """
+    rng = stream(seed, "null", "groups")
+    each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
+    for kind in np.unique(pool.numerics):
+        outside = pool.select(pool.numerics == kind)
+        recording = outside.statistics.recording
+        groups: list[NDArray[np.int64]] = []
+        for index in range(outside.experiment.max() + 1):
+            places = [np.flatnonzero(recording == r) for r in np.unique(recording[outside.experiment == index])]
+            for _ in range(each):
+                chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
+                if len(chosen) < segments:
+                    raise InputError(
+                        f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
+                        fix="simulate longer nulls, or give shorter recordings",
+                    )  # fmt: skip
+                groups.append(chosen)
+        yield LeftOutKind(
+            model=NullModel.fit(nulls.select(nulls.numerics != kind)), outside=outside, groups=tuple(groups)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,27 +111,13 @@ class NullBank:
         Raises:
             InputError: no experiment has that many segments, or too few have such noise.
         """
-        rng = stream(seed, "null", "groups")
-        each = math.ceil(_GROUPS / len(np.unique(self.nulls.experiment)))
         plain, beside_gusts = _Groups(), _Groups()
-        for kind in np.unique(self.nulls.numerics):
-            own = self.nulls.numerics == kind
-            outside = self.nulls.select(own)
-            evidence = Evidence.of_nulls(outside, NullModel.fit(self.nulls.select(~own)))
-            for index in range(outside.experiment.max() + 1):
-                inside = outside.experiment == index
-                places = [np.flatnonzero(evidence.recording == r) for r in np.unique(evidence.recording[inside])]
-                for _ in range(each):
-                    chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
-                    if len(chosen) < segments:
-                        raise InputError(
-                            f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
-                            fix="simulate longer nulls, or give shorter recordings",
-                        )  # fmt: skip
-                    picked = evidence.select(chosen)
-                    own_noise = float(outside.noise[inside][0])
-                    plain.add(picked, self.columns, own_noise)
-                    beside_gusts.add(picked.freed(self.columns.index(GUSTS)), self.columns, own_noise)
+        for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
+            evidence = Evidence.of_nulls(kept.outside, kept.model)
+            for chosen in kept.groups:
+                picked, own = evidence.select(chosen), float(kept.outside.noise[chosen[0]])
+                plain.add(picked, self.columns, own)
+                beside_gusts.add(picked.freed(self.columns.index(GUSTS)), self.columns, own)
         return Reference.of(plain, noise, beside_gusts=Reference.of(beside_gusts, noise))
 
 

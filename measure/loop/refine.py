@@ -18,11 +18,11 @@ from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 3
+ROUNDS = 3
 _FEW = 8
 """Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the columns' place."""
 _HALVINGS = 4
-_STAYS = 0.3
+STAYS = 0.3
 """Standard errors below which a step is not worth another round."""
 _LONGEST = 1.5
 """A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
@@ -61,7 +61,7 @@ class Refined:
     def without(self, outside: NDArray[np.bool_]) -> Model:
         """The same model fitted to the other segments alone, one step from `origin`."""
         step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin)
-        return self.origin.moved(_cut(step))
+        return self.origin.moved(cut(step))
 
 
 def refine(
@@ -86,10 +86,10 @@ def refine(
     own = [weighed[c - len(THETA)] for c in chosen]
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
-    model = Model(calibration=Calibration(), effects=effects).moved(_cut(np.array(values, dtype=np.float64)))
+    model = Model(calibration=Calibration(), effects=effects).moved(cut(np.array(values, dtype=np.float64)))
     part = _part(yardstick.null, [*range(len(THETA)), *chosen])
     reached = _round(forecaster, segments, model, part, yardstick.speeds, tuple(chosen))
-    for _ in range(_ROUNDS - 1):
+    for _ in range(ROUNDS - 1):
         if reached.stays:
             break
         reached = _round(forecaster, segments, reached.model, part, yardstick.speeds, tuple(chosen))
@@ -114,7 +114,7 @@ def finished(
     evidence = yardstick.of(errors).select(inside)
     fit = evidence.fit(chosen, centre=Calibration().steps_from(model.calibration))
     step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
-    return model.moved(_cut(step)) if np.isfinite(step).all() else model
+    return model.moved(cut(step)) if np.isfinite(step).all() else model
 
 
 def _round(
@@ -137,12 +137,13 @@ def _round(
         )  # fmt: skip
     step, errors = _step(found, null, speeds, origin)
     return Refined(
-        model=origin.moved(_cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
-        origin=origin, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < _STAYS),
+        model=origin.moved(cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
+        origin=origin, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < STAYS),
     )  # fmt: skip
 
 
-def _cut(step: Floats) -> tuple[float, ...]:
+def cut(step: Floats) -> tuple[float, ...]:
+    """A step along the calibrated parameters and strengths, no further than the linear model reaches."""
     longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
     return tuple(float(v) for v in np.clip(step, -longest, longest))
 

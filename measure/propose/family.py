@@ -6,7 +6,6 @@ model that has seen none of their numerics. So nulls along the directions of the
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,16 +13,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError
-from flagdata.rng import stream
 from measure.loop.columns import THETA
-from measure.loop.inference import Evidence, NullModel, Nulls
+from measure.loop.inference import Evidence, Nulls
+from measure.loop.reference import left_out_groups
 from measure.loop.statistics import Statistics
 from measure.propose.lens import evidence
 
 Floats = NDArray[np.float64]
 
-_GROUPS = 400
 _NOTHING = 1e-6
 """Mean share below which a term is never seen."""
 _ALIKE = 5e-4
@@ -56,27 +53,15 @@ class Family:
         Raises:
             InputError: no null experiment has as many segments.
         """
-        rng = stream(seed, "null", "groups")
         count, columns = found.response.shape[0], found.response.shape[2]
         alike = nulls.select(np.abs(nulls.noise - noise) <= _ALIKE)
         pool = alike if len(alike.noise) and len(np.unique(alike.experiment)) >= _LEAST else nulls
-        each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
         shares: list[Floats] = []
-        for kind in np.unique(pool.numerics):
-            outside = pool.select(pool.numerics == kind)
-            model = NullModel.fit(nulls.select(nulls.numerics != kind))
-            clean, recording = outside.clean, outside.statistics.recording
-            for index in range(int(outside.experiment.max()) + 1):
-                own = [np.flatnonzero(recording == r) for r in np.unique(recording[outside.experiment == index])]
-                for _ in range(each):
-                    chosen = np.concatenate([own[k] for k in rng.permutation(len(own))])[:count]
-                    if len(chosen) < count:
-                        raise InputError(
-                            f"{count} segments of data against {len(chosen)} nulls of one experiment",
-                            where="null bank", fix="simulate longer nulls, or give shorter recordings",
-                        )  # fmt: skip
-                    placed = replace(found, r=clean[chosen])
-                    shares.append(_shares(evidence(placed, outside.speeds[chosen], model), ()))
+        for kept in left_out_groups(nulls, pool, count, seed=seed):
+            clean = kept.outside.clean
+            for chosen in kept.groups:
+                placed = replace(found, r=clean[chosen])
+                shares.append(_shares(evidence(placed, kept.outside.speeds[chosen], kept.model), ()))
         result = np.array(shares)
         return cls(shares=result[:, :columns])
 

@@ -8,18 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.loop.columns import PRIOR, THETA, Calibration, EffectColumn
+from measure.loop.columns import THETA, Calibration, EffectColumn
 from measure.loop.inference import NullModel
 from measure.loop.model import Model
+from measure.loop.refine import ROUNDS, STAYS, cut
 from measure.propose.lens import Lens, evidence
 
 Floats = NDArray[np.float64]
-
-_ROUNDS = 3
-_STAYS = 0.3
-"""Standard errors below which a step is not worth another round."""
-_LONGEST = 1.5
-"""A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,11 +33,11 @@ def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectCol
         start: steps from the nominal model to begin with: the linear fit there.
     """
     model = Model(calibration=Calibration(), effects=tuple((column, 0.0) for column in columns))
-    step, errors = _cut(np.array(start, dtype=np.float64)), np.zeros(len(start))
-    for _ in range(_ROUNDS):
+    step, errors = np.array(cut(np.array(start, dtype=np.float64))), np.zeros(len(start))
+    for _ in range(ROUNDS):
         model = model.moved(tuple(step))
         step, errors = _step(lens, null, speeds, model)
-        if np.abs(step / errors).max() < _STAYS:
+        if np.abs(step / errors).max() < STAYS:
             break
     return Fitted(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
 
@@ -52,9 +47,4 @@ def _step(lens: Lens, null: NullModel, speeds: Floats, model: Model) -> tuple[Fl
     own = evidence(lens.at(model), speeds, null)
     found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
     value, error = np.array([found.of(column) for column in range(own.columns)]).T
-    return _cut(value), error
-
-
-def _cut(step: Floats) -> Floats:
-    longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
-    return np.clip(step, -longest, longest)
+    return np.array(cut(value)), error
