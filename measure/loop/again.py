@@ -7,6 +7,7 @@ unseen recordings worse than nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from measure.loop.bank import columns, names
 from measure.loop.comparison import left_out
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import left_together
+from measure.loop.inference import Evidence, left_together
 from measure.loop.reference import Reference
 from measure.loop.refine import DivergedError, Refined, refine
 from measure.loop.yardstick import Yardstick
@@ -67,39 +68,48 @@ class Rerun:
         coefficient: fitted to all recordings.
         gains: (segment,) held-out gain: see `inference.gains`.
         leftover: p-value of the global test on what it leaves.
+        evidence: of what it leaves.
     """
 
     coefficient: float
     gains: Floats
     leftover: float
+    evidence: Evidence
 
 
-def run_again(fits: Fits, reference: Reference, candidates: Sequence[int]) -> dict[int, Rerun]:
-    """Column → what its model does; columns whose cloth diverges are left out."""
+def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Rerun]:
+    """Column → what its model does; columns whose cloth diverges are left out.
+
+    Args:
+        workers: threads; each model is run in one.
+    """
     together = left_together(fits.yardstick.found.recording)
     parts = [together == index for index in np.unique(together)]
 
-    def left(fitted: Refined, outside: NDArray[np.bool_]) -> Floats:
-        return left_out(fits.forecaster, fits.segments, fitted, fits.yardstick, outside).misfit
+    def left(fitted: Refined) -> list[Floats]:
+        return [left_out(fits.forecaster, fits.segments, fitted, fits.yardstick, outside).misfit for outside in parts]
 
-    before = [left(fits.base, outside) for outside in parts]
-    made: dict[int, Rerun] = {}
-    for column in candidates:
+    def rerun(column: int) -> Rerun | None:
         fitted = fits.of((column,))
         if fitted is None:
-            continue
+            return None
+        errors, _ = fits.forecaster.run(*fitted.model.system(fits.forecaster, fits.segments), fits.segments)
+        evidence = fits.yardstick.of(errors)
         gains = np.zeros(len(together))
-        for outside, old in zip(parts, before, strict=True):
-            gains[outside] = old - left(fitted, outside)
-        made[column] = Rerun(
+        for outside, old, new in zip(parts, before, left(fitted), strict=True):
+            gains[outside] = old - new
+        return Rerun(
             coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
-            leftover=_leftover(fits, reference, fitted, column),
+            leftover=_leftover(reference, evidence, column), evidence=evidence,
         )  # fmt: skip
-    return made
+
+    with ThreadPoolExecutor(max_workers=workers) as pool:
+        list(pool.map(fits.of, [(), *((column,) for column in candidates)]))
+        before = left(fits.base)
+        found = dict(zip(candidates, pool.map(rerun, candidates), strict=True))
+    return {column: made for column, made in found.items() if made is not None}
 
 
-def _leftover(fits: Fits, reference: Reference, fitted: Refined, column: int) -> float:
-    errors, _ = fits.forecaster.run(*fitted.model.system(fits.forecaster, fits.segments), fits.segments)
-    evidence = fits.yardstick.of(errors)
+def _leftover(reference: Reference, evidence: Evidence, column: int) -> float:
     statistics = reference.statistics(evidence, names(), [column])
     return reference.p_global(statistics, evidence.fit([column]).left)

@@ -29,6 +29,8 @@ from sim.effects.parameter import Parameter
 Floats = NDArray[np.float64]
 
 LEVEL = 0.9
+_REACH = float(norm.ppf(0.5 + LEVEL / 2))
+"""Standard errors to either side of an interval."""
 GUST_COLUMN = -1
 """Stands for gusts, which are no column: only their size can be found, not their course."""
 _FIRST = len(THETA)
@@ -133,7 +135,8 @@ def judge(
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
     if best.candidate.leftover > level:
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
-    second = _second(evidence, reference, best, ranking, level)
+    rerun = (again or {}).get(best.column)
+    second = _second(evidence if rerun is None else rerun.evidence, reference, best, ranking, level)
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
@@ -183,23 +186,31 @@ def _second(
     evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:
     """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
-    strength is not nothing. Beside gusts, the pressure is free in every segment."""
+    strength is not nothing. Beside gusts, the pressure is free in every segment.
+
+    Args:
+        evidence: of what the best leaves, if it was run again.
+    """
     place = names().index(GUSTS)
-    taken: list[Weighed] = [best]
+    known = [best.column]
     if best.column == GUST_COLUMN:
-        evidence, reference, taken = evidence.freed(place), reference.beside(), []
-    known = [w.column for w in taken]
-    skipped = {GUST_COLUMN, best.column, *([] if taken else [place])}
+        evidence, reference, known = evidence.freed(place), reference.beside(), []
+    skipped = {GUST_COLUMN, best.column, *([] if known else [place])}
     others = [w for w in ranking if w.column not in skipped and w.candidate.effect not in _SEEN]
-    pairs = gains(evidence, [known, *([*known, w.column] for w in others)])
-    order = np.argsort(-pairs[1:].sum(axis=1))
-    chosen, gained = others[order[0]], pairs[1 + order[0]] - pairs[0]
-    fit = evidence.fit([*known, chosen.column])
-    strengths = [_beside(evidence, fit, w) for w in (*taken, chosen)]
-    likely = [_plausible(_described(w), *strength) for w, strength in zip((*taken, chosen), strengths, strict=True)]
-    value, error = strengths[-1]
-    lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _FAR * error
-    return chosen if lasting and all(likely) and _leftover(evidence, reference, fit.active) > level else None
+    fits = [evidence.fit([*known, w.column]) for w in others]
+    able = [
+        place
+        for place, (w, fit) in enumerate(zip(others, fits, strict=True))
+        if _plausible(_described(w), *_beside(evidence, fit, w))
+    ]
+    if not able:
+        return None
+    pairs = gains(evidence, [known, *([*known, others[place].column] for place in able)])
+    leader = int(np.argmax(pairs[1:].sum(axis=1)))
+    chosen, gained = others[able[leader]], pairs[1 + leader] - pairs[0]
+    value, error = _beside(evidence, fits[able[leader]], chosen)
+    lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _REACH * error
+    return chosen if lasting and _leftover(evidence, reference, fits[able[leader]].active) > level else None
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
@@ -293,8 +304,9 @@ def _beside_gusts(evidence: Evidence, reference: Reference) -> float:
 
 def estimate(value: float, error: float, unit: str) -> Estimate:
     """A normal interval at `LEVEL`."""
-    reach = float(norm.ppf(0.5 + LEVEL / 2)) * error
-    return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=LEVEL)
+    return Estimate(
+        value=value, low=value - _REACH * error, high=value + _REACH * error, unit=unit, level=LEVEL
+    )  # fmt: skip
 
 
 def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +36,7 @@ from measure.loop.attribution import (
     withdrawn,
 )
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
-from measure.loop.comparison import Predictions, Trial, compare, folds, left_out, predict
+from measure.loop.comparison import Fold, LeftOut, Predictions, Trial, compare, folds, left_out, predict
 from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
 from measure.loop.reference import NullBank, Reference
@@ -66,7 +67,7 @@ class Options:
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
-        workers: processes for the nulls.
+        workers: processes for the nulls, then threads for the models that are run again.
 
     Raises:
         UsageError: a level or counts that make no sense.
@@ -118,7 +119,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     judgement = judge(evidence, reference, level=options.level)
     if judgement.conclusion is not Conclusion.SUFFICIENT:
         tell("before and after", 0, 1)
-        again = run_again(fits, reference, finalists(judgement))
+        again = run_again(fits, reference, finalists(judgement), workers=options.workers)
         judgement = judge(evidence, reference, level=options.level, again=again)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     judgement, trial = _settled(solved, options, tell)
@@ -218,33 +219,38 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
         return Trial()
     tell("before and after", 0, 1)
     control = solved.control
-    floor = numerical_floor(
-        setting, np.arange(len(setting.speeds)), larger.model, copies=_FLOOR_COPIES, seed=options.seed
-    )
+    fitted = [solved.base, larger, *([] if control is None else [control[1]])]
+    every = folds(setting.segments, [float(u) for u in setting.speeds])
+
+    def left(fold: Fold) -> list[LeftOut]:
+        yardstick = solved.fits.yardstick
+        return [left_out(setting.forecaster, setting.segments, model, yardstick, fold.outside) for model in fitted]
+
+    with ThreadPoolExecutor(max_workers=options.workers) as pool:
+        simulated = pool.submit(
+            numerical_floor, setting, np.arange(len(setting.speeds)), larger.model, copies=_FLOOR_COPIES,
+            seed=options.seed,
+        )  # fmt: skip
+        tried = list(pool.map(left, every))
+        of_recording, floor = simulated.result()
     made: list[Comparison] = []
     helped: list[Floats] = []
     apart: list[Floats] = []
     places: list[NDArray[np.int64]] = []
     frames = len(setting.segments.items[0].positions) - setting.segments.first
-    every = folds(setting.segments, [float(u) for u in setting.speeds])
-    for place, fold in enumerate(every):
-        fitted = [solved.base, larger] if control is None else [solved.base, larger, control[1]]
-        tried = [
-            left_out(setting.forecaster, setting.segments, model, solved.fits.yardstick, fold.outside)
-            for model in fitted
-        ]
-        near = np.isin(floor[0], np.unique(setting.recording[fold.outside]))
+    for place, (fold, (before, after, *wrong)) in enumerate(zip(every, tried, strict=True)):
+        near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
         made.append(
             compare(
-                fold, frames=int(fold.outside.sum()) * frames, before=tried[0], after=tried[1],
-                control=None if control is None else tried[2], floor=floor[1][near],
+                fold, frames=int(fold.outside.sum()) * frames, before=before, after=after,
+                control=wrong[0] if wrong else None, floor=floor[near],
                 control_name="" if control is None else control[0].candidate.effect,
             )
         )  # fmt: skip
         if len(every) == 1 or place < len(setting.speeds):  # the late thirds are in the recordings as well
-            helped.append(tried[0].misfit - tried[1].misfit)
+            helped.append(before.misfit - after.misfit)
             places.append(np.full(len(helped[-1]), place))
-            apart += [] if control is None else [tried[2].misfit - tried[1].misfit]
+            apart += [own.misfit - after.misfit for own in wrong]
     return Trial(
         comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None,
         recording=np.concatenate(places),
