@@ -191,11 +191,11 @@ def _second(
     Args:
         evidence: of what the best leaves, if it was run again.
     """
-    place = names().index(GUSTS)
+    pressure = names().index(GUSTS)
     known = [best.column]
     if best.column == GUST_COLUMN:
-        evidence, reference, known = evidence.freed(place), reference.beside(), []
-    skipped = {GUST_COLUMN, best.column, *([] if known else [place])}
+        evidence, reference, known = evidence.freed(pressure), reference.beside(), []
+    skipped = {GUST_COLUMN, best.column, *([] if known else [pressure])}
     others = [w for w in ranking if w.column not in skipped and w.candidate.effect not in _SEEN]
     fits = [evidence.fit([*known, w.column]) for w in others]
     able = [

@@ -107,12 +107,12 @@ def control_warnings(verdict: Verdict) -> list[str]:
     """Where the wrong effect helps as much as the named one, or cannot be told from it: one sentence each."""
     found = []
     for c in verdict.comparisons:
-        if c.control is None or not known(c.control) or not known(c.after):
+        if c.apart is None or not known(c.apart):
             continue
-        if c.control.value <= c.after.value:
+        if c.apart.value <= 0:
             what = f"the control {c.control_name} does as well as the named effect: the attribution fails there"
             found.append(f"{_begun(c.what)}: {what}.")
-        elif c.apart is not None and c.apart.low <= 0:
+        elif c.apart.low <= 0:
             found.append(f"{_begun(c.what)}: the control {c.control_name} cannot be told from the named effect there.")
     return found
 

@@ -83,7 +83,9 @@ def test_a_control_that_does_as_well_as_the_named_effect_is_pointed_out() -> Non
     whole = verdict(Conclusion.EFFECT)
     assert sentences.control_warnings(whole) == []
     first = whole.comparisons[0]
-    failing = replace(whole, comparisons=(replace(first, control=first.after), *whole.comparisons[1:]))
+    failing = replace(
+        whole, comparisons=(replace(first, apart=replace(about(-0.2, 0.9), unit="1")), *whole.comparisons[1:])
+    )
     (warning,) = sentences.control_warnings(failing)
     assert warning.lower().startswith(first.what)
     assert "attribution fails" in warning
@@ -91,10 +93,10 @@ def test_a_control_that_does_as_well_as_the_named_effect_is_pointed_out() -> Non
 
 def test_a_control_that_cannot_be_told_from_the_named_effect_is_pointed_out() -> None:
     whole = verdict(Conclusion.EFFECT)
-    near, far = (replace(whole.comparisons[0], apart=about(0.0003, half)) for half in (0.0004, 0.0002))
+    near, far = (replace(whole.comparisons[0], apart=about(0.3, half, unit="1")) for half in (0.4, 0.2))
     (warning,) = sentences.control_warnings(replace(whole, comparisons=(near, far)))
     assert "cannot be told from the named effect" in warning
-    assert "worse by 0.3 mm [−0.1, 0.7]" in words(replace(whole, comparisons=(near,))).replace("\n    ", " ")
+    assert "worse by 0.3 [−0.1, 0.7] nat a segment" in words(replace(whole, comparisons=(near,))).replace("\n    ", " ")
 
 
 def test_a_reduction_whose_interval_holds_zero_is_pointed_out() -> None:

@@ -114,7 +114,7 @@ def comparison(what: str, before: float, *, with_after: bool, oracle: bool) -> C
         share=0.94 if with_after else None,
         control=about(0.93 * before, 0.0002) if with_after else None,
         control_name="tangential-linear-drag" if with_after else "",
-        apart=about(0.93 * before - after, 0.0003) if with_after else None,
+        apart=about(2.4, 0.9, unit="1") if with_after else None,
     )
 
 
