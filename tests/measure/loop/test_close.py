@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
-from measure.loop.close import Options, close_loop
+from measure.loop.close import Options, Solved, close_loop
 from measure.loop.columns import Calibration
 from measure.loop.nulls import NullBatch
-from measure.loop.verdict import Conclusion, Verdict
+from measure.loop.verdict import Conclusion, Estimate, Verdict
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 from sim.effects import EFFECTS, Effect
 
@@ -93,6 +94,22 @@ def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifte
     assert verdict.named == lifted.named
     # Single precision: the statistic to a few digits.
     assert verdict.test.statistic == pytest.approx(lifted.test.statistic, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("conclusion", "low", "doubtful"),
+    [
+        (Conclusion.EFFECT, -0.3, True), (Conclusion.PARTLY, -0.3, True), (Conclusion.EFFECT, 0.1, False),
+        (Conclusion.ONE_OF, -0.3, False),
+    ],
+)  # fmt: skip
+def test_an_effect_that_may_be_none_is_doubtful(conclusion: Conclusion, low: float, doubtful: bool) -> None:
+    first = SimpleNamespace(candidate=SimpleNamespace(null=0.0))
+    solved = SimpleNamespace(
+        larger=object(), judgement=SimpleNamespace(ranking=(first,), conclusion=conclusion),
+        strength=lambda weighed, larger: Estimate(value=0.5, low=low, high=1.4, unit="1"),
+    )  # fmt: skip
+    assert Solved.doubtful.__get__(solved) is doubtful
 
 
 def test_a_bank_of_other_segments_is_refused(specimen: Specimen, bank: Path) -> None:

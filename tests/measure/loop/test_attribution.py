@@ -1,0 +1,179 @@
+"""Judgements on made statistics, in which it is known what acts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from measure.loop.attribution import GUST_COLUMN, Judgement, finalists, judge, tied, withdrawn
+from measure.loop.bank import columns, names
+from measure.loop.columns import PRIOR, THETA, EffectColumn
+from measure.loop.inference import Evidence, NullModel, Nulls
+from measure.loop.reference import GUSTS, NullBank, Reference
+from measure.loop.statistics import Statistics
+from measure.loop.verdict import Conclusion
+
+Floats = NDArray[np.float64]
+KINDS, CLOTHS, WINDS, SEGMENTS = 20, 4, 4, 4
+COUNT = len(names())
+CLEAR = 6.0
+"""Response of a segment to an expected strength, in standard deviations of its errors."""
+
+
+def expected(column: int) -> float:
+    """The strength of a column that is expected where it acts."""
+    if column < len(THETA):
+        return float(PRIOR[column])
+    own = columns()[column - len(THETA)]
+    if not isinstance(own, EffectColumn):
+        return 0.5
+    low, high = (end - own.described.null for end in own.described.prior)
+    return high if high > -low else low
+
+
+EXPECTED = np.array([expected(column) for column in range(COUNT)])
+
+
+def drawn(rng: np.random.Generator, delta: Floats, numerics: Floats, speeds: Floats) -> Statistics:
+    """r = shift of the numerics + R δ + ε of recordings, with coefficients (segment, column) and ε ~ N(0, 1)."""
+    recording = np.repeat(np.arange(len(speeds)), SEGMENTS)
+    mixed = rng.normal(size=(len(recording), COUNT, COUNT)) + CLEAR * np.eye(COUNT)
+    response = mixed / np.abs(EXPECTED)
+    r = np.einsum("sij,sj->si", response, delta) + numerics[recording] + rng.normal(size=(len(recording), COUNT))
+    return Statistics(
+        recording=recording, r=r, response=response, error=np.ones(len(r)), marker_error=np.ones((len(r), 1))
+    )
+
+
+@pytest.fixture(scope="module")
+def bank() -> NullBank:
+    rng = np.random.default_rng(1)
+    recordings = KINDS * CLOTHS * WINDS
+    offsets = np.repeat(rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS * SEGMENTS, axis=0)
+    delta = np.concatenate([offsets, np.zeros((len(offsets), COUNT - len(THETA)))], axis=1)
+    shifts = np.repeat(rng.normal(size=(KINDS * CLOTHS, COUNT)), WINDS, axis=0)
+    speeds = rng.uniform(3, 8, recordings)
+    own = drawn(rng, delta, shifts, speeds)
+    nulls = Nulls(
+        statistics=own, speeds=speeds[own.recording], offsets=offsets, noise=np.zeros(len(offsets)),
+        numerics=np.repeat(np.arange(KINDS), CLOTHS * WINDS * SEGMENTS),
+    )  # fmt: skip
+    return NullBank(nulls=nulls, columns=names(), duration=2.0, words="made")
+
+
+@pytest.fixture(scope="module")
+def null(bank: NullBank) -> NullModel:
+    return bank.model()
+
+
+@pytest.fixture(scope="module")
+def reference(bank: NullBank) -> Reference:
+    return bank.reference(12, noise=0.0, seed=1)
+
+
+def judged(
+    null: NullModel, reference: Reference, acting: dict[str, float], *, gusts: float = 0.0, seed: int = 2
+) -> Judgement:
+    """Of three recordings with strengths in units of what is expected, and a pressure that fluctuates by `gusts`."""
+    rng = np.random.default_rng(seed)
+    delta = np.zeros((3 * SEGMENTS, COUNT))
+    for name, share in acting.items():
+        delta[:, names().index(name)] = share * EXPECTED[names().index(name)]
+    delta[:, names().index(GUSTS)] += gusts * rng.normal(size=len(delta))
+    speeds = np.array([3.5, 5.0, 7.0])
+    own = drawn(rng, delta, np.tile(rng.normal(size=COUNT), (3, 1)), speeds)
+    return judge(Evidence.of(own, speeds[own.recording], null), reference, level=0.02)
+
+
+def named(judgement: Judgement) -> list[str]:
+    return ["gusts" if column == GUST_COLUMN else names()[column] for column in judgement.named]
+
+
+def test_nothing_is_found_where_nothing_acts(null: NullModel, reference: Reference) -> None:
+    found = [judged(null, reference, {}, seed=seed).conclusion for seed in range(20)]
+    # At 2 %, three or more of twenty come once in 140 times.
+    assert sum(conclusion is not Conclusion.SUFFICIENT for conclusion in found) < 3
+
+
+@pytest.mark.parametrize(
+    "name", ["hem-mass.line_density", "lift.coefficient", "vertical-wind.inclination", "reactive-loading.mass"]
+)
+def test_an_effect_alone_is_named_alone(null: NullModel, reference: Reference, name: str) -> None:
+    found = judged(null, reference, {name: 1.0})
+    assert (found.conclusion, named(found)) == (Conclusion.EFFECT, [name])
+    strength = found.ranking[0].candidate.strength
+    assert strength.low < EXPECTED[names().index(name)] < strength.high
+
+
+def test_two_effects_are_both_named(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"lift.coefficient": 1.0, "hem-mass.line_density": 0.8})
+    assert found.conclusion is Conclusion.EFFECT
+    assert set(named(found)) == {"lift.coefficient", "hem-mass.line_density"}
+
+
+def test_a_pressure_that_fluctuates_is_called_gusts(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {}, gusts=0.5)
+    assert named(found) == ["gusts"]
+    # Half a relative deviation of the pressure is a quarter of the speed's; of twelve segments, known to a fifth.
+    assert found.ranking[0].candidate.strength.value == pytest.approx(0.25, rel=0.6)
+
+
+def test_a_pressure_that_differs_by_a_constant_is_not(null: NullModel, reference: Reference) -> None:
+    assert "gusts" not in named(judged(null, reference, {GUSTS: 1.0}))
+
+
+def test_an_effect_beside_gusts_is_named_with_them(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"hem-mass.line_density": 0.6}, gusts=1.0)
+    assert set(named(found)) == {"gusts", "hem-mass.line_density"}
+    assert found.conclusion is Conclusion.EFFECT
+
+
+def test_a_smooth_force_is_none_of_the_library(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"field.y.10": 2.0})
+    assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
+
+
+def test_a_strength_beyond_all_expectation_is_not_named(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"hem-mass.line_density": 6.0})
+    assert "hem-mass.line_density" not in named(found)
+    assert "not physical" in next(w for w in found.ranking if w.candidate.effect == "hem-mass").candidate.why_not
+
+
+def test_finalists_are_the_first_by_gain_and_by_statistic(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"lift.coefficient": 1.0})
+    chosen = finalists(found)
+    assert chosen[0] == found.ranking[0].column
+    assert GUST_COLUMN not in chosen
+    assert len(set(chosen)) == len(chosen) <= 4
+
+
+def test_what_is_withdrawn_is_no_longer_named_and_says_why(null: NullModel, reference: Reference) -> None:
+    found = withdrawn(judged(null, reference, {"lift.coefficient": 1.0}), "it failed")
+    assert (found.conclusion, found.named) == (Conclusion.OUTSIDE, ())
+    assert found.ranking[0].candidate.why_not == "it failed"
+
+
+def test_a_control_as_good_is_named_too(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"lift.coefficient": 1.0})
+    both = tied(found, found.ranking[1])
+    assert both.conclusion is Conclusion.ONE_OF
+    assert both.named == (found.ranking[0].column, found.ranking[1].column)
+    assert both.ranking[1].candidate.why_not == ""
+
+
+def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Reference) -> None:
+    """Of an effect whose model, run again, predicts nothing: another is first, or none."""
+    from measure.loop.again import Rerun
+
+    rng = np.random.default_rng(2)
+    delta = np.zeros((12, COUNT))
+    place = names().index("lift.coefficient")
+    delta[:, place] = EXPECTED[place]
+    speeds = np.array([3.5, 5.0, 7.0])
+    own = drawn(rng, delta, np.zeros((3, COUNT)), speeds)
+    evidence = Evidence.of(own, speeds[own.recording], null)
+    linear = judge(evidence, reference, level=0.02)
+    assert linear.named == (place,)
+    useless = Rerun(coefficient=0.1, gains=np.full(12, -1.0), leftover=0.5, evidence=evidence)
+    assert place not in judge(evidence, reference, level=0.02, again={place: useless}).named
