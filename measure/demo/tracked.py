@@ -1,4 +1,4 @@
-"""A tracked flag as a user would bring it: a table of markers from two winds, and a recipe that says what is known.
+"""A tracked flag as a user would bring it: a table of markers from three winds, and a recipe that says what is known.
 
 What acts on the cloth beside the base model is drawn here and written nowhere but into the returned `Tracks`, so that
 closing the loop can be held against it. Mesh, step and method are none of those that the fit uses.
@@ -73,7 +73,7 @@ class TrackedRecipe:
     effect: str = "lift"
     parameter: str = "coefficient"
     strength: float = 2.0
-    speeds: tuple[float, ...] = (4.0, 7.0)
+    speeds: tuple[float, ...] = (4.0, 5.5, 7.0)
     duration: float = 6.0
     settle: float = 3.0
     rate: float = 25.0

@@ -286,7 +286,8 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
         own = fluctuation(evidence.select(evidence.recording == index), place)
         by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
     return Weighed(
-        column=GUST_COLUMN, gains=gained, recording=evidence.recording, admissible=True, error=found.error / 2,
+        column=GUST_COLUMN, gains=gained, recording=evidence.recording, error=found.error / 2,
+        admissible=bool(found.deviation > _REACH * found.error),
         candidate=Candidate(
             effect="gusts", parameter="intensity", null=described.null,
             strength=estimate(found.deviation / 2, found.error / 2, described.unit), z=math.sqrt(statistic),
@@ -335,6 +336,8 @@ def _behind(best: Weighed, other: Weighed) -> float:
 
 
 def _reason(best: Weighed, other: Weighed) -> str:
+    if not other.admissible and other.column == GUST_COLUMN:
+        return "their intensity cannot be told from none"
     if not other.admissible:
         strength = other.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"

@@ -242,7 +242,8 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
         near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
         made.append(
             compare(
-                fold, frames=int(fold.outside.sum()) * frames, before=before, after=after,
+                fold, recording=setting.recording[fold.outside], frames=int(fold.outside.sum()) * frames,
+                before=before, after=after,
                 control=wrong[0] if wrong else None, floor=floor[near],
                 control_name="" if control is None else control[0].candidate.effect,
             )

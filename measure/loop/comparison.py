@@ -70,11 +70,14 @@ def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
     Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
     single segment, segments are taken to be drawn from all.
     """
-    own = [values[recording == index] for index in np.unique(recording)]
-    strata = own if min(len(part) for part in own) > 1 else [values]
-    if len(strata[0]) < 2:
+    if len(values) < 2:
         return math.inf
-    return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in strata))
+    return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in _strata(values, recording)))
+
+
+def _strata(values: Floats, recording: NDArray[np.int64]) -> list[Floats]:
+    own = [values[recording == index] for index in np.unique(recording)]
+    return own if min(len(part) for part in own) > 1 else [values]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -165,6 +168,7 @@ def _squared(errors: Floats) -> Floats:
 def compare(
     fold: Fold,
     *,
+    recording: NDArray[np.int64],
     frames: int,
     before: LeftOut,
     after: LeftOut,
@@ -175,6 +179,7 @@ def compare(
     """Errors of the segments left out.
 
     Args:
+        recording: (segment,) of those left out.
         floor: (segment,) mean squared distances of data simulated from the larger model, which it predicts with other
             numerics [m²].
     """
@@ -186,13 +191,17 @@ def compare(
         what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
         floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(old.mean()) else None,
         control=None if control is None else root(control.squared), control_name=control_name,
-        apart=None if control is None else a_segment(control.misfit - after.misfit),
+        apart=None if control is None else a_segment(control.misfit - after.misfit, recording),
     )  # fmt: skip
 
 
-def a_segment(values: Floats) -> Estimate:
-    """Mean of misfits over segments, with Student's interval [nat]."""
-    value, reach = float(values.mean()), _reach(values)
+def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:
+    """Mean of misfits over segments, drawn within recordings, with Student's interval [nat]."""
+    value, reach = float(values.mean()), math.inf
+    if len(values) > 1:
+        free = len(values) - len(_strata(values, recording))
+        quantile = float(student.ppf(0.5 + _LEVEL / 2, free))
+        reach = quantile * total_error(values, recording) / len(values)
     return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=_LEVEL)
 
 

@@ -47,17 +47,18 @@ def retest(
     def left(model: Model) -> LeftOut:
         return measured(setting.forecaster, setting.segments, model, yardstick, ~seen)
 
-    first, second = left(before), left(after)
+    first, second, recording = left(before), left(after), setting.recording[~seen]
     wrong = None if control is None else left(control)
     _, floor = numerical_floor(
-        setting, np.unique(setting.recording[~seen]), after, copies=_FLOOR_COPIES, seed=seed
+        setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed
     )  # fmt: skip
     room = float(first.squared.mean()) - min(float(floor.mean()), float(first.squared.mean()))
     gained = float(first.squared.mean() - second.squared.mean())
     return Retest(
         what=words, segments=int((~seen).sum()), before=root(first.squared), after=root(second.squared),
-        reduction=paired(first.squared, second.squared), helped=a_segment(first.misfit - second.misfit),
+        reduction=paired(first.squared, second.squared), helped=a_segment(first.misfit - second.misfit, recording),
         floor=root(floor), share=gained / room if room > _ROOM * float(first.squared.mean()) else None,
         control=None if wrong is None else root(wrong.squared),
-        apart=None if wrong is None else a_segment(wrong.misfit - second.misfit), control_names=tuple(control_names),
+        apart=None if wrong is None else a_segment(wrong.misfit - second.misfit, recording),
+        control_names=tuple(control_names),
     )  # fmt: skip
