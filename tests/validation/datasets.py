@@ -95,10 +95,11 @@ def _artifacts(lake: Path) -> int:
 def evidence(unbroken: Built, killed: Built) -> dict[str, Any]:
     """All that is found in the two lakes, as JSON."""
     recipe, lake = load(RECIPE), Lake.open(unbroken.lake)
-    rows = lake.rows(columns=["kind", "object_bytes"]).to_pylist()
+    rows = lake.rows(columns=["kind", "object", "object_bytes"]).to_pylist()
+    sizes = {row["object"]: row["object_bytes"] or 0 for row in rows}  # clips are rows of their recording's object
     return {
         "recipe": recipe.name, "recipe_hash": recipe.hash, "workers": WORKERS,
-        "rows": dict(Counter(row["kind"] for row in rows)), "bytes": sum(row["object_bytes"] or 0 for row in rows),
+        "rows": dict(Counter(row["kind"] for row in rows)), "bytes": sum(sizes.values()),
         "seconds_unbroken": unbroken.seconds, "seconds_after_last_kill": killed.seconds,
         "artifacts_at_kills": list(killed.kills), "comparison": compare(lake, Lake.open(killed.lake)),
         "problems": [finding.kind for finding in doctor(lake) if finding.severity != "note"],
