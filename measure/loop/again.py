@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from measure.loop.bank import columns, names
-from measure.loop.comparison import left_out
+from measure.loop.comparison import LeftOut, left_out
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, left_together
 from measure.loop.reference import Reference
@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fits:
-    """Models of one experiment beyond the linear, each fitted once.
+    """Models of one experiment beyond the linear: each is fitted once, and once without the same segments.
 
     Attributes:
         yardstick: the measure; its statistics at the nominal model are where the fits begin.
@@ -36,6 +36,7 @@ class Fits:
     segments: Segments
     yardstick: Yardstick
     _made: dict[tuple[int, ...], Refined | None] = field(default_factory=dict)
+    _left: dict[tuple[tuple[int, ...], bytes], LeftOut] = field(default_factory=dict)
 
     def of(self, chosen: Sequence[int]) -> Refined | None:
         """The base model with some columns of the library; None if its cloth diverges."""
@@ -46,6 +47,13 @@ class Fits:
             except DivergedError:
                 self._made[key] = None
         return self._made[key]
+
+    def left_out(self, fitted: Refined, outside: NDArray[np.bool_]) -> LeftOut:
+        """Of one of these models, fitted to the other segments alone."""
+        key = (fitted.chosen, outside.tobytes())
+        if key not in self._left:
+            self._left[key] = left_out(self.forecaster, self.segments, fitted, self.yardstick, outside)
+        return self._left[key]
 
     @property
     def base(self) -> Refined:
@@ -87,7 +95,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
     parts = [together == index for index in np.unique(together)]
 
     def left(fitted: Refined) -> list[Floats]:
-        return [left_out(fits.forecaster, fits.segments, fitted, fits.yardstick, outside).misfit for outside in parts]
+        return [fits.left_out(fitted, outside).misfit for outside in parts]
 
     def rerun(column: int) -> Rerun | None:
         fitted = fits.of((column,))
@@ -100,7 +108,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
             gains[outside] = old - new
         return Rerun(
             coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
-            leftover=_leftover(reference, evidence, column), evidence=evidence,
+            leftover=reference.p_left_by(evidence, names(), [column]), evidence=evidence,
         )  # fmt: skip
 
     with ThreadPoolExecutor(max_workers=workers) as pool:
@@ -108,8 +116,3 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
         before = left(fits.base)
         found = dict(zip(candidates, pool.map(rerun, candidates), strict=True))
     return {column: made for column, made in found.items() if made is not None}
-
-
-def _leftover(reference: Reference, evidence: Evidence, column: int) -> float:
-    statistics = reference.statistics(evidence, names(), [column])
-    return reference.p_global(statistics, evidence.fit([column]).left)

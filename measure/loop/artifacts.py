@@ -132,7 +132,8 @@ def fingerprint(experiment: Experiment) -> str:
     material = specimen.material
     total = hashlib.sha256()
     total.update(canonical({
-        "held": list(specimen.held), "stiffness": repr(specimen.stiffness), "gravity": list(specimen.gravity),
+        "held": list(specimen.held), "stiffness": repr(specimen.stiffness),
+        "anchors-told": specimen.anchors_told, "gravity": list(specimen.gravity),
         "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
         "material": [material.density, material.damping],
         "recordings": [[r.rate, r.noise] for r in experiment.recordings],

@@ -49,6 +49,10 @@ _BEYOND = 3.0
 _BETTER = 1.5
 """A mode of the corrective field whose statistic is larger by this factor says that the library has no answer."""
 
+NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
+NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
+"""Why an effect named is withdrawn."""
+
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
 """Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
 
@@ -159,12 +163,8 @@ def finalists(judgement: Judgement) -> tuple[int, ...]:
     return tuple(dict.fromkeys(w.column for w in (*able[:_RUN_AGAIN], *strongest[:_RUN_AGAIN])))
 
 
-NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
-NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
-
-
 def withdrawn(judgement: Judgement, reason: str) -> Judgement:
-    """The same, once the effect named has failed, for one of the reasons above."""
+    """The same, once the effect named has failed, for `NO_HELP` or `NOT_APART`."""
     ranking = tuple(
         replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in judgement.named else w
         for w in judgement.ranking
@@ -210,7 +210,7 @@ def _second(
     chosen, gained = others[able[leader]], pairs[1 + leader] - pairs[0]
     value, error = _beside(evidence, fits[able[leader]], chosen)
     lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _REACH * error
-    return chosen if lasting and _leftover(evidence, reference, fits[able[leader]].active) > level else None
+    return chosen if lasting and reference.p_left_by(evidence, names(), [*known, chosen.column]) > level else None
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
@@ -231,13 +231,6 @@ def _plausible(described: Parameter, coefficient: float, error: float) -> bool:
     return least <= described.null + coefficient <= most and abs(coefficient) - _FAR * error <= reach
 
 
-def _leftover(evidence: Evidence, reference: Reference, active: Sequence[int]) -> float:
-    """p-value of the global test on what some columns leave."""
-    chosen = [column for column in active if _FIRST <= column < evidence.columns]
-    statistics = reference.statistics(evidence, names(), chosen)
-    return reference.p_global(statistics, evidence.fit(chosen).left)
-
-
 def _weigh(
     evidence: Evidence,
     reference: Reference,
@@ -253,7 +246,7 @@ def _weigh(
     statistic = float(statistics[column])
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
     z = value / error if error > 0 else 0.0
-    gained, leftover = linear, again.leftover if again is not None else _leftover(evidence, reference, fit.active)
+    gained, leftover = linear, again.leftover if again else reference.p_left_by(evidence, names(), [column])
     if again is not None:
         gained, value = again.gains, again.coefficient
     null = effect.described.null
@@ -293,14 +286,9 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
             strength=estimate(found.deviation / 2, found.error / 2, described.unit), z=math.sqrt(statistic),
             p_value=reference.p_alone(statistic, len(names())), p_family=reference.p_family(statistic),
             gain=float(gained.sum()), gain_error=total_error(gained, evidence.recording), behind=0.0,
-            leftover=_beside_gusts(evidence, reference), by_recording=tuple(by_recording),
+            leftover=reference.beside().p_left_by(evidence.freed(place), names(), ()), by_recording=tuple(by_recording),
         ),
     )  # fmt: skip
-
-
-def _beside_gusts(evidence: Evidence, reference: Reference) -> float:
-    """p-value of the global test where the pressure is free in every segment."""
-    return _leftover(evidence.freed(names().index(GUSTS)), reference.beside(), ())
 
 
 def estimate(value: float, error: float, unit: str) -> Estimate:

@@ -7,7 +7,7 @@ a design: an amortised null.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from io import BytesIO
@@ -26,7 +26,8 @@ from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics, statistics
-from measure.observe.trajectory import Floats, Specimen
+from measure.observe.anchors import as_seen
+from measure.observe.trajectory import Floats, Specimen, Trajectory
 from sim.integrate.split import SplitEuler
 
 BATCH = 16
@@ -87,15 +88,29 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings)
-    forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     nominal = Calibration()
-    found = statistics(forecaster, segments, [nominal] * len(segments), weighed)
+    parts: list[Statistics] = []
+    for specimen, places in _experiments(batch, recordings):
+        own = segments.select(np.flatnonzero(np.isin(segments.recording, places)))
+        forecaster = Forecaster(specimen=specimen, markers=batch.markers, integrator=SplitEuler())
+        parts.append(statistics(forecaster, own, [nominal] * len(own), weighed))
+    found = Statistics.joined(parts)
     offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
         numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
     )  # fmt: skip
     return nulls, segments.duration
+
+
+def _experiments(batch: NullBatch, recordings: Sequence[Trajectory]) -> Iterator[tuple[Specimen, list[int]]]:
+    """Cloths of a batch as their recordings show them, with the places of these; one for all where they are one."""
+    if batch.specimen.anchors_told:
+        yield batch.specimen, list(range(len(recordings)))
+        return
+    for cloth in dict.fromkeys(batch.calibrations):
+        places = [place for place, own in enumerate(batch.calibrations) if own == cloth]
+        yield as_seen(batch.specimen, [recordings[place] for place in places]), places
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
@@ -126,7 +141,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
-        duration=np.array(duration),
+        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -148,6 +163,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []
     durations: set[float] = set()
+    told: set[bool] = set()
     count = 0
     for path in paths:
         try:
@@ -157,7 +173,7 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or "noise" not in content:
+        if tuple(content["columns"]) != names() or "anchors_told" not in content:
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
@@ -171,13 +187,17 @@ def load(folder: Path, *, words: str) -> NullBank:
             )
         )  # fmt: skip
         durations.add(round(float(content["duration"]), 1))
+        told.add(bool(content["anchors_told"]))
         count = int(own.recording.max()) + 1
-    if len(durations) > 1:
+    if len(durations) > 1 or len(told) > 1:
+        lengths = ", ".join(f"{d:g} s" for d in sorted(durations))
         raise CorruptError(
-            f"segments of {', '.join(f'{d:g} s' for d in sorted(durations))}", where=str(folder),
-            fix="build a bank of one design into a folder of its own",
+            f"segments of {lengths}, anchors {' and '.join('told' if t else 'taken from recordings' for t in told)}",
+            where=str(folder), fix="build a bank of one design into a folder of its own",
         )  # fmt: skip
-    return NullBank(nulls=_joined(parts), columns=names(), duration=durations.pop(), words=words)
+    return NullBank(
+        nulls=_joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_told=told.pop()
+    )
 
 
 def _joined(parts: Sequence[Nulls]) -> Nulls:

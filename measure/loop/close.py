@@ -36,7 +36,7 @@ from measure.loop.attribution import (
     withdrawn,
 )
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
-from measure.loop.comparison import Fold, LeftOut, Predictions, Trial, compare, folds, left_out, predict
+from measure.loop.comparison import Fold, LeftOut, Predictions, Trial, compare, folds, predict
 from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
 from measure.loop.reference import NullBank, Reference
@@ -110,9 +110,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
-    reference = bank.reference(
-        len(setting.segments), noise=max(s.noise for s in setting.segments.items), seed=options.seed
-    )
+    reference = bank.reference(len(setting.segments), noise=float(setting.segments.noise.max()), seed=options.seed)
     yardstick = Yardstick(found=found, projection=projection, null=bank.model(), speeds=speeds)
     evidence = yardstick.evidence(found)
     fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
@@ -223,8 +221,7 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     every = folds(setting.segments, [float(u) for u in setting.speeds])
 
     def left(fold: Fold) -> list[LeftOut]:
-        yardstick = solved.fits.yardstick
-        return [left_out(setting.forecaster, setting.segments, model, yardstick, fold.outside) for model in fitted]
+        return [solved.fits.left_out(model, fold.outside) for model in fitted]
 
     with ThreadPoolExecutor(max_workers=options.workers) as pool:
         simulated = pool.submit(

@@ -95,7 +95,7 @@ class Predictions:
 
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
     """Each recording left out in turn, where there are two or more, and the last third of every recording."""
-    recording = np.array([s.recording for s in segments.items])
+    recording = segments.recording
     result: list[Fold] = []
     if len(np.unique(recording)) > 1:
         result += [

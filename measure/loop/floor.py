@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from measure.loop.forecast import Segments
 from measure.loop.model import Model
 from measure.loop.nulls import NullBatch
 from measure.loop.setting import Setting
+from measure.observe.anchors import as_seen
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +40,8 @@ def numerical_floor(
         speeds=tuple(float(u) for u in setting.speeds[simulated]),
         seed=child_seed(seed, "floor"), effects=model.acting,
     )  # fmt: skip
-    segments = Segments.of(batch.simulate())
-    squared = predict(setting.forecaster, segments, model).squared
-    return simulated[[s.recording for s in segments.items]], squared
+    made = batch.simulate()
+    segments = Segments.of(made)
+    forecaster = replace(setting.forecaster, specimen=as_seen(batch.specimen, made))
+    squared = predict(forecaster, segments, model).squared
+    return simulated[segments.recording], squared

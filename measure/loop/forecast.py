@@ -125,6 +125,16 @@ class Segments:
         """Some of them."""
         return replace(self, items=tuple(self.items[i] for i in indices))
 
+    @cached_property
+    def recording(self) -> NDArray[np.int64]:
+        """(segment,) index of each one's recording."""
+        return np.array([item.recording for item in self.items])
+
+    @cached_property
+    def noise(self) -> Floats:
+        """(segment,) of a coordinate [m]."""
+        return np.array([item.noise for item in self.items])
+
     @property
     def first(self) -> int:
         """The first frame of a segment that counts."""

@@ -79,6 +79,7 @@ class NullBank:
         columns: names of the columns.
         duration: of a segment [s].
         words: how they were made.
+        anchors_told: whether they were predicted with the anchors they were simulated with.
 
     Raises:
         InputError: too few of them, or all of the same numerics.
@@ -88,6 +89,7 @@ class NullBank:
     columns: tuple[str, ...]
     duration: float
     words: str
+    anchors_told: bool = True
 
     def __post_init__(self) -> None:
         count, kinds = len(np.unique(self.nulls.statistics.recording)), len(np.unique(self.nulls.numerics))
@@ -212,6 +214,10 @@ class Reference:
     def p_left(self, left: float) -> float:
         """Share of the groups in which the base model leaves at least this, for their noise."""
         return _p(self.left, left / self.usual)
+
+    def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
+        """Of the global test on what some columns leave, fitted to the data."""
+        return self.p_global(self.statistics(evidence, columns, chosen), evidence.fit(chosen).left)
 
     def p_global(self, statistics: Floats, left: float) -> float:
         """Of the global test, Bonferroni's of two: the largest statistic (4/5 of the level), what is left (1/5)."""

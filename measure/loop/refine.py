@@ -162,8 +162,7 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
     for place, size in enumerate(sizes):
         moved = model.moved(tuple(size if k == place else 0.0 for k in range(len(sizes))))
         changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / size)
-    noise = np.array([s.noise for s in segments.items])
-    return reduced(base, changes, np.array([s.recording for s in segments.items]), noise)
+    return reduced(base, changes, segments.recording, segments.noise)
 
 
 def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:

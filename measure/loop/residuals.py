@@ -24,7 +24,7 @@ def residuals(
     Args:
         held_out: whether each recording's were made by models that were not fitted to it.
     """
-    recording = np.array([s.recording for s in segments.items])
+    recording = segments.recording
     made: list[Residual] = []
     for index, own in enumerate(experiment.recordings):
         places = np.flatnonzero(recording == index)

@@ -44,4 +44,4 @@ class Setting:
     @property
     def recording(self) -> NDArray[np.int64]:
         """(segment,) index of each one's recording."""
-        return np.array([s.recording for s in self.segments.items])
+        return self.segments.recording

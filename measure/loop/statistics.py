@@ -137,12 +137,12 @@ def _pieces(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> Iterator[tuple[Statistics, list[Tensor], Tensor]]:
     """Statistics of some segments at a time, with the sensitivities and the scale of their errors."""
-    recording = np.array([s.recording for s in segments.items])
+    recording = segments.recording
     # Segments of one recording share weights, and so stay in one chunk.
     for chosen in _chunks(recording):
         own = segments.select(chosen)
         starts = [calibrations[i] for i in chosen]
-        noise = np.array([s.noise for s in own.items])
+        noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.calibration_sensitivities(own, starts, base)
         changes += [forecaster.sensitivity(column, own, starts, base) for column in columns]

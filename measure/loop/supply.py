@@ -17,7 +17,7 @@ def given(folder: Path, setting: Setting) -> NullBank:
     """The bank of a folder, made as `measure.loop.bank` does.
 
     Raises:
-        InputError: its segments are of another length than the recordings'.
+        InputError: its segments or anchors are not like the recordings'.
         FlagdataError: as `measure.loop.bank.load`.
     """
     bank = banks.load(folder, words=f"over priors, from {folder.name}")
@@ -29,8 +29,14 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
     """Refuse nulls that do not fit the recordings.
 
     Raises:
-        InputError: segments of another length.
+        InputError: segments of another length, or anchors known in another way.
     """
+    if bank.anchors_told != setting.experiment.specimen.anchors_told:
+        ways = ("taken from where the recordings show the attachments", "told")
+        raise InputError(
+            f"its anchors were {ways[bank.anchors_told]}, those of the recordings are {ways[not bank.anchors_told]}",
+            where=where, fix="simulate nulls for these recordings: leave the bank out",
+        )  # fmt: skip
     if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
         raise InputError(
             f"its segments last {bank.duration:.2g} s, those of the recordings {setting.segments.duration:.2g} s",

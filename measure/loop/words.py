@@ -90,10 +90,11 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     size = np.ptp(specimen.mesh.rest, axis=0)
     air = specimen.air.plain
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
+    places = "" if specimen.anchors_told else ", tied where they are seen on the average"
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
-        f"it is held at {len(specimen.held)} points {held}",
+        f"it is held at {len(specimen.held)} points {held}{places}",
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
         "the wind at the flag is the logged one, the same all over it",
         "density, bending and internal damping are free: what only changes them is no effect",

@@ -11,9 +11,9 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from measure.observe import cloth, noise
+from measure.observe.anchors import anchors_of
 from measure.observe.checks import attachment, frames, inertia, shape, surroundings
 from measure.observe.gaps import fill_positions
-from measure.observe.interpolation import onto
 from measure.observe.observation import Known, Observation
 from measure.observe.pins import hold
 from measure.observe.setup import Hold, Setup
@@ -49,7 +49,8 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     known = [seen.known for seen in prepared]
     mesh, held = hold(mesh, _pins(known, setup, low))
     specimen = Specimen(
-        mesh=mesh, material=_material(known, setup), held=held, anchors=_anchors(recordings, mesh.rest[list(held)]),
+        mesh=mesh, material=_material(known, setup), held=held,
+        anchors=anchors_of(recordings, mesh.rest[list(held)]), anchors_told=False,
         stiffness=_agreed([k.stiffness for k in known], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins"),
         gravity=(
             _agreed([k.gravity for k in known], None, GRAVITY, "gravity")
@@ -204,12 +205,6 @@ def _pins(known: Sequence[Known], setup: Setup, low: Floats) -> Hold | Floats:
                 "recordings whose cloth is held differently", where="cloth", fix="take those with the same pins"
             )
     return given[0] - low
-
-
-def _anchors(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
-    """(held, 3) where the held points are on the average of all frames [m], each recording counting alike."""
-    means = [onto(r.markers, seats) @ r.positions.mean(axis=0) for r in recordings]
-    return np.mean(means, axis=0)
 
 
 T = TypeVar("T")

@@ -129,6 +129,7 @@ class Specimen:
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
+        anchors_told: whether `anchors` are known by themselves, not taken from where recordings show the attachments.
         gravity: (x, y, z) [m/s²].
         air: the base model's force.
 
@@ -141,6 +142,7 @@ class Specimen:
     held: tuple[int, ...]
     anchors: Floats
     stiffness: float = ARCSIM_STIFFNESS
+    anchors_told: bool = True
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
 

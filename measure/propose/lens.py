@@ -68,20 +68,12 @@ class Lens:
 
     def yardstick(self, null: NullModel, of_recordings: Floats) -> Yardstick:
         """The measure of any model's errors along the lens, of speeds by recording [m/s]."""
-        recording, noise = self._recording, self._noise
+        recording, noise = self.segments.recording, self.segments.noise
         return Yardstick(
             found=reduced(self.base, self.directions, recording, noise),
             projection=Projection.along(self.directions, error_scale(self.base, recording, noise)),
             null=null, speeds=self.speeds(of_recordings),
         )  # fmt: skip
-
-    @property
-    def _recording(self) -> NDArray[np.int64]:
-        return np.array([s.recording for s in self.segments.items])
-
-    @property
-    def _noise(self) -> Floats:
-        return np.array([s.noise for s in self.segments.items])
 
     @property
     def calibrated(self) -> Statistics:
@@ -113,13 +105,13 @@ class Lens:
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
         """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
-        found = reduced(base, [*self.directions, *changes], self._recording, self._noise)
+        found = reduced(base, [*self.directions, *changes], self.segments.recording, self.segments.noise)
         count = len(self.directions)
         return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
 
     def speeds(self, of_recordings: Floats) -> Floats:
         """(segment,) of the wind [m/s], of speeds by recording."""
-        return of_recordings[self._recording]
+        return of_recordings[self.segments.recording]
 
 
 def evidence(found: Statistics, speeds: Floats, null: NullModel) -> Evidence:

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from measure.loop.columns import Calibration, Column
@@ -121,5 +119,4 @@ def _statistics(forecaster: Forecaster, segments: Segments, columns: Sequence[Co
     changes = forecaster.calibration_sensitivities(segments, nominal, base)
     along = of_columns(forecaster, segments, base, columns)
     changes += [along[column.name] for column in columns]
-    recording: NDArray[np.int64] = np.array([s.recording for s in segments.items])
-    return reduced(base, changes, recording, np.array([s.noise for s in segments.items]))
+    return reduced(base, changes, segments.recording, segments.noise)

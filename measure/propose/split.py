@@ -37,7 +37,7 @@ def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
     Raises:
         InputError: too few segments.
     """
-    recording = np.array([s.recording for s in segments.items])
+    recording = segments.recording
     seen = np.ones(len(recording), dtype=bool)
     words = "the last third of each recording"
     for index in np.unique(recording):

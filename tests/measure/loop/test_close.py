@@ -119,6 +119,12 @@ def test_a_bank_of_other_segments_is_refused(specimen: Specimen, bank: Path) -> 
         close_loop(Experiment(specimen=specimen, recordings=short), Options(bank=bank))
 
 
+def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen, bank: Path) -> None:
+    data = recorded(replace(specimen, anchors_told=False), seed=5)
+    with pytest.raises(InputError, match="anchors were told, those of the recordings are taken from where"):
+        close_loop(data, Options(bank=bank))
+
+
 @pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"nulls": 10}, {"workers": 0}])
 def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(UsageError):

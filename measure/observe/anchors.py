@@ -1,0 +1,28 @@
+"""Where the attachments are tied, as far as recordings show it.
+
+The wind draws an attachment away from its anchor by what its spring yields, so that anchors taken from recordings are
+off by that. Whatever is compared with such recordings has to take its anchors in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from measure.observe.interpolation import onto
+from measure.observe.trajectory import Floats, Specimen, Trajectory
+
+
+def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
+    """(held, 3) where points (held, 2) of the cloth are on the average of all frames [m], recordings counting alike."""
+    means = [onto(r.markers, seats) @ r.positions.mean(axis=0) for r in recordings]
+    return np.mean(means, axis=0)
+
+
+def as_seen(specimen: Specimen, recordings: Sequence[Trajectory]) -> Specimen:
+    """The cloth with its anchors taken from these recordings; itself where its anchors are told."""
+    if specimen.anchors_told:
+        return specimen
+    return replace(specimen, anchors=anchors_of(recordings, specimen.mesh.rest[list(specimen.held)]))

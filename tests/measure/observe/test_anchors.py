@@ -1,0 +1,38 @@
+"""Anchors taken from recordings: the mean place of each attachment, and only where they are not told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from measure.observe.anchors import anchors_of, as_seen
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+
+PULL = np.array([2e-3, 0.0, -1e-3])
+
+
+def flat(specimen: Specimen, name: str, moved: np.ndarray, frames: int) -> Trajectory:
+    """The flag upright in the plane, displaced and swinging about it by 1 cm across the wind."""
+    rest = specimen.mesh.rest
+    place = np.stack([rest[:, 0], 0 * rest[:, 0], rest[:, 1]], axis=1) + moved
+    swing = 0.01 * np.sin(2 * np.pi * np.arange(frames) / frames)
+    positions = place + swing[:, None, None] * np.array([0.0, 1.0, 0.0])
+    return Trajectory(
+        name=name, markers=rest, positions=positions, rate=25.0, wind=WindTrack.constant((4.0, 0.0, 0.0))
+    )
+
+
+def test_recordings_count_alike_whatever_their_length(specimen: Specimen) -> None:
+    recordings = [flat(specimen, "a", np.zeros(3), 20), flat(specimen, "b", PULL, 60)]
+    seats = specimen.mesh.rest[list(specimen.held)]
+    expected = np.stack([seats[:, 0], 0 * seats[:, 0], seats[:, 1]], axis=1) + PULL / 2
+    np.testing.assert_allclose(anchors_of(recordings, seats), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_what_is_told_stays(specimen: Specimen, told: bool) -> None:
+    known = replace(specimen, anchors_told=told)
+    found = as_seen(known, [flat(specimen, "a", PULL, 20)])
+    np.testing.assert_allclose(found.anchors - specimen.anchors, np.zeros((2, 3)) + (0 if told else PULL), atol=1e-12)
