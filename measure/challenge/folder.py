@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.provenance import canonical, digest, file_hash
+from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 from sim import handles as held
 from sim.material import named
@@ -191,7 +192,7 @@ def read_set(folder: Path) -> Experiment:
         markers = np.load(folder / "markers.npy")
         specimen = Specimen(
             mesh=mesh, material=named(flag["material"]), held=held.corners(mesh.rest), anchors=np.array(flag["pins"]),
-            stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]),
+            stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]), anchors_told=False,
         )  # fmt: skip
         recordings = tuple(
             Trajectory(
@@ -204,4 +205,4 @@ def read_set(folder: Path) -> Experiment:
         )  # fmt: skip
     except (KeyError, ValueError, OSError) as error:
         raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
-    return Experiment(specimen=specimen, recordings=recordings)
+    return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)

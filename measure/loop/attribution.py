@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
-from measure.loop.columns import THETA, EffectColumn, FieldColumn
+from measure.loop.columns import THETA, EffectColumn
 from measure.loop.comparison import total_error
 from measure.loop.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.inference import Evidence, Fit, gains
@@ -47,7 +47,7 @@ _RUN_AGAIN = 2
 _BEYOND = 3.0
 """A strength so many times what is expected of it, beyond its error, is not physical."""
 _BETTER = 1.5
-"""A mode of the corrective field whose statistic is larger by this factor says that the library has no answer."""
+"""A corrective field whose statistic is larger by this factor says that the library has no answer."""
 
 NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
 NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
@@ -107,7 +107,7 @@ def judge(
     statistics = reference.statistics(evidence, names())
     statistic, p_value = float(statistics.max()), reference.p_global(statistics, evidence.fit(()).left)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
-    smooth = [i + _FIRST for i, c in enumerate(columns()) if isinstance(c, FieldColumn)]
+    corrective = [i + _FIRST for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
     held_out = gains(evidence, [[i] for i, _ in effects])
     weighed = [
         _weigh(evidence, reference, column, effect, own, statistics, (again or {}).get(column))
@@ -133,27 +133,31 @@ def judge(
     if not best.admissible or best.gains.sum() <= 0:
         reasons[best.column] = "no effect of the library predicts unseen recordings better than the base model"
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    if _field_leads(evidence, best, smooth, statistics):
-        reasons[best.column] = "a smooth force field explains more than any effect of the library"
+    rerun = (again or {}).get(best.column)
+    if _field_leads(evidence, best, corrective, statistics, beyond_linear=rerun is not None):
+        reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
     if best.candidate.leftover > level:
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
-    rerun = (again or {}).get(best.column)
     second = _second(evidence if rerun is None else rerun.evidence, reference, best, ranking, level)
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
 
 
-def _field_leads(evidence: Evidence, best: Weighed, smooth: Sequence[int], statistics: Floats) -> bool:
-    """Whether a mode of the corrective field says that the library has no answer.
+def _field_leads(
+    evidence: Evidence, best: Weighed, corrective: Sequence[int], statistics: Floats, *, beyond_linear: bool
+) -> bool:
+    """Whether a corrective field says that the library has no answer.
 
-    A pressure that fluctuates pushes steady modes by chance: against gusts, the mode must also predict better.
+    A pressure that fluctuates pushes steady fields by chance, and a strong effect is far from linear: against gusts,
+    and against a model that was run again, the field must also predict better.
     """
-    mode = max(smooth, key=lambda column: float(statistics[column]))
-    larger = best.candidate.z**2 * _BETTER < float(statistics[mode])
-    return larger and (best.column != GUST_COLUMN or gains(evidence, [[mode]]).sum() > best.gains.sum())
+    field = max(corrective, key=lambda column: float(statistics[column]))
+    larger = best.candidate.z**2 * _BETTER < float(statistics[field])
+    unlike = beyond_linear or best.column == GUST_COLUMN
+    return larger and (not unlike or gains(evidence, [[field]]).sum() > best.gains.sum())
 
 
 def finalists(judgement: Judgement) -> tuple[int, ...]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
 from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
@@ -20,7 +19,7 @@ import torch
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
-from measure.loop.columns import THETA, Calibration, Column, fields, library
+from measure.loop.columns import THETA, Calibration, Column, fields, library, motions
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
@@ -30,16 +29,17 @@ from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 from sim.integrate.split import SplitEuler
 
-BATCH = 16
+BATCH = 8
 WINDS = 4
-"""Recordings of one cloth, so that a batch holds four null experiments."""
+"""Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
+by the cloth, so that few cloths of many numerics say more than many of few."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
 
 def columns() -> tuple[Column, ...]:
-    """What is weighed beside the calibrated parameters: the library's strengths, then the corrective field's modes."""
-    return (*library(), *fields())
+    """What is weighed beside the calibrated parameters: the library's strengths, then corrective fields."""
+    return (*library(), *fields(), *motions())
 
 
 def names() -> tuple[str, ...]:
@@ -99,6 +99,7 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
         numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
+        period=np.full(len(found.recording), segments.period),
     )  # fmt: skip
     return nulls, segments.duration
 
@@ -141,6 +142,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
+        period=nulls.period,
         duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
@@ -173,7 +175,7 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or "anchors_told" not in content:
+        if tuple(content["columns"]) != names() or not {"anchors_told", "period"} <= set(content):
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
@@ -183,7 +185,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         parts.append(
             Nulls(
                 statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics,
-                noise=content["noise"],
+                noise=content["noise"], period=content["period"],
             )
         )  # fmt: skip
         durations.add(round(float(content["duration"]), 1))
@@ -196,16 +198,5 @@ def load(folder: Path, *, words: str) -> NullBank:
             where=str(folder), fix="build a bank of one design into a folder of its own",
         )  # fmt: skip
     return NullBank(
-        nulls=_joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_told=told.pop()
+        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_told=told.pop()
     )
-
-
-def _joined(parts: Sequence[Nulls]) -> Nulls:
-    least = min(part.statistics.marker_error.shape[1] for part in parts)
-    own = [part.statistics for part in parts]
-    trimmed = [replace(statistics, marker_error=statistics.marker_error[:, :least]) for statistics in own]
-    return Nulls(
-        statistics=Statistics.joined(trimmed), speeds=np.concatenate([p.speeds for p in parts]),
-        offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
-        noise=np.concatenate([p.noise for p in parts]),
-    )  # fmt: skip

@@ -51,7 +51,7 @@ from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
-_KINDS = 12
+_KINDS = 20
 FEWEST_NULLS = _KINDS * banks.BATCH
 """So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
 
@@ -110,8 +110,8 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
-    reference = bank.reference(len(setting.segments), noise=float(setting.segments.noise.max()), seed=options.seed)
-    yardstick = Yardstick(found=found, projection=projection, null=bank.model(), speeds=speeds)
+    reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
+    yardstick = Yardstick(found=found, projection=projection, null=bank.model(setting.design), speeds=speeds)
     evidence = yardstick.evidence(found)
     fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
     judgement = judge(evidence, reference, level=options.level)

@@ -1,7 +1,7 @@
-"""What is varied about the model, one column each: calibrated parameters, effects of the library, smooth force fields.
+"""What is varied about the model, one column each: calibrated parameters, effects of the library, corrective fields.
 
-A column is a direction in the space of models with the size of a small step along it. `Column.system` gives the batch
-with that step; the change of the predictions, divided by the step, is the column's sensitivity.
+A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Most
+are found by simulation: `StepColumn.system` gives the batch with a small step taken. Those of motion are written down.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import UsageError
@@ -24,6 +25,8 @@ from sim.effects.parameter import Parameter
 from sim.material import Material
 from sim.state import State
 from sim.system import System
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,14 +77,22 @@ class Column(ABC):
     """One direction.
 
     Attributes:
-        name: "lift.coefficient", "field.x.10".
-        step: size of the step.
+        name: "lift.coefficient", "field.x.10", "motion.1.20".
         unit: of the coefficient.
     """
 
     name: str
-    step: float
     unit: str
+
+
+class StepColumn(Column):
+    """One whose sensitivity is that of a small step.
+
+    Attributes:
+        step: its size.
+    """
+
+    step: float
 
     @abstractmethod
     def system(self, system: System, state: State) -> tuple[System, State]:
@@ -89,7 +100,7 @@ class Column(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class EffectColumn(Column):
+class EffectColumn(StepColumn):
     """A strength of an effect of the library, from its null value.
 
     Attributes:
@@ -125,33 +136,28 @@ class EffectColumn(Column):
         return EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
 
 
-@dataclass(frozen=True, kw_only=True)
-class SmoothField(ForceEffect):
-    """A steady force per mass b cos(π i u/W) cos(π j v/H) along an axis: part of a low-rank corrective field.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SteadyField(ForceEffect):
+    """A steady force per mass: part of a low-rank corrective field.
 
     Attributes:
-        acceleration: b [m/s²].
+        acceleration: (vertex, 3, batch) or (vertex, 3, 1) [m/s²].
+    """
+
+    acceleration: Tensor
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        return self.acceleration.to(dtype=cloth.dtype, device=cloth.device) * cloth.mass[:, None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldColumn(StepColumn):
+    """A mode b cos(π i u/W) cos(π j v/H) of the corrective field, a force per mass along an axis of the world.
+
+    Attributes:
         axis: 0, 1 or 2.
         mode: (i, j).
     """
-
-    acceleration: float
-    axis: int
-    mode: tuple[int, int]
-
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        rest = cloth.mesh.rest - cloth.mesh.rest.min(axis=0)
-        share = rest / rest.max(axis=0)
-        shape = np.cos(np.pi * self.mode[0] * share[:, 0]) * np.cos(np.pi * self.mode[1] * share[:, 1])
-        weight = self.acceleration * torch.as_tensor(shape, dtype=cloth.dtype, device=cloth.device)
-        force = torch.zeros_like(position)
-        force[:, self.axis] = weight[:, None] * cloth.mass
-        return force
-
-
-@dataclass(frozen=True, kw_only=True)
-class FieldColumn(Column):
-    """A mode of the corrective field, along the axes of the world."""
 
     axis: int
     mode: tuple[int, int]
@@ -165,9 +171,58 @@ class FieldColumn(Column):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return "m/s²"
 
+    def acceleration(self, rest: Floats) -> Tensor:
+        """(vertex, 3, 1) of a step, at rest coordinates (vertex, 2) [m/s²]."""
+        made = torch.zeros((len(rest), 3, 1), dtype=torch.float64)
+        made[:, self.axis, 0] = self.step * torch.as_tensor(cosine(self.mode, rest, rest))
+        return made
+
     def system(self, system: System, state: State) -> tuple[System, State]:
-        force = SmoothField(acceleration=self.step, axis=self.axis, mode=self.mode)
-        return force.apply(system, state)
+        return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionColumn(Column):
+    """A force per mass b cos(π i u/W) cos(π j v/H) along the observed motion: along its velocity, or its acceleration.
+
+    Its change of the predictions is T² times it, T their horizon: what the force does to a point that is free. As a
+    direction to look along, where only nulls say what is usual, it need not be what cloth does.
+
+    Attributes:
+        derivative: 1 for velocity, 2 for acceleration.
+        mode: (i, j).
+    """
+
+    derivative: int
+    mode: tuple[int, int]
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"motion.{self.derivative}.{self.mode[0]}{self.mode[1]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return ("1/s", "1")[self.derivative - 1]
+
+    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
+        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
+
+        Args:
+            markers: (marker, 2) [m].
+            rest: (vertex, 2) of the cloth [m].
+            period: between the frames [s].
+        """
+        first, middle, last = seen[:-2], seen[1:-1], seen[2:]
+        along = (last - first) * (period / 2) if self.derivative == 1 else last - 2 * middle + first
+        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
+        return along * shape[None, :, None, None]
+
+
+def cosine(mode: tuple[int, int], places: Floats, rest: Floats) -> Floats:
+    """(place,) cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m]."""
+    low = rest.min(axis=0)
+    share = (places - low) / (rest.max(axis=0) - low)
+    return np.cos(np.pi * mode[0] * share[:, 0]) * np.cos(np.pi * mode[1] * share[:, 1])
 
 
 # Step of every strength that is weighed: some tenths of its expected range, where predictions are near linear.
@@ -192,6 +247,7 @@ _STEPS: tuple[tuple[str, str, float], ...] = (
     ("tilted-pole", "sway", 0.02),
 )
 _MODES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
+_MOTIONS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2))
 
 
 def library() -> tuple[EffectColumn, ...]:
@@ -210,5 +266,10 @@ def library() -> tuple[EffectColumn, ...]:
 
 
 def fields() -> tuple[FieldColumn, ...]:
-    """The corrective field's modes."""
+    """The corrective field's modes: steady forces."""
     return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
+
+
+def motions() -> tuple[MotionColumn, ...]:
+    """Forces along the observed motion."""
+    return tuple(MotionColumn(derivative=derivative, mode=mode) for derivative in (1, 2) for mode in _MOTIONS)

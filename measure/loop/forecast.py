@@ -22,8 +22,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import InputError
-from measure.loop.columns import THETA, Calibration, Column
+from flagdata.errors import InputError, UsageError
+from measure.loop.columns import THETA, Calibration, Column, FieldColumn, MotionColumn, SteadyField, StepColumn
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.handles import Handles
@@ -38,6 +38,8 @@ HORIZON = 0.04
 """About this long a prediction is [s]: 25 frames a second, the paper's rate."""
 _SEGMENT = 2.0  # s
 _SHORTEST = 0.8  # s: a segment of recordings too short for two of the usual length
+WIDEST = 72
+"""Members of a batch: beyond, a member costs as much as before."""
 _WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
 
 
@@ -227,6 +229,10 @@ class Forecaster:
         wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
         return replace(system, wind=wind), state
 
+    def _observed(self, segments: Segments) -> Tensor:
+        """(frame, marker, 3, batch) [m], warm-up included."""
+        return self._real(np.stack([s.positions for s in segments.items], axis=-1))
+
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
         """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted."""
         return self.run(system, state, segments)[0]
@@ -234,7 +240,7 @@ class Forecaster:
     def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
         """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
         period = segments.period
-        seen = self._real(np.stack([s.positions for s in segments.items], axis=-1))
+        seen = self._observed(segments)
         x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
         v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
@@ -257,15 +263,65 @@ class Forecaster:
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> Tensor:
         """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
+        if isinstance(column, MotionColumn):
+            seen, rest = self._observed(segments), self.specimen.mesh.rest
+            return column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
+        if not isinstance(column, StepColumn):
+            raise UsageError(f"{column.name} has no sensitivity", where="columns", fix="give a StepColumn")
         system, state = column.system(*self.system(segments, calibrations))
         return (base - self.errors(system, state, segments)) / column.step
 
-    def calibration_sensitivities(
-        self, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+    def sensitivities(
+        self, columns: Sequence[Column], segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> list[Tensor]:
-        """The same for each parameter of `THETA`."""
-        changes = []
-        for place, (_, _, step) in enumerate(THETA):
-            moved = [c.moved([step if k == place else 0.0 for k in range(len(THETA))]) for c in calibrations]
-            changes.append((base - self.errors(*self.system(segments, moved), segments)) / step)
-        return changes
+        """The same of each parameter of `THETA`, then of each column.
+
+        Parameters and steady fields run side by side, each on a copy of the segments: small batches cost nearly as
+        much as larger ones.
+        """
+        still = torch.zeros((self.specimen.mesh.vertex_count, 3, 1), dtype=torch.float64)
+        rest = self.specimen.mesh.rest
+        taken = [
+            _Step(size=size, calibrations=_moved(calibrations, place, size), acceleration=still)
+            for place, (_, _, size) in enumerate(THETA)
+        ]
+        fields = [column for column in columns if isinstance(column, FieldColumn)]
+        taken += [
+            _Step(size=column.step, calibrations=calibrations, acceleration=column.acceleration(rest))
+            for column in fields
+        ]
+        each = max(1, WIDEST // len(segments))
+        changes: list[Tensor] = []
+        for first in range(0, len(taken), each):
+            changes += self._side_by_side(taken[first : first + each], segments, base)
+        along = dict(zip(fields, changes[len(THETA) :], strict=True))
+        return [
+            *changes[: len(THETA)],
+            *(
+                along[c] if isinstance(c, FieldColumn) else self.sensitivity(c, segments, calibrations, base)
+                for c in columns
+            ),
+        ]
+
+    def _side_by_side(self, steps: Sequence[_Step], segments: Segments, base: Tensor) -> list[Tensor]:
+        count = len(segments)
+        copies = segments.select(list(range(count)) * len(steps))
+        field = SteadyField(acceleration=torch.cat([s.acceleration.expand(-1, -1, count) for s in steps], dim=2))
+        system, state = field.apply(*self.system(copies, [c for s in steps for c in s.calibrations]))
+        errors = self.errors(system, state, copies)
+        return [
+            (base - errors[..., place * count : (place + 1) * count]) / step.size for place, step in enumerate(steps)
+        ]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Step:
+    """Of a parameter or a steady field: its size, the calibration of each segment, the force per mass [m/s²]."""
+
+    size: float
+    calibrations: Sequence[Calibration]
+    acceleration: Tensor
+
+
+def _moved(calibrations: Sequence[Calibration], place: int, size: float) -> list[Calibration]:
+    return [c.moved([size if k == place else 0.0 for k in range(len(THETA))]) for c in calibrations]

@@ -9,7 +9,7 @@ experiment: nuisance columns, learnt from the nulls as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,9 +25,22 @@ _SHIFTS = 16
 """Of 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """How markers are seen, which moves the mean of what numerics leave.
+
+    Attributes:
+        noise: of a marker's coordinate [m].
+        period: between the frames that are used [s].
+    """
+
+    noise: float
+    period: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NullModel:
-    """μ and Σ, from null segments.
+    """μ and Σ of one design, from null segments.
 
     Attributes:
         coefficients: (feature, column) of μ in 1, U, U².
@@ -41,10 +54,10 @@ class NullModel:
     shifts: Floats
 
     @classmethod
-    def fit(cls, nulls: Nulls) -> NullModel:
-        """From segments whose calibrations are known."""
+    def fit(cls, nulls: Nulls, design: Design) -> NullModel:
+        """From segments whose calibrations are known, for segments of a design."""
         clean = nulls.clean
-        features = _features(nulls.speeds)
+        features = np.c_[_features(nulls.speeds), nulls.beyond(design)]
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
         left = clean - features @ coefficients
         experiment = nulls.experiment
@@ -52,11 +65,11 @@ class NullModel:
         within = left - means[experiment]
         covariance = within.T @ within / max(len(left) - len(means) - features.shape[1], 1)
         covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(left))
-        return cls(coefficients=coefficients, covariance=covariance, shifts=_principal(means, covariance))
+        return cls(coefficients=coefficients[:_POWERS], covariance=covariance, shifts=_principal(means, covariance))
 
     def mean(self, speeds: Floats) -> Floats:
         """(segment, column)."""
-        return _features(speeds)[:, : len(self.coefficients)] @ self.coefficients
+        return _features(speeds) @ self.coefficients
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,6 +82,7 @@ class Nulls:
         offsets: (segment, theta) steps from the calibration of the fit to the one they were simulated with.
         numerics: (segment,) which mesh and method.
         noise: (segment,) of a marker's coordinate [m].
+        period: (segment,) between the frames used [s].
     """
 
     statistics: Statistics
@@ -76,6 +90,7 @@ class Nulls:
     offsets: Floats
     numerics: NDArray[np.int64]
     noise: Floats
+    period: Floats
 
     @cached_property
     def experiment(self) -> NDArray[np.int64]:
@@ -93,8 +108,32 @@ class Nulls:
         """Some segments."""
         return Nulls(
             statistics=self.statistics.select(chosen), speeds=self.speeds[chosen], offsets=self.offsets[chosen],
-            numerics=self.numerics[chosen], noise=self.noise[chosen],
+            numerics=self.numerics[chosen], noise=self.noise[chosen], period=self.period[chosen],
         )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: Sequence[Nulls]) -> Nulls:
+        """One after another, of as many markers as all have; recordings and numerics are those of the parts."""
+        least = min(part.statistics.marker_error.shape[1] for part in parts)
+        own = [replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]) for p in parts]
+        return cls(
+            statistics=Statistics.joined(own), speeds=np.concatenate([p.speeds for p in parts]),
+            offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
+            noise=np.concatenate([p.noise for p in parts]), period=np.concatenate([p.period for p in parts]),
+        )  # fmt: skip
+
+    def beyond(self, design: Design) -> Floats:
+        """(segment, k) by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary."""
+        beyond = np.stack([1e6 * (self.noise**2 - design.noise**2), 100 * (self.period - design.period)], axis=1)
+        return beyond[:, np.ptp(beyond, axis=0) > 0]
+
+    @property
+    def design(self) -> Design:
+        """Of the first segment: that of all, where they are of one kind."""
+        return Design(noise=float(self.noise[0]), period=float(self.period[0]))
+
+
+_POWERS = 3
 
 
 def _features(speeds: Floats) -> Floats:

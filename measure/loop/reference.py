@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from measure.loop.fluctuation import fluctuation
-from measure.loop.inference import Evidence, NullModel, Nulls
+from measure.loop.inference import Design, Evidence, NullModel, Nulls
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
@@ -66,8 +66,9 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
                     )  # fmt: skip
                 groups.append(chosen)
         yield LeftOutKind(
-            model=NullModel.fit(nulls.select(nulls.numerics != kind)), outside=outside, groups=tuple(groups)
-        )
+            model=NullModel.fit(nulls.select(nulls.numerics != kind), outside.design), outside=outside,
+            groups=tuple(groups),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,9 +100,9 @@ class NullBank:
                 fix=f"simulate at least {_LEAST} of {_KINDS}, better 200 of 12",
             )  # fmt: skip
 
-    def model(self) -> NullModel:
-        """Learnt from all."""
-        return NullModel.fit(self.nulls)
+    def model(self, design: Design) -> NullModel:
+        """Learnt from all, for data of a design."""
+        return NullModel.fit(self.nulls, design)
 
     def reference(self, segments: int, *, noise: float, seed: int) -> Reference:
         """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from measure.loop.alignment import aligned
 from measure.loop.columns import Calibration
 from measure.loop.forecast import Forecaster, Segments
+from measure.loop.inference import Design
 from measure.observe.trajectory import Experiment
 from sim.integrate.split import SplitEuler
 
@@ -40,6 +41,11 @@ class Setting:
     def speeds(self) -> Floats:
         """(recording,) mean logged wind [m/s]."""
         return np.array([r.wind.speed for r in self.experiment.recordings])
+
+    @property
+    def design(self) -> Design:
+        """How its markers are seen: as noisy as in the noisiest recording."""
+        return Design(noise=float(self.segments.noise.max()), period=self.segments.period)
 
     @property
     def recording(self) -> NDArray[np.int64]:

@@ -144,8 +144,7 @@ def _pieces(
         starts = [calibrations[i] for i in chosen]
         noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
-        changes = forecaster.calibration_sensitivities(own, starts, base)
-        changes += [forecaster.sensitivity(column, own, starts, base) for column in columns]
+        changes = forecaster.sensitivities(columns, own, starts, base)
         yield reduced(base, changes, recording[chosen], noise), changes, error_scale(base, recording[chosen], noise)
 
 

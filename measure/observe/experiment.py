@@ -13,6 +13,7 @@ from flagdata.findings import Finding, Severity
 from measure.observe import cloth, noise
 from measure.observe.anchors import anchors_of
 from measure.observe.checks import attachment, frames, inertia, shape, surroundings
+from measure.observe.common import at_same_points
 from measure.observe.gaps import fill_positions
 from measure.observe.observation import Known, Observation
 from measure.observe.pins import hold
@@ -45,7 +46,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     low = corners.min(axis=0)
     mesh = cloth.model_mesh(corners - low, vertices=setup.vertices)
     prepared = [_prepared(seen, corners) for seen in observations]
-    recordings = tuple(_trajectory(seen, low) for seen in prepared)
+    recordings, moved = at_same_points([_trajectory(seen, low) for seen in prepared], mesh.rest)
     known = [seen.known for seen in prepared]
     mesh, held = hold(mesh, _pins(known, setup, low))
     specimen = Specimen(
@@ -59,7 +60,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         air=_agreed([k.air for k in known], setup.air, QuadraticNormal(), "wind force"),
     )  # fmt: skip
     experiment = Experiment(specimen=specimen, recordings=recordings)
-    found = (*found, *(f for seen in prepared for f in seen.findings), *_checked(experiment))
+    found = (*found, *(f for seen in prepared for f in seen.findings), *moved, *_checked(experiment))
     return Observed(experiment=experiment, findings=found)
 
 

@@ -52,12 +52,8 @@ class Lens:
         """Along the calibrated parameters and some columns: those of the nulls."""
         nominal = [Calibration()] * len(segments)
         base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-        along = forecaster.calibration_sensitivities(segments, nominal, base)
-        found = of_columns(forecaster, segments, base, weighed)
-        return cls(
-            forecaster=forecaster, segments=segments, base=base,
-            directions=(*along, *(found[column.name] for column in weighed)),
-        )  # fmt: skip
+        along = forecaster.sensitivities(weighed, segments, nominal, base)
+        return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
     def select(self, chosen: NDArray[np.int64]) -> Lens:
         """Of some segments."""

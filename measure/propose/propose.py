@@ -152,7 +152,7 @@ def weigh(
     """
     supply.check(bank, setting)
     parts = split(setting.segments, setting.speeds)
-    null = bank.model()
+    null = bank.model(setting.design)
     stage("terms", 0, 1)
     whole = Lens.of(setting.forecaster, setting.segments, weighed)
     lens = whole.select(np.flatnonzero(parts.seen))

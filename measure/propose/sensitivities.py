@@ -13,15 +13,12 @@ import torch
 from torch import Tensor
 
 from measure.loop.columns import Calibration, Column
-from measure.loop.forecast import Forecaster, Segments
+from measure.loop.forecast import WIDEST, Forecaster, Segments
 from measure.loop.statistics import Statistics, reduced
 from measure.propose.terms import MASS, TermColumn
 from sim.cloth import Cloth
 from sim.effects.effect import ClothEffect, Effect
 from sim.effects.field import FieldEffect, Flat, Seen, heavier
-
-_WIDEST = 72
-"""Members of a batch: beyond, a member costs as much as before."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +67,7 @@ def of_columns(
             fields.setdefault(column.term.field, []).append(column)
         else:
             found[column.name] = forecaster.sensitivity(column, segments, nominal, base)
-    each = max(1, _WIDEST // len(segments))
+    each = max(1, WIDEST // len(segments))
     for own in fields.values():
         for first in range(0, len(own), each):
             found |= _bundle(forecaster, segments, base, own[first : first + each])
@@ -106,7 +103,7 @@ def _chunks(segments: Segments) -> list[list[int]]:
     chunks: list[list[int]] = []
     for index in sorted({s.recording for s in segments.items}):
         own = [place for place, segment in enumerate(segments.items) if segment.recording == index]
-        if chunks and len(chunks[-1]) + len(own) <= _WIDEST // 2:
+        if chunks and len(chunks[-1]) + len(own) <= WIDEST // 2:
             chunks[-1] += own
         else:
             chunks.append(own)
@@ -116,7 +113,7 @@ def _chunks(segments: Segments) -> list[list[int]]:
 def _statistics(forecaster: Forecaster, segments: Segments, columns: Sequence[Column]) -> Statistics:
     nominal = [Calibration()] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-    changes = forecaster.calibration_sensitivities(segments, nominal, base)
+    changes = forecaster.sensitivities((), segments, nominal, base)
     along = of_columns(forecaster, segments, base, columns)
     changes += [along[column.name] for column in columns]
     return reduced(base, changes, segments.recording, segments.noise)

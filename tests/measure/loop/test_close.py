@@ -23,7 +23,7 @@ DURATION, NOISE, SPEEDS = 4.6, 5e-4, (3.5, 6.0)
 
 @pytest.fixture(scope="module")
 def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """64 nulls of four kinds of numerics."""
+    """64 nulls of eight kinds of numerics."""
     folder = tmp_path_factory.mktemp("bank")
     batches = [
         banks.prior_batch(
@@ -35,7 +35,7 @@ def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
             speeds=(3.0, 6.5),
             seed=seed,
         )
-        for seed in range(4)
+        for seed in range(8)
     ]
     banks.build(folder, batches, workers=2)
     return folder

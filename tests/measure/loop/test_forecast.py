@@ -9,10 +9,11 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from measure.loop.columns import THETA, Calibration, EffectColumn
+from measure.loop.columns import THETA, Calibration, EffectColumn, FieldColumn, MotionColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from measure.propose.terms import Term, columns_of
 
 NOMINAL = Calibration()
 
@@ -51,17 +52,66 @@ def test_what_a_model_lacks_returns_along_its_sensitivity(
     assert float((judged + change * step / 2).norm() / judged.norm()) < 0.2
 
 
+def test_a_motion_column_is_the_observed_motion_at_the_frames_of_the_errors(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    # x = x₀ + v t + a t²/2 at every marker: by central differences v + a t one frame before each error, and a.
+    period, v, a = 1 / own_recording.rate, np.array([0.3, -0.2, 0.1]), np.array([0.5, 2.0, -1.0])
+    t = np.arange(len(own_recording.positions))[:, None, None] * period
+    moving = replace(own_recording, positions=own_recording.positions[:1] + v * t + a * t**2 / 2)
+    segments = Segments.of([moving])
+    base = forecaster.errors(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
+    u, w = forecaster.markers[:, 0] / 0.75, forecaster.markers[:, 1] / 0.5
+    shape = (np.cos(2 * np.pi * u) * np.cos(np.pi * w))[:, None]
+    for derivative in (1, 2):
+        column = MotionColumn(derivative=derivative, mode=(2, 1))
+        change = forecaster.sensitivity(column, segments, [NOMINAL] * len(segments), base)
+        assert change.shape == base.shape
+        for place, segment in enumerate(segments.items):
+            before = segment.start + (segments.first - 1) * period
+            expected = period**2 * shape * (v + a * before if derivative == 1 else a)
+            np.testing.assert_allclose(change[0, :, :, place].numpy(), expected, atol=1e-9)
+
+
+def test_a_force_along_the_velocity_moves_cloth_about_as_it_moves_free_points(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    segments = Segments.of([own_recording])
+    nominal = [NOMINAL] * len(segments)
+    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    (drag,) = columns_of([Term(field="against_motion", shape="everywhere")])
+    simulated = forecaster.sensitivity(drag, segments, nominal, base)
+    written = forecaster.sensitivity(MotionColumn(derivative=1, mode=(0, 0)), segments, nominal, base)
+    assert float((simulated * written).sum() / simulated.norm() / written.norm()) < -0.8
+    assert 0.5 < float(simulated.norm() / written.norm()) < 1.0
+
+
 def test_calibration_sensitivities_are_those_of_their_parameters(
     forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
     segments = Segments.of([own_recording])
     base = forecaster.errors(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
-    changes = forecaster.calibration_sensitivities(segments, [NOMINAL] * len(segments), base)
+    changes = forecaster.sensitivities((), segments, [NOMINAL] * len(segments), base)
     assert len(changes) == len(THETA)
     heavier = Calibration(density=1.05)
     errors = forecaster.errors(*forecaster.system(segments, [heavier] * len(segments)), segments)
     expected = -np.log(1.05) * changes[0]
     assert float((errors - expected).norm() / errors.norm()) < 0.2
+
+
+def test_steps_side_by_side_are_those_taken_alone(forecaster: Forecaster, own_recording: Trajectory) -> None:
+    segments = Segments.of([own_recording])
+    nominal = [Calibration(density=1.1)] * len(segments)
+    columns = (
+        FieldColumn(axis=2, mode=(1, 0)), EffectColumn(effect="lift", parameter="coefficient", step=0.3),
+        MotionColumn(derivative=1, mode=(0, 0)), FieldColumn(axis=0, mode=(0, 1)),
+    )  # fmt: skip
+    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    together = forecaster.sensitivities(columns, segments, nominal, base)
+    assert len(together) == len(THETA) + len(columns)
+    for column, change in zip(columns, together[len(THETA) :], strict=True):
+        alone = forecaster.sensitivity(column, segments, nominal, base)
+        torch.testing.assert_close(change, alone, rtol=1e-9, atol=1e-12)
 
 
 def test_members_of_a_batch_do_not_touch_one_another(forecaster: Forecaster, own_recording: Trajectory) -> None:

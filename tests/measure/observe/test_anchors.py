@@ -19,9 +19,7 @@ def flat(specimen: Specimen, name: str, moved: np.ndarray, frames: int) -> Traje
     place = np.stack([rest[:, 0], 0 * rest[:, 0], rest[:, 1]], axis=1) + moved
     swing = 0.01 * np.sin(2 * np.pi * np.arange(frames) / frames)
     positions = place + swing[:, None, None] * np.array([0.0, 1.0, 0.0])
-    return Trajectory(
-        name=name, markers=rest, positions=positions, rate=25.0, wind=WindTrack.constant((4.0, 0.0, 0.0))
-    )
+    return Trajectory(name=name, markers=rest, positions=positions, rate=25.0, wind=WindTrack.constant((4.0, 0.0, 0.0)))
 
 
 def test_recordings_count_alike_whatever_their_length(specimen: Specimen) -> None:

@@ -17,7 +17,6 @@ from measure.loop.columns import THETA, Calibration, Column, EffectColumn, field
 from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
-from measure.loop.statistics import Statistics
 from measure.observe.trajectory import Experiment, Specimen
 from measure.propose.terms import Term, columns_of
 from sim.cloth import Cloth
@@ -98,11 +97,7 @@ def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], lens: tuple[Col
         made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, (*lens, *columns))
         shifted = replace(made.statistics, recording=made.statistics.recording + seed * RECORDINGS)
         parts.append(replace(made, statistics=shifted))
-    whole = Nulls(
-        statistics=Statistics.joined([p.statistics for p in parts]), speeds=np.concatenate([p.speeds for p in parts]),
-        offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
-        noise=np.concatenate([p.noise for p in parts]),
-    )  # fmt: skip
+    whole = Nulls.joined(parts)
     return whole, duration
 
 

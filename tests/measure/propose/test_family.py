@@ -32,7 +32,8 @@ def drawn(rng: np.random.Generator) -> tuple[Nulls, Statistics]:
         recording=recording, r=r, response=square, error=np.ones(count), marker_error=np.ones((count, 1))
     )  # fmt: skip
     nulls = Nulls(
-        statistics=own, speeds=rng.uniform(3, 6, count), offsets=offsets, numerics=numerics, noise=np.zeros(count)
+        statistics=own, speeds=rng.uniform(3, 6, count), offsets=offsets, numerics=numerics, noise=np.zeros(count),
+        period=np.full(count, 0.04),
     )  # fmt: skip
     terms = np.tile(rng.normal(size=(DIRECTIONS, TERMS)), (4, 1, 1))
     seen = Statistics(
@@ -50,7 +51,10 @@ def test_nulls_of_numerics_never_seen_reach_the_level_as_often_as_it_says(level:
         nulls, seen = drawn(rng)
         pool = list(range(3, 3 + TERMS))
         inside = nulls.numerics >= KINDS // 3
-        model, family = NullModel.fit(nulls.select(inside)), Family.of(nulls.select(inside), seen, noise=0.0, seed=0)
+        model, family = (
+            NullModel.fit(nulls.select(inside), nulls.design),
+            Family.of(nulls.select(inside), seen, noise=0.0, seed=0),
+        )
         others = nulls.select(~inside)
         for index in range(int(others.experiment.max()) + 1):
             chosen = np.flatnonzero(others.experiment == index)[:4]
@@ -64,7 +68,7 @@ def test_nulls_of_numerics_never_seen_reach_the_level_as_often_as_it_says(level:
 
 def test_a_term_that_acts_is_found_among_the_others() -> None:
     nulls, seen = drawn(np.random.default_rng(6))
-    model, family = NullModel.fit(nulls), Family.of(nulls, seen, noise=0.0, seed=0)
+    model, family = NullModel.fit(nulls, nulls.design), Family.of(nulls, seen, noise=0.0, seed=0)
     pool = list(range(3, 3 + TERMS))
     acting = replace(seen, r=20.0 * seen.response[:, :, 10])
     own = evidence(acting, np.full(4, 4.5), model)
