@@ -7,7 +7,7 @@ a design: an amortised null.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from io import BytesIO
 from multiprocessing import get_context
@@ -25,7 +25,7 @@ from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics, statistics
-from measure.observe.anchors import as_seen
+from measure.observe.anchors import anchors_of
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 from sim.integrate.split import SplitEuler
 
@@ -88,13 +88,11 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings)
+    if not batch.specimen.anchors_told:
+        segments = segments.tied(_shown(batch, recordings))
+    forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     nominal = Calibration()
-    parts: list[Statistics] = []
-    for specimen, places in _experiments(batch, recordings):
-        own = segments.select(np.flatnonzero(np.isin(segments.recording, places)))
-        forecaster = Forecaster(specimen=specimen, markers=batch.markers, integrator=SplitEuler())
-        parts.append(statistics(forecaster, own, [nominal] * len(own), weighed))
-    found = Statistics.joined(parts)
+    found = statistics(forecaster, segments, [nominal] * len(segments), weighed)
     offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
@@ -104,14 +102,14 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     return nulls, segments.duration
 
 
-def _experiments(batch: NullBatch, recordings: Sequence[Trajectory]) -> Iterator[tuple[Specimen, list[int]]]:
-    """Cloths of a batch as their recordings show them, with the places of these; one for all where they are one."""
-    if batch.specimen.anchors_told:
-        yield batch.specimen, list(range(len(recordings)))
-        return
-    for cloth in dict.fromkeys(batch.calibrations):
-        places = [place for place, own in enumerate(batch.calibrations) if own == cloth]
-        yield as_seen(batch.specimen, [recordings[place] for place in places]), places
+def _shown(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
+    """Anchors (held, 3) for each recording, taken from all of its cloth [m]."""
+    seats = batch.specimen.mesh.rest[list(batch.specimen.held)]
+    cloths: dict[Calibration, list[Trajectory]] = {}
+    for cloth, recording in zip(batch.calibrations, recordings, strict=True):
+        cloths.setdefault(cloth, []).append(recording)
+    shown = {cloth: anchors_of(own, seats) for cloth, own in cloths.items()}
+    return [shown[cloth] for cloth in batch.calibrations]
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
@@ -142,8 +140,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
-        period=nulls.period,
-        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told),
+        period=nulls.period, duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 

@@ -50,7 +50,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 @click.option("--unit", default="m", show_default=True, help="Of positions.")
 @click.option("--up", default="z", show_default=True, help="Axis that points up: z, y, x, -z, -y or -x.")
 @click.option("--noise", type=click.FloatRange(min=0), help="Of a marker's coordinate [m]; estimated by default.")
-@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 192 (the default) or more.")
+@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 160 (the default) or more.")
 @click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
               help="Of the global test; 0.02 by default.")  # fmt: skip

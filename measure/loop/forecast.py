@@ -53,6 +53,7 @@ class Segment:
         positions: (frame, marker, 3), warm-up included [m].
         wind: of the recording.
         noise: of a coordinate [m].
+        anchors: (held, 3) where its cloth is tied [m]; None where the specimen says it.
     """
 
     recording: int
@@ -60,6 +61,7 @@ class Segment:
     positions: Floats
     wind: WindTrack
     noise: float
+    anchors: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,6 +124,10 @@ class Segments:
                     )
                 )  # fmt: skip
         return cls(items=tuple(items), markers=first.markers, period=period, warm=warm)
+
+    def tied(self, anchors: Sequence[Floats]) -> Segments:
+        """With cloths tied where each recording's (held, 3) are [m]."""
+        return replace(self, items=tuple(replace(item, anchors=anchors[item.recording]) for item in self.items))
 
     def select(self, indices: Iterable[int]) -> Segments:
         """Some of them."""
@@ -215,15 +221,14 @@ class Forecaster:
         start[:, 0] = specimen.mesh.rest[:, 0] - specimen.mesh.rest[list(specimen.held), 0].min()
         start[:, 2] = specimen.mesh.rest[:, 1] - specimen.mesh.rest[list(specimen.held), 1].min()
         start += specimen.anchors[np.argmin(specimen.anchors[:, 2])]
-        start[list(specimen.held)] = specimen.anchors
         handles = Handles(vertices=specimen.held, stiffness=specimen.stiffness)
         materials = {c: c.material(specimen.material) for c in set(calibrations)}
         scenes = [
             Scene(
-                mesh=specimen.mesh, position=start, material=materials[c], handles=handles, gravity=specimen.gravity,
-                air=specimen.air,
+                mesh=specimen.mesh, material=materials[c], handles=handles, gravity=specimen.gravity, air=specimen.air,
+                position=_held(start, specimen.held, specimen.anchors if own.anchors is None else own.anchors),
             )
-            for c in calibrations
+            for own, c in zip(segments.items, calibrations, strict=True)
         ]  # fmt: skip
         system, state = assemble(scenes, dtype=self.dtype, device=self.device)
         wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
@@ -312,6 +317,12 @@ class Forecaster:
         return [
             (base - errors[..., place * count : (place + 1) * count]) / step.size for place, step in enumerate(steps)
         ]
+
+
+def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
+    position = start.copy()
+    position[list(vertices)] = anchors
+    return position
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("recipe_path", metavar="RECIPE.toml", type=click.Path(path_type=Path))
 @click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings; seek no other.")
 @click.option("--known", multiple=True, metavar="EFFECT.STRENGTH", help="What the model has already; may be repeated.")
-@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 192 (the default) or more.")
+@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 160 (the default) or more.")
 @click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
               help="Of the test of every term; 0.03 by default.")  # fmt: skip

@@ -42,7 +42,8 @@ def test_anchors_that_are_not_told_are_taken_from_the_recordings_of_each_cloth(b
         forecaster = Forecaster(specimen=own, markers=batch.markers, integrator=SplitEuler())
         expected = statistics(forecaster, segments, [Calibration()] * len(segments), (LEAN,))
         found = nulls.select(nulls.statistics.recording // 2 == place)
-        np.testing.assert_allclose(found.statistics.r, expected.r, rtol=1e-6)
+        # Single precision, and a solver that stops for all members of a batch at once.
+        np.testing.assert_allclose(found.statistics.r, expected.r, rtol=1e-3)
         np.testing.assert_allclose(found.offsets, np.tile(CLOTHS[place].steps_from(Calibration()), (len(segments), 1)))
 
 
