@@ -32,6 +32,7 @@ from measure.loop.attribution import (
     estimate,
     finalists,
     judge,
+    strength,
     tied,
     withdrawn,
 )
@@ -166,7 +167,7 @@ class Solved:
         column, coefficient = larger.model.effects[place]
         linear = self.evidence.fit([weighed.column]).of(weighed.column)[1]
         error = larger.errors[len(THETA) + place] * weighed.error / linear
-        return estimate(column.described.null + coefficient, error, column.unit)
+        return strength(column.described.null, coefficient, error, column.unit)
 
     @property
     def doubtful(self) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from measure.loop.attribution import RESPONSE
 from measure.loop.bank import columns
 from measure.loop.columns import THETA, FieldColumn
 from measure.loop.inference import Fit
@@ -98,5 +99,6 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
         "the wind at the flag is the logged one, the same all over it",
         "density, bending and internal damping are free: what only changes them is no effect",
+        f"a strength may be off by {100 * RESPONSE:.0f} % by the fit's mesh alone: its interval holds that",
         "the choice of the effect has seen all recordings; the errors before and after are of fits that had not",
     )
