@@ -25,7 +25,7 @@ from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics, statistics
-from measure.observe.anchors import anchors_of
+from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 from sim.integrate.split import SplitEuler
 
@@ -87,9 +87,7 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     """Simulate a batch and take its statistics along columns, from the nominal calibration; with the duration of a
     segment [s]."""
     recordings = batch.simulate()
-    segments = Segments.of(recordings)
-    if not batch.specimen.anchors_told:
-        segments = segments.tied(_shown(batch, recordings))
+    segments = Segments.of(recordings).tied(_anchors(batch, recordings))
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     nominal = Calibration()
     found = statistics(forecaster, segments, [nominal] * len(segments), weighed)
@@ -102,14 +100,13 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     return nulls, segments.duration
 
 
-def _shown(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
-    """Anchors (held, 3) for each recording, taken from all of its cloth [m]."""
-    seats = batch.specimen.mesh.rest[list(batch.specimen.held)]
+def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
+    """(held, 3) for each recording [m]; where they are not told, taken from all recordings of its cloth."""
     cloths: dict[Calibration, list[Trajectory]] = {}
     for cloth, recording in zip(batch.calibrations, recordings, strict=True):
         cloths.setdefault(cloth, []).append(recording)
-    shown = {cloth: anchors_of(own, seats) for cloth, own in cloths.items()}
-    return [shown[cloth] for cloth in batch.calibrations]
+    known = {cloth: as_seen(batch.specimen, own).anchors for cloth, own in cloths.items()}
+    return [known[cloth] for cloth in batch.calibrations]
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:

@@ -143,6 +143,11 @@ class Segments:
         """(segment,) of a coordinate [m]."""
         return np.array([item.noise for item in self.items])
 
+    @cached_property
+    def positions(self) -> Floats:
+        """(frame, marker, 3, segment), warm-up included [m]."""
+        return np.stack([item.positions for item in self.items], axis=-1)
+
     @property
     def first(self) -> int:
         """The first frame of a segment that counts."""
@@ -234,10 +239,6 @@ class Forecaster:
         wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
         return replace(system, wind=wind), state
 
-    def _observed(self, segments: Segments) -> Tensor:
-        """(frame, marker, 3, batch) [m], warm-up included."""
-        return self._real(np.stack([s.positions for s in segments.items], axis=-1))
-
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
         """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted."""
         return self.run(system, state, segments)[0]
@@ -245,7 +246,7 @@ class Forecaster:
     def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
         """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
         period = segments.period
-        seen = self._observed(segments)
+        seen = self._real(segments.positions)
         x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
         v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
@@ -269,7 +270,7 @@ class Forecaster:
     ) -> Tensor:
         """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
         if isinstance(column, MotionColumn):
-            seen, rest = self._observed(segments), self.specimen.mesh.rest
+            seen, rest = self._real(segments.positions), self.specimen.mesh.rest
             return column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
         if not isinstance(column, StepColumn):
             raise UsageError(f"{column.name} has no sensitivity", where="columns", fix="give a StepColumn")
