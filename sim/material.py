@@ -7,6 +7,7 @@ The tables are those of Wang, O'Brien and Ramamoorthi (ACM TOG 30(4):71, 2011); 
 from __future__ import annotations
 
 import functools
+import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -102,6 +103,12 @@ class Material:
             name=name, source=str(content["source"]), stretching=content["stretching"], bending=content["bending"],
             **{key: float(value) for key, value in numbers.items()},
         )  # fmt: skip
+
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of density and tables: the same of materials that differ by damping and names alone."""
+        numbers = [np.array([self.density]), self.stretching, self.bending]
+        return hashlib.sha256(b"".join(n.astype("<f8").tobytes() for n in numbers)).hexdigest()
 
     def scaled(self, *, density: float = 1.0, stretching: float = 1.0, bending: float = 1.0) -> Material:
         """This material with its density and tables multiplied."""

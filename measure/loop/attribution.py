@@ -109,7 +109,8 @@ def judge(
         again: of columns whose models were run again, which counts in place of the linear evidence.
     """
     statistics = reference.statistics(evidence, names())
-    statistic, p_value = float(statistics.max()), reference.p_global(statistics, evidence.fit(()).left)
+    statistic = reference.farthest_of(statistics, evidence.fit(()).left)
+    p_value = reference.p_global(statistic)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     corrective = [i + _FIRST for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
     held_out = gains(evidence, [[i] for i, _ in effects])
@@ -144,7 +145,9 @@ def judge(
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
     if best.candidate.leftover > level:
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
-    second = _second(evidence if rerun is None else rerun.evidence, reference, best, ranking, level)
+    useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
+    others = [w for w in ranking[1:] if w.column not in useless]
+    second = _second(evidence if rerun is None else rerun.evidence, reference, best, others, level)
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
@@ -173,38 +176,46 @@ def finalists(judgement: Judgement) -> tuple[int, ...]:
 
 def withdrawn(judgement: Judgement, reason: str) -> Judgement:
     """The same, once the effect named has failed, for `NO_HELP` or `NOT_APART`."""
-    ranking = tuple(
-        replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in judgement.named else w
-        for w in judgement.ranking
-    )
+    ranking = _told(judgement.ranking, judgement.named, reason)
     return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)
+
+
+def alone(judgement: Judgement, reason: str) -> Judgement:
+    """The same, once the second of two effects has failed: the first explains a part."""
+    ranking = _told(judgement.ranking, judgement.named[1:], reason)
+    return replace(judgement, conclusion=Conclusion.PARTLY, named=judgement.named[:1], ranking=ranking)
 
 
 def tied(judgement: Judgement, control: Weighed) -> Judgement:
     """The same, once a control has proved as good as the effect named, within errors, on unseen data."""
-    ranking = tuple(
-        replace(w, candidate=replace(w.candidate, why_not="")) if w.column == control.column else w
-        for w in judgement.ranking
-    )
+    ranking = _told(judgement.ranking, (control.column,), "")
     named = (*judgement.named, control.column)
     return replace(judgement, conclusion=Conclusion.ONE_OF, named=named, ranking=ranking)
 
 
+def _told(ranking: Sequence[Weighed], chosen: Sequence[int], reason: str) -> tuple[Weighed, ...]:
+    """The same candidates, those of some columns with another reason why they are not named."""
+    return tuple(
+        replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in chosen else w for w in ranking
+    )
+
+
 def _second(
-    evidence: Evidence, reference: Reference, best: Weighed, ranking: Sequence[Weighed], level: float
+    evidence: Evidence, reference: Reference, best: Weighed, others: Sequence[Weighed], level: float
 ) -> Weighed | None:
     """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
     strength is not nothing. Beside gusts, the pressure is free in every segment.
 
     Args:
         evidence: of what the best leaves, if it was run again.
+        others: candidates beside the best, but for those whose models, run again, predict nothing.
     """
     pressure = names().index(GUSTS)
     known = [best.column]
     if best.column == GUST_COLUMN:
         evidence, reference, known = evidence.freed(pressure), reference.beside(), []
-    skipped = {GUST_COLUMN, best.column, *([] if known else [pressure])}
-    others = [w for w in ranking if w.column not in skipped and w.candidate.effect not in _SEEN]
+    skipped = {GUST_COLUMN, *([] if known else [pressure])}
+    others = [w for w in others if w.column not in skipped and w.candidate.effect not in _SEEN]
     fits = [evidence.fit([*known, w.column]) for w in others]
     able = [
         place
@@ -270,7 +281,7 @@ def _weigh(
             effect=effect.effect, parameter=effect.parameter, null=null,
             strength=strength(null, value, error, effect.unit),
             z=z, p_value=reference.p_alone(statistic, column),
-            p_family=reference.p_family(statistic), gain=float(gained.sum()),
+            p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
             by_recording=tuple(by_recording),
         ),
@@ -293,7 +304,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
             effect="gusts", parameter="intensity", null=described.null,
             strength=strength(described.null, found.deviation / 2, found.error / 2, described.unit),
             z=math.sqrt(statistic), p_value=reference.p_alone(statistic, len(names())),
-            p_family=reference.p_family(statistic),
+            p_family=reference.p_family(statistic, len(names())),
             gain=float(gained.sum()), gain_error=total_error(gained, evidence.recording), behind=0.0,
             leftover=reference.beside().p_left_by(evidence.freed(place), names(), ()), by_recording=tuple(by_recording),
         ),

@@ -96,6 +96,7 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
         numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
         period=np.full(len(found.recording), segments.period),
+        cloth=np.full(len(found.recording), batch.specimen.material.fingerprint),
     )  # fmt: skip
     return nulls, segments.duration
 
@@ -137,7 +138,8 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
-        period=nulls.period, duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told),
+        period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
+        anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -169,7 +171,7 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or not {"anchors_told", "period"} <= set(content):
+        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth"} <= set(content):
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
@@ -179,7 +181,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         parts.append(
             Nulls(
                 statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics,
-                noise=content["noise"], period=content["period"],
+                noise=content["noise"], period=content["period"], cloth=content["cloth"],
             )
         )  # fmt: skip
         durations.add(round(float(content["duration"]), 1))

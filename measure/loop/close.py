@@ -29,6 +29,7 @@ from measure.loop.attribution import (
     NOT_APART,
     Judgement,
     Weighed,
+    alone,
     estimate,
     finalists,
     judge,
@@ -121,6 +122,8 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
         again = run_again(fits, reference, finalists(judgement), workers=options.workers)
         judgement = judge(evidence, reference, level=options.level, again=again)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
+    if solved.doubtful and solved.doubtful == judgement.named[1:]:
+        solved = replace(solved, judgement=alone(judgement, NOT_APART))
     judgement, trial = _settled(solved, options, tell)
     tell("before and after", 1, 1)
     return _verdict(solved, judgement, bank, trial, options, began)
@@ -170,13 +173,14 @@ class Solved:
         return strength(column.described.null, coefficient, error, column.unit)
 
     @property
-    def doubtful(self) -> bool:
-        """Whether the effect that is said to act might be none, by the interval of its strength."""
-        larger, first = self.larger, self.judgement.ranking[0]
+    def doubtful(self) -> tuple[int, ...]:
+        """Columns of effects that are said to act but might be none, by the interval of their strength."""
+        larger, acting = self.larger, self.acting
         if larger is None or self.judgement.conclusion is Conclusion.ONE_OF:
-            return False
-        found = self.strength(first, larger)
-        return found.low <= first.candidate.null <= found.high
+            return ()
+        weighed = {w.column: w for w in self.judgement.ranking if w.column in acting}
+        found = {column: self.strength(weighed[column], larger) for column in acting}
+        return tuple(c for c in acting if found[c].low <= weighed[c].candidate.null <= found[c].high)
 
     @cached_property
     def control(self) -> tuple[Weighed, Refined] | None:
@@ -246,7 +250,7 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
                 control_name="" if control is None else control[0].candidate.effect,
             )
         )  # fmt: skip
-        if len(every) == 1 or place < len(setting.speeds):  # the late thirds are in the recordings as well
+        if len(every) == 1 or place < len(setting.speeds):  # the late parts are in the recordings as well
             helped.append(before.misfit - after.misfit)
             places.append(np.full(len(helped[-1]), place))
             apart += [own.misfit - after.misfit for own in wrong]
@@ -265,7 +269,7 @@ def _verdict(
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
-            statistic=judgement.statistic, null=[float(v) for v in solved.reference.largest],
+            statistic=judgement.statistic, null=[float(v) for v in solved.reference.farthest],
             p_value=judgement.p_value, level=options.level, nulls=bank.words,
         ),
         parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),

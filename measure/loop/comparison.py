@@ -19,6 +19,8 @@ from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 _LEVEL = 0.9
+_ENOUGH = 3
+"""Segments of a recording beyond which two may be left out."""
 _FAR = 2.0
 """Standard errors by which an effect must be better than the control."""
 
@@ -38,7 +40,7 @@ class Trial:
     Attributes:
         comparisons: one a fold.
         helped: (segment,) half misfit before less after (see `measure.loop.yardstick`), each segment of the recordings
-            left out in turn (of a single recording: of its last third).
+            left out in turn (of a single recording: of its last part).
         apart: (segment,) control less after; None without a control.
         recording: (segment,) what was left out together with each.
     """
@@ -94,7 +96,8 @@ class Predictions:
 
 
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
-    """Each recording left out in turn, where there are two or more, and the last third of every recording."""
+    """Each recording left out in turn, where there are two or more, and the last part of every recording: a third, but
+    two segments of four or more, so that chance within a recording shows."""
     recording = segments.recording
     result: list[Fold] = []
     if len(np.unique(recording)) > 1:
@@ -105,9 +108,9 @@ def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
     late = np.zeros(len(recording), dtype=bool)
     for index in np.unique(recording):
         own = np.flatnonzero(recording == index)
-        late[own[-max(1, len(own) // 3) :]] = True
+        late[own[-max(2 if len(own) > _ENOUGH else 1, len(own) // 3) :]] = True
     if not late.all():
-        result.append(Fold(words="last third of each recording, unseen", outside=late))
+        result.append(Fold(words="last part of each recording, unseen", outside=late))
     return tuple(result)
 
 

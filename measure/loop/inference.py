@@ -1,7 +1,8 @@
 """What the statistics of segments say: coefficients, tests against nulls, comparison on held-out segments.
 
 Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null recordings, whose own
-δ is known: the calibration they were simulated with. U is the wind's speed. Recordings of one cloth share the numerics
+δ is known: the calibration they were simulated with. U is the wind's speed; μ is that of the nominal cloth, as far as
+nulls of it tell. Recordings of one cloth share the numerics
 they differ from the fit's by, and what is not linear in its calibration, so that μ has a part in common to an
 experiment: nuisance columns, learnt from the nulls as well.
 """
@@ -27,15 +28,17 @@ _SHIFTS = 16
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """How markers are seen, which moves the mean of what numerics leave.
+    """What is seen, and how, which moves the mean of what numerics leave.
 
     Attributes:
         noise: of a marker's coordinate [m].
         period: between the frames that are used [s].
+        cloth: `Material.fingerprint` of the nominal one.
     """
 
     noise: float
     period: float
+    cloth: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,10 +46,10 @@ class NullModel:
     """μ and Σ of one design, from null segments.
 
     Attributes:
-        coefficients: (feature, column) of μ in 1, U, U².
+        coefficients: (feature, column) of μ in 1, U, U², for the design's cloth.
         covariance: (column, column) Σ of one segment, about the mean of its experiment.
         shifts: (shift, column) how μ moves from one experiment to another: principal directions, each as long as its
-            standard deviation.
+            standard deviation. Where no null is of the design's cloth, how it moves from cloth to cloth is among them.
     """
 
     coefficients: Floats
@@ -65,6 +68,11 @@ class NullModel:
         within = left - means[experiment]
         covariance = within.T @ within / max(len(left) - len(means) - features.shape[1], 1)
         covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(left))
+        first = np.unique(experiment, return_index=True)[1]
+        by_cloth = _by_cloth(means, nulls.numerics[first], nulls.cloth[first], covariance)
+        if design.cloth in by_cloth:
+            coefficients[0] += by_cloth[design.cloth]
+            means = means - np.stack([by_cloth[cloth] for cloth in nulls.cloth[first]])
         return cls(coefficients=coefficients[:_POWERS], covariance=covariance, shifts=_principal(means, covariance))
 
     def mean(self, speeds: Floats) -> Floats:
@@ -83,6 +91,7 @@ class Nulls:
         numerics: (segment,) which mesh and method.
         noise: (segment,) of a marker's coordinate [m].
         period: (segment,) between the frames used [s].
+        cloth: (segment,) `Material.fingerprint` of the nominal one, one to a mesh and method.
     """
 
     statistics: Statistics
@@ -91,6 +100,7 @@ class Nulls:
     numerics: NDArray[np.int64]
     noise: Floats
     period: Floats
+    cloth: NDArray[np.str_]
 
     @cached_property
     def experiment(self) -> NDArray[np.int64]:
@@ -109,6 +119,7 @@ class Nulls:
         return Nulls(
             statistics=self.statistics.select(chosen), speeds=self.speeds[chosen], offsets=self.offsets[chosen],
             numerics=self.numerics[chosen], noise=self.noise[chosen], period=self.period[chosen],
+            cloth=self.cloth[chosen],
         )  # fmt: skip
 
     @classmethod
@@ -120,6 +131,7 @@ class Nulls:
             statistics=Statistics.joined(own), speeds=np.concatenate([p.speeds for p in parts]),
             offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
             noise=np.concatenate([p.noise for p in parts]), period=np.concatenate([p.period for p in parts]),
+            cloth=np.concatenate([p.cloth for p in parts]),
         )  # fmt: skip
 
     def beyond(self, design: Design) -> Floats:
@@ -130,7 +142,7 @@ class Nulls:
     @property
     def design(self) -> Design:
         """Of the first segment: that of all, where they are of one kind."""
-        return Design(noise=float(self.noise[0]), period=float(self.period[0]))
+        return Design(noise=float(self.noise[0]), period=float(self.period[0]), cloth=str(self.cloth[0]))
 
 
 _POWERS = 3
@@ -138,6 +150,36 @@ _POWERS = 3
 
 def _features(speeds: Floats) -> Floats:
     return np.stack([np.ones_like(speeds), speeds, speeds**2], axis=1)
+
+
+def _by_cloth(
+    means: Floats, kinds: NDArray[np.int64], cloths: NDArray[np.str_], covariance: Floats
+) -> dict[str, Floats]:
+    """Cloth → (column,) what the nulls of one nominal cloth have in common, beyond that of all.
+
+    A random effect of the cloth beside one of the numerics, predicted linearly (Henderson, Biometrics 31:423, 1975).
+    Their variances are found by moments, in units of the covariance and summed over the columns. Empty where they
+    cannot be told apart: one cloth alone, or no cloth by two numerics.
+
+    Args:
+        means: (experiment, column).
+        kinds, cloths: (experiment,) its numerics and nominal cloth.
+    """
+    numbers, first = np.unique(kinds, return_index=True)
+    by_kind, cloth_of = np.stack([means[kinds == kind].mean(axis=0) for kind in numbers]), cloths[first]
+    names = [str(name) for name in np.unique(cloth_of)]
+    free = len(numbers) - len(names)
+    if len(names) < 2 or free < 1:
+        return {}
+    centres = {name: by_kind[cloth_of == name].mean(axis=0) for name in names}
+    counts = np.array([(cloth_of == name).sum() for name in names])
+    factor = np.linalg.cholesky(covariance)
+    about = np.linalg.solve(factor, (by_kind - np.stack([centres[str(name)] for name in cloth_of])).T)
+    of_numerics = float((about**2).sum()) / free
+    between = np.linalg.solve(factor, np.stack(list(centres.values())).T).var(axis=1, ddof=1).sum()
+    of_cloths = max(float(between) - of_numerics * float((1 / counts).mean()), 0.0)
+    shrunk = counts * of_cloths / (counts * of_cloths + of_numerics)
+    return {name: share * centres[name] for name, share in zip(names, shrunk, strict=True)}
 
 
 def _principal(means: Floats, covariance: Floats) -> Floats:

@@ -43,6 +43,20 @@ class Model:
         )
         return replace(self, calibration=self.calibration.moved(steps[:own]), effects=effects)
 
+    def steps_from(self, other: Model) -> tuple[float, ...]:
+        """Steps of `moved` that lead here from another model of the same effects."""
+        strengths = (b - a for (_, a), (_, b) in zip(other.effects, self.effects, strict=True))
+        return (*self.calibration.steps_from(other.calibration), *strengths)
+
+    def halved(self) -> Model:
+        """Halfway from here to the nominal base model."""
+        nominal = Calibration()
+        density, bending, damping = (step / 2 for step in self.calibration.steps_from(nominal))
+        return Model(
+            calibration=nominal.moved((density, bending, damping)),
+            effects=tuple((column, coefficient / 2) for column, coefficient in self.effects),
+        )
+
 
 def _kept(column: EffectColumn, coefficient: float) -> float:
     null, (least, most) = column.described.null, column.described.admissible

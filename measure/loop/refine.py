@@ -80,7 +80,7 @@ def refine(
         weighed: the columns of the statistics, but for the calibrated parameters.
 
     Raises:
-        DivergedError: the model's cloth does not stay one, at an eighth of the effects' strengths neither.
+        DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.
     """
     fit = yardstick.evidence(yardstick.found).fit(chosen)
     own = [weighed[c - len(THETA)] for c in chosen]
@@ -129,7 +129,7 @@ def _round(
         found = _linearised(forecaster, segments, origin)
         if np.isfinite(found.r).all() and np.isfinite(found.response).all():
             break
-        origin = replace(origin, effects=tuple((column, strength / 2) for column, strength in origin.effects))
+        origin = origin.halved()
     else:
         raise DivergedError(
             "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
@@ -160,9 +160,18 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
     changes = []
     for place, size in enumerate(sizes):
-        moved = model.moved(tuple(size if k == place else 0.0 for k in range(len(sizes))))
-        changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / size)
+        moved, taken = _stepped(model, place, size)
+        changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / taken)
     return reduced(base, changes, segments.recording, segments.noise)
+
+
+def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:
+    """A model after a step along one of its parameters, with the step: back, where bounds cut the one ahead shorter."""
+    count = len(THETA) + len(model.effects)
+    ways = [model.moved(tuple(way if k == place else 0.0 for k in range(count))) for way in (size, -size)]
+    taken = [moved.steps_from(model)[place] for moved in ways]
+    longer = int(abs(taken[1]) > abs(taken[0]) + 1e-9 * size)
+    return ways[longer], taken[longer]
 
 
 def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:

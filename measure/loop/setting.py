@@ -44,8 +44,11 @@ class Setting:
 
     @property
     def design(self) -> Design:
-        """How its markers are seen: as noisy as in the noisiest recording."""
-        return Design(noise=float(self.segments.noise.max()), period=self.segments.period)
+        """Its markers are as noisy as in the noisiest recording."""
+        return Design(
+            noise=float(self.segments.noise.max()), period=self.segments.period,
+            cloth=self.experiment.specimen.material.fingerprint,
+        )  # fmt: skip
 
     @property
     def recording(self) -> NDArray[np.int64]:

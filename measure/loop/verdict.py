@@ -68,7 +68,7 @@ class Comparison:
     """Errors on data neither model was fitted to: root mean square one-step prediction error [m].
 
     Attributes:
-        what: which data ("recording 7.0 m/s, unseen", "last third of 4.0 m/s").
+        what: which data ("recording 7.0 m/s, unseen", "last part of each recording, unseen").
         frames: how many.
         before, after: of the base model and of the model with the effect.
         reduction: paired, before − after [m].
@@ -140,10 +140,10 @@ class NullTest:
     """The global test.
 
     Attributes:
-        statistic: observed.
-        null: the same of every simulated null.
-        p_value: of the whole test: Bonferroni's of the largest statistic, at 4/5 of the level, and of what the base
-            model leaves altogether, at 1/5; each (1 + nulls at least as large) / (1 + nulls).
+        statistic: observed: how far the farthest column is from nulls' mean, in their standard deviations (see
+            `measure.loop.reference`).
+        null: the same of every group of simulated nulls.
+        p_value: (1 + nulls at least as large) / (1 + nulls); beyond their highest tenth by an exponential tail.
         level: at which it was judged.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
     """

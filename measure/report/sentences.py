@@ -49,7 +49,7 @@ def test_sentence(test: NullTest) -> str:
     says = "is rejected" if test.p_value <= test.level else "is not rejected"
     spread = p_interval(test)
     interval = f" [{probability(spread.low)}, {probability(spread.high)}] {level_text(_LEVEL)}" if spread else ""
-    more = "" if counted(test) else " The p-value is corrected for a second test, of all that the base model leaves."
+    more = "" if counted(test) else " The p-value is that of an exponential tail beyond the highest tenth of them."
     return (
         f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}. "
         f"{as_large(test)} of {len(null)} groups of nulls reach the observed statistic {number(test.statistic)}.{more}"
@@ -76,7 +76,7 @@ def as_large(test: NullTest) -> int:
 
 
 def counted(test: NullTest) -> bool:
-    """Whether the p-value is (1 + nulls at least as large)/(1 + nulls), and not, say, combined with another test's."""
+    """Whether the p-value is (1 + nulls at least as large)/(1 + nulls), and not, say, of a tail beyond most of them."""
     count = sum(map(math.isfinite, test.null))
     return math.isclose(test.p_value, (1 + as_large(test)) / (1 + count), rel_tol=1e-9)
 

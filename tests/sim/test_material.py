@@ -44,6 +44,19 @@ def test_catalog_agrees_with_the_distributed_files(reference_data: Path) -> None
         np.testing.assert_array_equal(cloth.bending, content["bending"])
 
 
+def test_a_fingerprint_tells_cloths_by_their_mass_and_stiffness_alone() -> None:
+    cloth = material.named("camel-ponte-roma")
+    assert replace(cloth, name="another", source="", damping=5e-3).fingerprint == cloth.fingerprint
+    others = [cloth.scaled(**{what: 1.01}) for what in ("density", "stretching", "bending")]
+    assert len({cloth.fingerprint, *(other.fingerprint for other in others)}) == 4
+    # Of the numbers, not of the object: as after a trip through a file.
+    again = Material(
+        name="again", source="", density=float(str(cloth.density)), stretching=cloth.stretching.copy(),
+        bending=cloth.bending.copy(),
+    )  # fmt: skip
+    assert again.fingerprint == cloth.fingerprint
+
+
 def test_thicker_cloth_is_heavier_and_stiffer_by_the_same_factor() -> None:
     thin = material.named("gray-interlock")
     thick = thin.thickened(2)

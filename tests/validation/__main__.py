@@ -7,6 +7,7 @@ from tests.validation.page import draw_page
 
 VALIDATIONS = {
     "arcsim": "tests.validation.arcsim",
+    "arcsim-loop": "tests.validation.arcsim_loop",
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",

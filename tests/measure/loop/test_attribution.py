@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from measure.loop.attribution import GUST_COLUMN, Judgement, finalists, judge, tied, withdrawn
+from measure.loop.attribution import (
+    GUST_COLUMN,
+    NOT_APART,
+    Judgement,
+    alone,
+    finalists,
+    judge,
+    tied,
+    withdrawn,
+)
 from measure.loop.bank import columns, names
 from measure.loop.columns import PRIOR, THETA, EffectColumn
 from measure.loop.inference import Evidence, NullModel, Nulls
@@ -57,7 +68,7 @@ def bank() -> NullBank:
     own = drawn(rng, delta, shifts, speeds)
     nulls = Nulls(
         statistics=own, speeds=speeds[own.recording], offsets=offsets, noise=np.zeros(len(offsets)),
-        period=np.full(len(offsets), 0.04),
+        period=np.full(len(offsets), 0.04), cloth=np.full(len(offsets), "made"),
         numerics=np.repeat(np.arange(KINDS), CLOTHS * WINDS * SEGMENTS),
     )  # fmt: skip
     return NullBank(nulls=nulls, columns=names(), duration=2.0, words="made")
@@ -163,8 +174,19 @@ def test_a_control_as_good_is_named_too(null: NullModel, reference: Reference) -
     assert both.ranking[1].candidate.why_not == ""
 
 
+def test_a_second_effect_that_failed_leaves_a_part_explained(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"lift.coefficient": 1.0})
+    first, second = found.ranking[:2]
+    both = replace(found, conclusion=Conclusion.EFFECT, named=(first.column, second.column))
+    left = alone(both, NOT_APART)
+    assert left.conclusion is Conclusion.PARTLY
+    assert left.named == (first.column,)
+    assert left.ranking[0].candidate.why_not == first.candidate.why_not
+    assert left.ranking[1].candidate.why_not == NOT_APART
+
+
 def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Reference) -> None:
-    """Of an effect whose model, run again, predicts nothing: another is first, or none."""
+    """An effect whose model, run again, predicts nothing is not named."""
     from measure.loop.again import Rerun
 
     rng = np.random.default_rng(2)
@@ -177,4 +199,4 @@ def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Refer
     linear = judge(evidence, reference, level=0.02)
     assert linear.named == (place,)
     useless = Rerun(coefficient=0.1, gains=np.full(12, -1.0), leftover=0.5, evidence=evidence)
-    assert judge(evidence, reference, level=0.02, again={place: useless}).named[:1] != (place,)
+    assert place not in judge(evidence, reference, level=0.02, again={place: useless}).named

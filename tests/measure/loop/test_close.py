@@ -13,6 +13,7 @@ from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
 from measure.loop.close import Options, Solved, close_loop
 from measure.loop.columns import Calibration
+from measure.loop.inference import Design
 from measure.loop.nulls import NullBatch
 from measure.loop.verdict import Conclusion, Estimate, Verdict
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
@@ -25,7 +26,12 @@ DURATION, NOISE, SPEEDS = 4.6, 5e-4, (3.5, 6.0)
 def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """64 nulls of eight kinds of numerics."""
     folder = tmp_path_factory.mktemp("bank")
-    batches = [
+    banks.build(folder, batches(specimen), workers=2)
+    return folder
+
+
+def batches(specimen: Specimen) -> list[NullBatch]:
+    return [
         banks.prior_batch(
             specimen,
             markers=specimen.mesh.rest,
@@ -37,8 +43,6 @@ def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
         for seed in range(8)
     ]
-    banks.build(folder, batches, workers=2)
-    return folder
 
 
 def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
@@ -54,6 +58,19 @@ def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
 def lifted(specimen: Specimen, bank: Path) -> Verdict:
     data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
     return close_loop(data, Options(bank=bank))
+
+
+def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, bank: Path) -> None:
+    nulls = banks.load(bank, words="made").nulls
+    assert nulls.design == Design(noise=NOISE, period=0.04, cloth=specimen.material.fingerprint)
+    for kind, batch in enumerate(batches(specimen)):
+        own = nulls.select(nulls.numerics == kind)
+        recording = own.statistics.recording - own.statistics.recording.min()
+        np.testing.assert_array_equal(own.speeds, np.array(batch.speeds)[recording])
+        steps = np.array([cloth.steps_from(Calibration()) for cloth in batch.calibrations])
+        np.testing.assert_array_equal(own.offsets, steps[recording])
+        assert set(own.cloth) == {specimen.material.fingerprint}
+        assert set(own.noise) == {NOISE}
 
 
 def test_a_null_needs_no_effect(specimen: Specimen, bank: Path) -> None:
@@ -97,19 +114,22 @@ def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifte
 
 
 @pytest.mark.parametrize(
-    ("conclusion", "low", "doubtful"),
+    ("conclusion", "lows", "doubtful"),
     [
-        (Conclusion.EFFECT, -0.3, True), (Conclusion.PARTLY, -0.3, True), (Conclusion.EFFECT, 0.1, False),
-        (Conclusion.ONE_OF, -0.3, False),
+        (Conclusion.EFFECT, (-0.3,), (7,)), (Conclusion.PARTLY, (-0.3,), (7,)), (Conclusion.EFFECT, (0.1,), ()),
+        (Conclusion.ONE_OF, (-0.3,), ()), (Conclusion.EFFECT, (0.1, -0.2), (8,)), (Conclusion.EFFECT, (0.1, 0.2), ()),
     ],
 )  # fmt: skip
-def test_an_effect_that_may_be_none_is_doubtful(conclusion: Conclusion, low: float, doubtful: bool) -> None:
-    first = SimpleNamespace(candidate=SimpleNamespace(null=0.0))
+def test_effects_that_may_be_none_are_doubtful(
+    conclusion: Conclusion, lows: tuple[float, ...], doubtful: tuple[int, ...]
+) -> None:
+    ranking = [SimpleNamespace(column=7 + k, candidate=SimpleNamespace(null=0.0)) for k in range(3)]
     solved = SimpleNamespace(
-        larger=object(), judgement=SimpleNamespace(ranking=(first,), conclusion=conclusion),
-        strength=lambda weighed, larger: Estimate(value=0.5, low=low, high=1.4, unit="1"),
+        larger=object(), judgement=SimpleNamespace(ranking=ranking, conclusion=conclusion),
+        acting=tuple(7 + k for k in range(len(lows))),
+        strength=lambda weighed, larger: Estimate(value=0.5, low=lows[weighed.column - 7], high=1.4, unit="1"),
     )  # fmt: skip
-    assert Solved.doubtful.__get__(solved) is doubtful
+    assert Solved.doubtful.__get__(solved) == doubtful
 
 
 def test_a_bank_of_other_segments_is_refused(specimen: Specimen, bank: Path) -> None:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from measure.loop.comparison import Trial, paired, total_error
+from measure.loop.comparison import Trial, folds, paired, total_error
+from measure.loop.forecast import Segments
 from measure.loop.verdict import Comparison, Estimate
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 
 RNG = np.random.default_rng(1)
 NOISE = RNG.standard_normal(12)
@@ -52,6 +54,21 @@ def test_errors_that_are_not_finite_have_failed() -> None:
     helped = around(1.0)
     helped[3] = np.nan
     assert Trial(comparisons=trial(1.0, 1.0).comparisons, helped=helped).failed
+
+
+@pytest.mark.parametrize(("frames", "each", "late"), [(250, 4, 2), (202, 3, 1), (450, 8, 2), (500, 9, 3)])
+def test_two_segments_of_four_are_late_and_a_third_of_more(
+    specimen: Specimen, frames: int, each: int, late: int
+) -> None:
+    """Of 2 s at 25 frames a second, after 8 frames; with one alone a recording's chance would not show."""
+    wind = WindTrack.constant((4.0, 0.0, 0.0))
+    still = np.zeros((frames, specimen.mesh.vertex_count, 3))
+    own = [Trajectory(name=n, markers=specimen.mesh.rest, positions=still, rate=25.0, wind=wind) for n in ("a", "b")]
+    segments = Segments.of(own)
+    assert len(segments) == 2 * each
+    *apart, last = folds(segments, [4.0, 4.0])
+    np.testing.assert_array_equal([fold.outside for fold in apart], [segments.recording == k for k in (0, 1)])
+    np.testing.assert_array_equal(last.outside, np.tile(np.arange(each) >= each - late, 2))
 
 
 def test_what_differs_between_recordings_is_no_error() -> None:

@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls, gains
-from measure.loop.reference import GUSTS, NullBank
+from measure.loop.reference import GUSTS, NullBank, Reference
 from measure.loop.statistics import Statistics
 
 Floats = NDArray[np.float64]
@@ -53,6 +53,7 @@ class World:
         return Nulls(
             statistics=own, speeds=speeds[own.recording], offsets=offsets[own.recording], numerics=kinds[own.recording],
             noise=np.zeros(len(own.recording)), period=np.full(len(own.recording), 0.04),
+            cloth=np.full(len(own.recording), "made"),
         )  # fmt: skip
 
     def data(self, null: NullModel, delta: Floats) -> Evidence:
@@ -100,10 +101,48 @@ def test_the_mean_is_that_of_the_design_of_the_data(world: World) -> None:
     moved = nulls.statistics.r + 3.0 * (1e3 * noise[:, None]) ** 2 - 2.0 * (period[:, None] - 0.04) / 0.01
     seen = replace(nulls, statistics=replace(nulls.statistics, r=moved), noise=noise, period=period)
     speed = np.array([5.0])
-    plain = NullModel.fit(nulls, Design(noise=0.0, period=0.04)).mean(speed)
-    found = NullModel.fit(seen, Design(noise=1e-3, period=0.03)).mean(speed)
+    plain = NullModel.fit(nulls, nulls.design).mean(speed)
+    found = NullModel.fit(seen, Design(noise=1e-3, period=0.03, cloth="made")).mean(speed)
     bound = 12 / 40**0.5 * np.abs(world.direction) + 0.5
     assert (np.abs(found - plain - 5.0) < bound).all()
+
+
+def of_cloths(world: World, moves: dict[str, Floats]) -> Nulls:
+    """Nulls of cloths in turn, one to a kind of numerics, whose means are moved."""
+    nulls = world.nulls()
+    cloth = np.array(list(moves))[nulls.numerics % len(moves)]
+    moved = nulls.statistics.r + np.stack([moves[str(name)] for name in cloth])
+    return replace(nulls, statistics=replace(nulls.statistics, r=moved), cloth=cloth)
+
+
+def test_the_mean_is_that_of_the_cloth_of_the_data() -> None:
+    world = World(1)
+    moves = {name: 6 * world.rng.normal(size=COLUMNS) for name in ("wool", "silk", "felt", "jute")}
+    centre = np.mean(list(moves.values()), axis=0)
+    nulls = of_cloths(world, moves)
+    speed = np.array([5.0])
+    unknown = NullModel.fit(nulls, replace(nulls.design, cloth="linen"))
+    for name, move in moves.items():
+        known = NullModel.fit(nulls, replace(nulls.design, cloth=name))
+        # Of the five kinds of a cloth: their shifts have deviation 1 along the direction, two experiments each; and of
+        # the 160 segments noise. Three deviations.
+        bound = 3 * (np.abs(world.direction) / 10**0.5 + np.sqrt(np.diag(world.covariance) / 160)) + 0.2
+        assert (np.abs((known.mean(speed) - unknown.mean(speed))[0] - (move - centre)) < bound).all(), name
+        # How cloths differ is a shift of one that is not known, and of no other.
+        spread = [np.linalg.norm(model.shifts) for model in (known, unknown)]
+        assert spread[0] < 0.75 * spread[1]
+
+
+def test_cloths_that_are_alike_move_no_mean() -> None:
+    # Where the cloth moves nothing, its share is a few hundredths: the moments of 20 kinds say it is little or none.
+    world = World(1)
+    nulls = of_cloths(world, {name: np.zeros(COLUMNS) for name in ("wool", "silk", "felt", "jute")})
+    speed = np.array([5.0])
+    means = [
+        NullModel.fit(nulls, replace(nulls.design, cloth=name)).mean(speed)[0] for name in ("wool", "silk", "none")
+    ]
+    own = np.linalg.solve(np.linalg.cholesky(world.covariance), np.stack([means[0] - means[2], means[1] - means[2]]).T)
+    assert np.abs(own).max() < 1.0
 
 
 def test_the_null_model_finds_how_numerics_shift_the_mean(world: World, null: NullModel) -> None:
@@ -127,10 +166,27 @@ def test_p_values_of_nulls_are_uniform() -> None:
     found = []
     for _ in range(150):
         data = world.data(null, effect(0.0))
-        found.append(reference.p_family(float(reference.statistics(data, columns).max())))
+        found.append(reference.p_left_by(data, columns, ()))
     # Of 150 draws against 40 experiments: their quantiles are themselves uncertain by 1/√40 at the most.
     assert kstest(found, uniform.cdf).statistic < 2 / 40**0.5
     assert np.mean(np.array(found) <= 0.05) < 0.05 + 3 * (0.05 / 40) ** 0.5
+
+
+def test_few_kinds_of_numerics_make_no_null_rare() -> None:
+    """400 groups of 40 kinds that are alike within a kind: a new draw beyond all is no event of 1 in 400, but in 41."""
+    rng, kinds, worlds = np.random.default_rng(4), np.repeat(np.arange(40), 10), 4000
+    found = []
+    for _ in range(worlds):
+        far = rng.exponential(size=40)[kinds, None]
+        reference = Reference(
+            scaled=far, spread=np.ones(1), far=far, kinds=kinds, centre=np.zeros(1), width=np.ones(1)
+        )  # fmt: skip
+        found.append(reference.p_global(rng.exponential()))
+    for level in (0.005, 0.02, 0.05, 0.5):
+        share = float(np.mean(np.array(found) <= level))
+        # Three standard errors; the threshold is a quantile of 40 draws, which is 0.1 but for a quarter.
+        assert 0.6 * level < share + 3 * (level / worlds) ** 0.5
+        assert share < 1.3 * level + 3 * (level / worlds) ** 0.5, level
 
 
 def test_a_bank_of_shorter_experiments_than_the_data_is_refused(world: World) -> None:
@@ -241,9 +297,8 @@ def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
             + extra**2 * evidence.curvature[:, place, place],
         )  # fmt: skip
         freed = moved.freed(place)
-        beside = reference.beside()
-        before.append(reference.p_global(reference.statistics(moved, columns), moved.fit(()).left))
-        after.append(beside.p_global(beside.statistics(freed, columns), freed.fit(()).left))
+        before.append(reference.p_left_by(moved, columns, ()))
+        after.append(reference.beside().p_left_by(freed, columns, ()))
     assert np.median(before) < 0.02
     # As of nulls, whose p-values are uniform: 30 of them have a median of 0.5 ± 0.09.
     assert np.median(after) > 0.25

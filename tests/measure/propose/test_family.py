@@ -33,7 +33,7 @@ def drawn(rng: np.random.Generator) -> tuple[Nulls, Statistics]:
     )  # fmt: skip
     nulls = Nulls(
         statistics=own, speeds=rng.uniform(3, 6, count), offsets=offsets, numerics=numerics, noise=np.zeros(count),
-        period=np.full(count, 0.04),
+        period=np.full(count, 0.04), cloth=np.full(count, "made"),
     )  # fmt: skip
     terms = np.tile(rng.normal(size=(DIRECTIONS, TERMS)), (4, 1, 1))
     seen = Statistics(

@@ -46,16 +46,16 @@ def test_too_few_nulls_for_the_level_are_called_so() -> None:
     assert "no p-value below 0.05" in sentences.test_remark(test)
 
 
-def test_a_p_value_that_other_tests_contribute_to_gets_no_interval_and_no_critical_value() -> None:
-    """Bonferroni over two tests: p is not the share of the nulls shown, so nothing is derived from that share."""
+def test_a_p_value_of_a_tail_gets_no_interval_and_no_critical_value() -> None:
+    """p is not the share of the nulls shown, so nothing is derived from that share."""
     alone = null_test([float(v) for v in range(1, 100)], 98.5, 0.05)
     combined = replace(alone, p_value=alone.p_value / 0.8)
     assert sentences.critical_value(alone) is not None
     assert sentences.p_interval(alone) is not None
     assert sentences.critical_value(combined) is None
     assert sentences.p_interval(combined) is None
-    assert "corrected for a second test" in sentences.test_sentence(combined)
-    assert "corrected" not in sentences.test_sentence(alone)
+    assert "exponential tail" in sentences.test_sentence(combined)
+    assert "tail" not in sentences.test_sentence(alone)
 
 
 def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:

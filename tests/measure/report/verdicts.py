@@ -176,7 +176,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         ranking=candidates(named, 3),
         comparisons=tuple(
             comparison(what, before, with_after=not sufficient, oracle=conclusion is Conclusion.EFFECT)
-            for what, before in (("tunnel 7.0 m/s, unseen", 0.0042), ("last third of tunnel 5.5 m/s", 0.0033))
+            for what, before in (("tunnel 7.0 m/s, unseen", 0.0042), ("last part of tunnel 5.5 m/s", 0.0033))
         ),
         residuals=tuple(
             residual(name, speed, held_out=held_out, with_after=not sufficient, seed=n, size_of=size)
