@@ -203,8 +203,9 @@ class Catalog:
         version = self.head()
         table = self._writable(version)
         table.create_checkpoint()
-        for name in (f"{version:020d}.checkpoint.parquet", "_last_checkpoint"):
-            flush_file(self._log / name)
+        flush_file(self._log / f"{version:020d}{_CHECKPOINT}")
+        if (hint := self._log / _HINT).exists():
+            flush_file(hint)
         flush_folder(self._log)
         small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
         if len(small) > 1:
@@ -295,10 +296,11 @@ class Catalog:
         return {key.removeprefix(_INFO_PREFIX): digest for key, digest in hashes.items()}
 
     def _checkpoint(self) -> int:
-        try:
-            return int(json.loads((self._log / "_last_checkpoint").read_text())["version"])
-        except FileNotFoundError:
-            return 0
+        """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
+        return max((int(path.name.removesuffix(_CHECKPOINT)) for path in self._checkpoints()), default=0)
+
+    def _checkpoints(self) -> list[Path]:
+        return sorted(self._log.glob(f"*{_CHECKPOINT}"))
 
     def _open(self, version: int) -> DeltaTable:
         try:
@@ -310,13 +312,12 @@ class Catalog:
             self._entries.files()  # raises, where an entry is to blame
             first = str(error).splitlines()[0]  # without the Delta library's stack
             restore = "restore the folder from a copy"
-            checkpoints = any(self._log.glob("*.checkpoint.parquet"))
             raise CorruptError(
                 f"the catalog's log cannot be read: {first}",
                 where=str(self._log),
-                fix="delete _last_checkpoint and *.checkpoint.parquet there: they save time, the .json files hold all;"
+                fix=f"delete {_HINT} and *{_CHECKPOINT} there: they save time, the .json files hold all;"
                 f" if that does not help, {restore}"
-                if checkpoints
+                if self._checkpoints()
                 else restore,
             ) from None
         unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
@@ -375,6 +376,8 @@ class Catalog:
         self._entries.acknowledge(version)
 
 
+_CHECKPOINT = ".checkpoint.parquet"
+_HINT = "_last_checkpoint"
 _HOOKS = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import multiprocessing
 import os
 import pickle
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from deltalake import DeltaTable
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
 from flagdata.findings import Severity
@@ -285,6 +287,25 @@ def test_a_damaged_checkpoint_is_told_and_the_fix_that_is_named_works(lake: Lake
     for path in (*checkpoints, log / "_last_checkpoint"):
         path.unlink()
     assert Lake.open(lake.path).rows().num_rows == 40
+
+
+def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(lake: Lake, put_text: Put) -> None:
+    count = 0
+    while not lake.catalog.is_due_for_tidying():
+        put_text(lake, str(count))
+        count += 1
+    log = lake.path / "catalog" / "_delta_log"
+    DeltaTable(lake.catalog.path).create_checkpoint()
+    (log / "_last_checkpoint").unlink()
+    (left,) = log.glob("*.checkpoint.parquet")
+    later = Lake.open(lake.path)
+    for i in range(count, 2 * count + 1):
+        put_text(later, str(i))
+    newest = max(log.glob("*.checkpoint.parquet"))
+    assert newest > left
+    assert json.loads((log / "_last_checkpoint").read_text())["version"] == int(newest.name.split(".")[0])
+    assert Lake.open(lake.path).rows().num_rows == 2 * count + 1
+    assert doctor(later, grace=NOW) == ()
 
 
 def test_a_lake_travels_by_pickle(lake: Lake, put_text: Put) -> None:
