@@ -169,7 +169,7 @@ def _measurement(closed: Closed, stored: str | None = None) -> Artifact:
     verdict = closed.verdict
     report = {
         "schema": "flagdata.close-loop-report/1", "conclusion": verdict.conclusion.value, "named": list(verdict.named),
-        "words": verdict.words, "p_value": verdict.test.p_value, "separating": verdict.separating,
+        "words": verdict.words, "p_value": verdict.test.p_value.value, "separating": verdict.separating,
         "findings": [finding.as_dict() for finding in closed.findings],
     }  # fmt: skip
     return Artifact(

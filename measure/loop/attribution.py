@@ -110,7 +110,7 @@ def judge(
     """
     statistics = reference.statistics(evidence, names())
     statistic = reference.farthest_of(statistics, evidence.fit(()).left)
-    p_value = reference.p_global(statistic)
+    p_value = reference.rarity.p(statistic)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     corrective = [i + _FIRST for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
     held_out = gains(evidence, [[i] for i, _ in effects])

@@ -53,6 +53,7 @@ from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
+_INTERVAL = 0.9
 _KINDS = 20
 FEWEST_NULLS = _KINDS * banks.BATCH
 """So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
@@ -266,11 +267,14 @@ def _verdict(
     setting, larger = solved.setting, solved.larger if judgement.named else None
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
+    rarity = solved.reference.rarity
+    low, high = rarity.interval(judgement.statistic, level=_INTERVAL)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
-            statistic=judgement.statistic, null=[float(v) for v in solved.reference.farthest],
-            p_value=judgement.p_value, level=options.level, nulls=bank.words,
+            statistic=judgement.statistic, null=[float(v) for v in rarity.null],
+            p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=_INTERVAL),
+            level=options.level, critical=rarity.critical(options.level), nulls=bank.words,
         ),
         parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
         comparisons=trial.comparisons,

@@ -14,6 +14,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
+from measure.loop.rarity import Rarity
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
@@ -209,9 +210,9 @@ class Reference:
         return self.beside_gusts
 
     @cached_property
-    def farthest(self) -> Floats:
-        """(group,) how far the farthest is, of all columns and what is left."""
-        return self.far.max(axis=1)
+    def rarity(self) -> Rarity:
+        """Of how far the farthest is, of all columns and what is left: the global test's."""
+        return Rarity(null=self.far.max(axis=1), kinds=self.kinds)
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
         """(column,) of data, gusts the last, where some columns are fitted already."""
@@ -219,7 +220,7 @@ class Reference:
 
     def p_family(self, statistic: float, column: int) -> float:
         """Chance that in nulls any is as far as this column."""
-        return self.p_global(float(self._far(statistic * self.spread[column], column)))
+        return self.rarity.p(float(self._far(statistic * self.spread[column], column)))
 
     def p_alone(self, statistic: float, column: int) -> float:
         """The same for the column alone."""
@@ -227,7 +228,7 @@ class Reference:
 
     def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
         """Of the global test on what some columns leave, fitted to the data."""
-        return self.p_global(self.farthest_of(self.statistics(evidence, columns, chosen), evidence.fit(chosen).left))
+        return self.rarity.p(self.farthest_of(self.statistics(evidence, columns, chosen), evidence.fit(chosen).left))
 
     def farthest_of(self, statistics: Floats, left: float) -> float:
         """How far the farthest of data is: the statistic of the global test."""
@@ -237,25 +238,7 @@ class Reference:
         """Of shares, and what is left the last, as `far` has it."""
         return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
 
-    def p_global(self, farthest: float) -> float:
-        """Of the global test: the share of groups as far, beyond their highest tenth by an exponential tail.
 
-        What is rare, few kinds of numerics say: groups of one kind are alike. So the tail's mean excess m is that of as
-        many independent draws as kinds k reach it, and its chance that of the next draw, (1 + x/(k m))^(−k) at an
-        excess x. (Peaks over a threshold: Davison and Smith, J. R. Stat. Soc. B 52:393, 1990; for tests of few
-        permutations: Knijnenburg et al., Bioinformatics 25:i161, 2009.) Never less than 1/(1 + groups).
-        """
-        null = self.farthest
-        threshold = float(np.quantile(null, 1 - _TAIL))
-        beyond = null > threshold
-        if farthest <= threshold or not beyond.any():
-            return _p(null, farthest)
-        mean, count = float((null[beyond] - threshold).mean()), len(np.unique(self.kinds[beyond]))
-        tail = _TAIL * (1 + (farthest - threshold) / (count * mean)) ** -count
-        return max(tail, 1 / (1 + len(null)))
-
-
-_TAIL = 0.1
 _NOTHING = 1e-6
 """Mean share below which a column is never seen: that of the columns that are always fitted."""
 _ALIKE = 1.5e-3

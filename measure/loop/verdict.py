@@ -143,15 +143,18 @@ class NullTest:
         statistic: observed: how far the farthest column is from nulls' mean, in their standard deviations (see
             `measure.loop.reference`).
         null: the same of every group of simulated nulls.
-        p_value: (1 + nulls at least as large) / (1 + nulls); beyond their highest tenth by an exponential tail.
+        p_value: chance of a null as large, with the interval that few kinds of numerics leave it (see
+            `measure.loop.rarity`).
         level: at which it was judged.
+        critical: the statistic beyond which the base model is rejected; None where no null is rare enough for it.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
     """
 
     statistic: float
     null: list[float]
-    p_value: float
+    p_value: Estimate
     level: float
+    critical: float | None
     nulls: str
 
 

@@ -32,7 +32,7 @@ _SEPARATES: dict[frozenset[str], str] = {
 
 def sentence(verdict: Verdict) -> str:
     """The verdict in words."""
-    test = f"p = {probability(verdict.test.p_value)} against {len(verdict.test.null)} groups of nulls"
+    test = f"p = {probability(verdict.test.p_value.value)} against {len(verdict.test.null)} groups of nulls"
     if verdict.conclusion is Conclusion.SUFFICIENT:
         return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
     rejected = f"The base model is rejected ({test})."

@@ -10,7 +10,6 @@ from markupsafe import Markup
 from measure.loop.quantity import display, number
 from measure.loop.verdict import NullTest, Residual
 from measure.report.chart import Chart, Linear, Logarithmic
-from measure.report.sentences import critical_value
 
 _LEFT, _RIGHT, _TOP = 62.0, 628.0, 34.0
 _BINS = 24
@@ -87,7 +86,7 @@ def null_distribution(test: NullTest) -> Markup:
     """A histogram of the statistic over simulated nulls, the observed one, and the least that would be significant."""
     null = [v for v in test.null if math.isfinite(v)]
     values = [v for v in (*null, test.statistic) if math.isfinite(v)]
-    critical = critical_value(test)
+    critical = test.critical
     marked = [*values, *([critical] if critical is not None else [])]
     ratio = bool(values) and min(values) > 0 and math.isfinite(test.statistic) and test.statistic > _FAR * max(null)
     x = Logarithmic.over(marked, _LEFT, _RIGHT) if ratio else Linear.over(marked, _LEFT, _RIGHT)

@@ -55,7 +55,6 @@ def page(verdict: Verdict) -> str:
         "heading": sentences.heading(verdict),
         "test_sentence": sentences.test_sentence(verdict.test),
         "remark": sentences.test_remark(verdict.test),
-        "p_interval": sentences.p_interval(verdict.test),
         "named": named,
         "rejected": sentences.rejected(verdict),
         "warnings": sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict),

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from scipy.stats import binomtest
-
 from measure.loop.quantity import known, level_text, number, probability
 from measure.loop.titles import title, titles
 from measure.loop.verdict import Candidate, Conclusion, Estimate, NullTest, Verdict
-
-_LEVEL = 0.9
 
 
 def heading(verdict: Verdict) -> str:
@@ -46,26 +42,25 @@ def after_label(verdict: Verdict) -> str:
 def test_sentence(test: NullTest) -> str:
     """The global test with its p-value, the interval that the number of nulls leaves it, and what it says."""
     null = [v for v in test.null if math.isfinite(v)]
-    says = "is rejected" if test.p_value <= test.level else "is not rejected"
-    spread = p_interval(test)
-    interval = f" [{probability(spread.low)}, {probability(spread.high)}] {level_text(_LEVEL)}" if spread else ""
-    more = "" if counted(test) else " The p-value is that of an exponential tail beyond the highest tenth of them."
+    p = test.p_value
+    says = "is rejected" if p.value <= test.level else "is not rejected"
+    interval = f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}"
     return (
-        f"The base model {says}: p = {probability(test.p_value)}{interval} at level {test.level:g}. "
-        f"{as_large(test)} of {len(null)} groups of nulls reach the observed statistic {number(test.statistic)}.{more}"
+        f"The base model {says}: p = {probability(p.value)} {interval} at level {test.level:g}. {as_large(test)} of "
+        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}; beyond their highest "
+        f"tenth p is that of an exponential tail, and its interval that of other draws of the kinds of numerics."
     )
 
 
 def test_remark(test: NullTest) -> str:
     """What limits the test; empty where nothing does."""
-    count = sum(map(math.isfinite, test.null))
-    least = 1 / (1 + count)
-    if counted(test) and least > test.level:
+    if test.critical is None:
+        count = sum(map(math.isfinite, test.null))
         return (
-            f"With {count} nulls no p-value below {probability(least)} is possible: it could not have rejected at "
-            f"level {test.level:g}."
+            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible: it could not have "
+            f"rejected at level {test.level:g}."
         )
-    if test.p_value > test.level:
+    if test.p_value.value > test.level:
         return "An effect too weak for these recordings to show may still be there."
     return ""
 
@@ -73,34 +68,6 @@ def test_remark(test: NullTest) -> str:
 def as_large(test: NullTest) -> int:
     """How many nulls are at least as large as the observed statistic."""
     return sum(1 for v in test.null if math.isfinite(v) and v >= test.statistic)
-
-
-def counted(test: NullTest) -> bool:
-    """Whether the p-value is (1 + nulls at least as large)/(1 + nulls), and not, say, of a tail beyond most of them."""
-    count = sum(map(math.isfinite, test.null))
-    return math.isclose(test.p_value, (1 + as_large(test)) / (1 + count), rel_tol=1e-9)
-
-
-def critical_value(test: NullTest) -> float | None:
-    """The least statistic with a p-value not above the level; None where there are too few nulls, or it is not counted.
-
-    p = (1 + k)/(1 + n) ≤ level allows k = ⌊level (1 + n)⌋ − 1 nulls at least as large, so the statistic has to exceed
-    the next one.
-    """
-    null = sorted((v for v in test.null if math.isfinite(v)), reverse=True)
-    allowed = math.floor(test.level * (1 + len(null)) + 1e-9) - 1
-    return null[allowed] if counted(test) and 0 <= allowed < len(null) else None
-
-
-def p_interval(test: NullTest) -> Estimate | None:
-    """Clopper–Pearson interval of the chance that a null is at least as large; None where p is not that chance."""
-    count = sum(map(math.isfinite, test.null))
-    if not count or not counted(test):
-        return None
-    interval = binomtest(as_large(test), count).proportion_ci(_LEVEL, method="exact")
-    return Estimate(
-        value=test.p_value, low=float(interval.low), high=float(interval.high), unit="1", level=_LEVEL
-    )  # fmt: skip
 
 
 def control_warnings(verdict: Verdict) -> list[str]:

@@ -81,7 +81,7 @@ def _recording(runs: Path, name: str, rise: float) -> Observation:
 def _told(verdict: Verdict, declared: Declared) -> dict[str, Any]:
     return {
         "true": dict(declared.true), "said": verdict.conclusion.value, "named": list(verdict.named),
-        "words": verdict.words, "statistic": verdict.test.statistic, "p": verdict.test.p_value,
+        "words": verdict.words, "statistic": verdict.test.statistic, "p": verdict.test.p_value.value,
         "level": verdict.test.level, "nulls": verdict.test.nulls, "seconds": round(verdict.seconds),
         "first": [_candidate(candidate) for candidate in verdict.ranking[:3]],
         "E_red": [comparison.share for comparison in verdict.comparisons],

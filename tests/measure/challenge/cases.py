@@ -85,8 +85,9 @@ def comparison(*, share: float | None = 0.9, after: float = 1e-3, control: float
 
 def verdict(conclusion: Conclusion, *named: str, **options: Any) -> Verdict:
     return Verdict(
-        conclusion=conclusion, named=named, words="", test=NullTest(statistic=1.0, null=[], p_value=0.5, level=0.05,
-        nulls=""), parameters=(), ranking=options.get("ranking", tuple(candidate(name) for name in named)),
+        conclusion=conclusion, named=named, words="", parameters=(),
+        test=NullTest(statistic=1.0, null=[], p_value=estimate(0.5), level=0.05, critical=None, nulls=""),
+        ranking=options.get("ranking", tuple(candidate(name) for name in named)),
         comparisons=options.get("comparisons", (comparison(),) if named else ()), residuals=(),
     )  # fmt: skip
 

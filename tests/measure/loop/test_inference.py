@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls, gains
-from measure.loop.reference import GUSTS, NullBank, Reference
+from measure.loop.reference import GUSTS, NullBank
 from measure.loop.statistics import Statistics
 
 Floats = NDArray[np.float64]
@@ -170,23 +170,6 @@ def test_p_values_of_nulls_are_uniform() -> None:
     # Of 150 draws against 40 experiments: their quantiles are themselves uncertain by 1/√40 at the most.
     assert kstest(found, uniform.cdf).statistic < 2 / 40**0.5
     assert np.mean(np.array(found) <= 0.05) < 0.05 + 3 * (0.05 / 40) ** 0.5
-
-
-def test_few_kinds_of_numerics_make_no_null_rare() -> None:
-    """400 groups of 40 kinds that are alike within a kind: a new draw beyond all is no event of 1 in 400, but in 41."""
-    rng, kinds, worlds = np.random.default_rng(4), np.repeat(np.arange(40), 10), 4000
-    found = []
-    for _ in range(worlds):
-        far = rng.exponential(size=40)[kinds, None]
-        reference = Reference(
-            scaled=far, spread=np.ones(1), far=far, kinds=kinds, centre=np.zeros(1), width=np.ones(1)
-        )  # fmt: skip
-        found.append(reference.p_global(rng.exponential()))
-    for level in (0.005, 0.02, 0.05, 0.5):
-        share = float(np.mean(np.array(found) <= level))
-        # Three standard errors; the threshold is a quantile of 40 draws, which is 0.1 but for a quarter.
-        assert 0.6 * level < share + 3 * (level / worlds) ** 0.5
-        assert share < 1.3 * level + 3 * (level / worlds) ** 0.5, level
 
 
 def test_a_bank_of_shorter_experiments_than_the_data_is_refused(world: World) -> None:

@@ -14,48 +14,21 @@ from measure.report.words import words
 from tests.measure.report.verdicts import about, verdict
 
 
-def null_test(null: list[float], statistic: float, level: float) -> NullTest:
-    reached = sum(v >= statistic for v in null)
-    return NullTest(statistic=statistic, null=null, p_value=(1 + reached) / (1 + len(null)), level=level, nulls="")
-
-
-def test_the_interval_of_a_p_value_without_a_larger_null_is_clopper_and_pearsons_closed_form() -> None:
-    """With none of n reached, the upper end at 90 % is 1 − 0.05^(1/n), the lower 0."""
-    spread = sentences.p_interval(null_test([1.0] * 199, 2.0, 0.01))
-    assert spread is not None
-    assert spread.low == 0
-    assert spread.high == pytest.approx(1 - 0.05 ** (1 / 199), rel=1e-9)
-
-
-def test_nothing_is_said_of_a_p_value_without_nulls() -> None:
-    assert sentences.p_interval(null_test([], 2.0, 0.01)) is None
-
-
-def test_the_critical_value_is_the_one_that_leaves_room_for_the_allowed_nulls() -> None:
-    """99 nulls 1…99 at level 0.03: p ≤ 0.03 allows 2 nulls at least as large (98, 99), so 97 has to be exceeded."""
-    nulls = [float(v) for v in range(1, 100)]
-    assert sentences.critical_value(null_test(nulls, 0.0, 0.03)) == 97.0
-    for statistic, significant in ((97.0, False), (97.5, True)):
-        test = null_test(nulls, statistic, 0.03)
-        assert (test.p_value <= test.level) is significant
-
-
 def test_too_few_nulls_for_the_level_are_called_so() -> None:
-    test = null_test([1.0] * 19, 5.0, 0.01)
-    assert sentences.critical_value(test) is None
+    test = NullTest(
+        statistic=5.0, null=[1.0] * 19, p_value=about(0.05, 0.01), level=0.01, critical=None, nulls="few"
+    )  # fmt: skip
     assert "no p-value below 0.05" in sentences.test_remark(test)
 
 
-def test_a_p_value_of_a_tail_gets_no_interval_and_no_critical_value() -> None:
-    """p is not the share of the nulls shown, so nothing is derived from that share."""
-    alone = null_test([float(v) for v in range(1, 100)], 98.5, 0.05)
-    combined = replace(alone, p_value=alone.p_value / 0.8)
-    assert sentences.critical_value(alone) is not None
-    assert sentences.p_interval(alone) is not None
-    assert sentences.critical_value(combined) is None
-    assert sentences.p_interval(combined) is None
-    assert "exponential tail" in sentences.test_sentence(combined)
-    assert "tail" not in sentences.test_sentence(alone)
+def test_the_test_is_told_with_its_interval_and_how_many_nulls_reach_it() -> None:
+    whole = verdict(Conclusion.SUFFICIENT)
+    reached = sum(v >= whole.test.statistic for v in whole.test.null)
+    told = sentences.test_sentence(whole.test)
+    assert told.startswith("The base model is not rejected: p = ")
+    assert f" {reached} of 199 groups of nulls reach the observed statistic 1.13" in told
+    assert "90 % at level 0.01" in told
+    assert sentences.test_remark(verdict(Conclusion.EFFECT).test) == ""
 
 
 def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
@@ -75,7 +48,7 @@ def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
 
 
 def test_a_base_model_that_is_not_rejected_is_not_called_true() -> None:
-    remark = sentences.test_remark(null_test([1.0, 2.0, 3.0] * 50, 2.5, 0.05))
+    remark = sentences.test_remark(verdict(Conclusion.SUFFICIENT).test)
     assert remark == "An effect too weak for these recordings to show may still be there."
 
 

@@ -131,6 +131,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
     }[conclusion]
     null = rng.lognormal(0.0, 0.3, size=199)
     statistic = 1.13 if sufficient else 41.27 if conclusion is Conclusion.EFFECT else 2.61
+    p = (1 + int((null >= statistic).sum())) / 200
     names = (("tunnel 4.0 m/s", 4.0, False), ("tunnel 5.5 m/s", 5.5, False), ("tunnel 7.0 m/s", 7.0, True))
     return Verdict(
         conclusion=conclusion,
@@ -149,8 +150,9 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         test=NullTest(
             statistic=statistic,
             null=null.tolist(),
-            p_value=(1 + int((null >= statistic).sum())) / 200,
+            p_value=Estimate(value=p, low=0.5 * p, high=min(2.5 * p, 1.0), unit="1"),
             level=0.01,
+            critical=float(np.sort(null)[-2]),
             nulls="199 simulations at parameters drawn from the posterior, with half the step and a finer mesh.",
         ),
         parameters=(
