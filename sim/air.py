@@ -24,7 +24,7 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from flagdata.registry import Registry
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 
 # Dynamic viscosity of air at 288.15 K, U.S. Standard Atmosphere 1976, table 4.
 _VISCOSITY = 1.789e-5
@@ -65,12 +65,12 @@ class FaceWind:
 
 def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> FaceWind:
     """The relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
-    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+    x0, x1, x2 = cloth.at_corners(position)
     normal = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
     length = (normal * normal).sum(1, keepdim=True).sqrt()
     normal = normal / length.clamp(min=torch.finfo(position.dtype).tiny)
     at_vertices = wind - velocity
-    r0, r1, r2 = (at_vertices[cloth.faces[:, c]] for c in range(3))
+    r0, r1, r2 = cloth.at_corners(at_vertices)
     relative = (r0 + r1 + r2) / 3
     return FaceWind(normal=normal, relative=relative, across=(relative * normal).sum(1, keepdim=True))
 
@@ -104,7 +104,7 @@ class QuadraticNormal:
         seen = face_wind(cloth, position, velocity, wind)
         third = (cloth.areas / 3)[:, None, None]
         push = third * (self.density * seen.across.abs() * seen.across * seen.normal + self.drag * seen.along)
-        return gather_sum([push, push, push], cloth.face_slots)
+        return cloth.shared_out(push)
 
 
 NO_AIR = QuadraticNormal(density=0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -39,7 +40,7 @@ class Cloth:
         grid: where the samples are.
         segments: (3, 5, batch) bending [N·m].
         damping: (batch,) d [s].
-        face_slots: (vertex, k) rows of the stacked corner forces (3·face, …) to sum at each vertex, padded with 3·face.
+        face_slots: (k, vertex) rows of the stacked corner forces (3·face, …) to sum at each vertex, padded with 3·face.
         hinge_slots: the same for (4·hinge, …), padded with 4·hinge.
         stiffening: (hinge, batch) bending stiffness on top, as a share of the table's; None where there is none.
     """
@@ -114,6 +115,26 @@ class Cloth:
             hinge_slots=index(incidence(mesh.hinges, mesh.vertex_count)),
         )
 
+    def at_corners(self, field: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """A vertex field (vertex, …) at the three corners of the faces: (face, …) each."""
+        first, second, third = field.index_select(0, self._corner).unflatten(0, (3, len(self.faces)))
+        return first, second, third
+
+    def shared_out(self, share: Tensor) -> Tensor:
+        """What each face (face, 3, batch) gives to each of its corners, summed at the vertices: (vertex, 3, batch)."""
+        return gather_sum([share], self._around)
+
+    @cached_property
+    def _corner(self) -> Tensor:
+        """(3·face,) vertices, of the first corners first."""
+        return self.faces.T.reshape(-1)
+
+    @cached_property
+    def _around(self) -> Tensor:
+        """(k, vertex) faces around each vertex in the order of `face_slots`, padded with their number."""
+        count = len(self.faces)
+        return torch.where(self.face_slots == 3 * count, count, self.face_slots % count)
+
     @property
     def batch(self) -> int:
         return len(self.materials)
@@ -134,7 +155,7 @@ def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int6
         elements: (element, corner) vertex indices.
 
     Returns:
-        (vertex, k) indices `corner * len(elements) + element` in ascending order, padded with `elements.size`.
+        (k, vertex) indices `corner * len(elements) + element` in ascending order, padded with `elements.size`.
     """
     vertex = elements.T.ravel()
     order = np.argsort(vertex, kind="stable")
@@ -143,7 +164,7 @@ def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int6
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     rank = np.arange(len(vertex)) - np.repeat(starts, counts)
     slots[vertex[order], rank] = order
-    return slots
+    return np.ascontiguousarray(slots.T)
 
 
 def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
@@ -151,14 +172,14 @@ def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
 
     Args:
         corners: one (element, 3, batch) tensor for each corner.
-        slots: (vertex, k) from `incidence`.
+        slots: (k, vertex) from `incidence`.
 
     Returns:
         (vertex, 3, batch).
     """
-    zero = torch.zeros_like(corners[0][:1])
-    stacked = torch.cat([*corners, zero])
-    total = stacked[slots[:, 0]]
-    for k in range(1, slots.shape[1]):
-        total = total + stacked[slots[:, k]]
+    stacked = torch.cat([*corners, torch.zeros_like(corners[0][:1])])
+    first, *others = stacked.index_select(0, slots.reshape(-1)).unflatten(0, tuple(slots.shape))
+    total = first.clone()
+    for other in others:
+        total += other
     return total

@@ -16,7 +16,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 
 
 def rest_areas(cloth: Cloth) -> Tensor:
@@ -26,17 +26,17 @@ def rest_areas(cloth: Cloth) -> Tensor:
 
 def mean_normals(cloth: Cloth, position: Tensor) -> Tensor:
     """Mean normals at the vertices (see above): (vertex, 3, batch)."""
-    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
+    x0, x1, x2 = cloth.at_corners(position)
     sixth = torch.linalg.cross(x1 - x0, x2 - x0, dim=1) / 6
-    return gather_sum([sixth, sixth, sixth], cloth.face_slots) / rest_areas(cloth)[:, None, None]
+    return cloth.shared_out(sixth) / rest_areas(cloth)[:, None, None]
 
 
 def mean_normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
     """Their time derivative: (vertex, 3, batch) [1/s]."""
-    x0, x1, x2 = (position[cloth.faces[:, c]] for c in range(3))
-    v0, v1, v2 = (velocity[cloth.faces[:, c]] for c in range(3))
+    x0, x1, x2 = cloth.at_corners(position)
+    v0, v1, v2 = cloth.at_corners(velocity)
     sixth = (torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)) / 6
-    return gather_sum([sixth, sixth, sixth], cloth.face_slots) / rest_areas(cloth)[:, None, None]
+    return cloth.shared_out(sixth) / rest_areas(cloth)[:, None, None]
 
 
 def effective(force: Tensor, *, mass: Tensor, added: Tensor, normals: Tensor) -> Tensor:

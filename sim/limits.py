@@ -62,7 +62,7 @@ def stretches(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor]:
 
 def _decomposed(cloth: Cloth, position: Tensor) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
     """x_u, x_v (face, 3, batch), and the eigenvalues of FᵀF, larger first (face, batch)."""
-    corners = [position[cloth.faces[:, c]] for c in range(3)]
+    corners = cloth.at_corners(position)
     d = cloth.gradients[..., None, None]
     xu = d[:, 0, 0] * corners[0] + d[:, 0, 1] * corners[1] + d[:, 0, 2] * corners[2]
     xv = d[:, 1, 0] * corners[0] + d[:, 1, 1] * corners[1] + d[:, 1, 2] * corners[2]

@@ -32,7 +32,7 @@ class Strain:
 
 def _derivatives(cloth: Cloth, field: Tensor) -> tuple[Tensor, Tensor]:
     """∂/∂u and ∂/∂v of a vertex field (vertex, 3, batch) on the faces: (face, 3, batch) each."""
-    corners = [field[cloth.faces[:, c]] for c in range(3)]
+    corners = cloth.at_corners(field)
     d = cloth.gradients[..., None, None]
     u = d[:, 0, 0] * corners[0] + d[:, 0, 1] * corners[1] + d[:, 0, 2] * corners[2]
     v = d[:, 1, 0] * corners[0] + d[:, 1, 1] * corners[1] + d[:, 1, 2] * corners[2]

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.air import QuadraticNormal, face_wind
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 from sim.effects.geometry import origin
 from sim.effects.parameter import Parametrised
 from sim.state import State
@@ -102,7 +102,7 @@ class FactoredNormal:
             density = density * effect.factor(self.base.density, seen.across)
         third = (cloth.areas / 3)[:, None, None]
         push = third * (density * seen.across.abs() * seen.across * seen.normal + self.base.drag * seen.along)
-        return gather_sum([push, push, push], cloth.face_slots)
+        return cloth.shared_out(push)
 
 
 class WindEffect(Effect):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 from sim.effects.effect import Effect
 from sim.effects.geometry import horizontal, left_of, norm, origin
 from sim.inertia import mean_normals, rest_areas
@@ -255,10 +255,10 @@ class Seen(Flat):
         return self._across.abs() * (direction * normal).sum(1, keepdim=True) * normal
 
     def _along_threads(self, axis: int) -> Tensor:
-        corners = [self.position[self.cloth.faces[:, c]] for c in range(3)]
+        corners = self.cloth.at_corners(self.position)
         slopes = [self.cloth.gradients[:, axis, c, None, None] * corners[c] for c in range(3)]
         third = (self.cloth.areas / 3)[:, None, None] * (slopes[0] + slopes[1] + slopes[2])
-        mean = gather_sum([third, third, third], self.cloth.face_slots) / rest_areas(self.cloth)[:, None, None]
+        mean = self.cloth.shared_out(third) / rest_areas(self.cloth)[:, None, None]
         thread = mean / norm(mean).clamp(min=torch.finfo(mean.dtype).tiny)
         return (self._relative * thread).sum(1, keepdim=True) * thread
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from sim.air import face_wind
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 from sim.effects.effect import ForceEffect
 from sim.effects.geometry import norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
@@ -45,4 +45,4 @@ class Lift(ForceEffect):
         direction = seen.relative / speed.clamp(min=torch.finfo(speed.dtype).tiny)
         lift = seen.across * (speed * seen.normal - seen.across * direction)
         push = (cloth.areas / 3)[:, None, None] * (0.5 * self.density * self.coefficient * lift)
-        return gather_sum([push, push, push], cloth.face_slots)
+        return cloth.shared_out(push)

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 
 from torch import Tensor
 
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 from sim.effects.added_mass import AddedMass, MassPerArea
 from sim.effects.effect import ForceEffect
 from sim.inertia import mean_normal_rates, mean_normals, rest_areas
@@ -59,12 +59,12 @@ class ReactiveLoading(ForceEffect):
         slip = across * normal - relative
 
         g0, g1, g2 = shape_gradients(cloth, position)
-        v0, v1, v2 = (across[cloth.faces[:, c]] for c in range(3))
-        s0, s1, s2 = (slip[cloth.faces[:, c]] for c in range(3))
+        v0, v1, v2 = cloth.at_corners(across)
+        s0, s1, s2 = cloth.at_corners(slip)
         following = ((s0 + s1 + s2) / 3 * (g0 * v0 + g1 * v1 + g2 * v2)).sum(1, keepdim=True)
         spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
         swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
-        convective = gather_sum([swept, swept, swept], cloth.face_slots)
+        convective = cloth.shared_out(swept)
         return (
             -self.mass
             * (rest_areas(cloth)[:, None, None] * (turning * relative).sum(1, keepdim=True) + convective)
@@ -78,7 +78,7 @@ def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Ten
     Those of the flat cloth, carried along by its tangents x_u and x_v: exact where the cloth is not stretched, and
     finite where a face collapses.
     """
-    corners = [position[cloth.faces[:, c]] for c in range(3)]
+    corners = cloth.at_corners(position)
     d = cloth.gradients[..., None, None]
     along_u, along_v = (d[:, a, 0] * corners[0] + d[:, a, 1] * corners[1] + d[:, a, 2] * corners[2] for a in range(2))
     first, second = (d[:, 0, c] * along_u + d[:, 1, c] * along_v for c in range(2))

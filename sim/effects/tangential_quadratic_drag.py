@@ -8,7 +8,7 @@ from typing import Annotated
 from torch import Tensor
 
 from sim.air import face_wind
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 from sim.effects.effect import ForceEffect
 from sim.effects.geometry import norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
@@ -39,4 +39,4 @@ class TangentialQuadraticDrag(ForceEffect):
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         along = face_wind(cloth, position, velocity, wind).along
         push = (cloth.areas / 3)[:, None, None] * (self.density * self.coefficient * norm(along) * along)
-        return gather_sum([push, push, push], cloth.face_slots)
+        return cloth.shared_out(push)

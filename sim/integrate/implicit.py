@@ -25,7 +25,7 @@ from sim.cloth import gather_sum
 from sim.inertia import mean_normals
 from sim.integrate.backend import Backend, kernel_for
 from sim.state import State
-from sim.system import System
+from sim.system import Drive, System
 
 
 class AirShape(StrEnum):
@@ -68,14 +68,15 @@ class BackwardEuler:
     def advance(self, system: System, state: State, duration: float) -> State:
         """The state `duration` seconds later."""
         steps = max(1, math.ceil(duration / self.step - 1e-9))
+        h = duration / steps
         for _ in range(steps):
-            state = self._step(system, state, duration / steps)
+            state = self.stepped(system, state, system.drive(state.time, state.time + h), h)
         return state
 
-    def _step(self, system: System, state: State, h: float) -> State:
+    def stepped(self, system: System, state: State, drive: Drive, h: float) -> State:
+        """The state one step of `h` [s] later, whatever `step` is, with what moves the cloth from outside meanwhile."""
         cloth = system.cloth
         x, v, time = state.position, state.velocity, state.time
-        drive = system.drive(time, time + h)
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         kernel = kernel_for(system, state, self.backend)

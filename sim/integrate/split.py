@@ -60,7 +60,7 @@ class SplitEuler:
             pull = torch.stack([tie.force(system.cloth, time, x) for tie in system.ties]).sum(0)
             impulse = impulse + h * pull - h * h * stiffness * v
         begun = v + impulse / resisting
-        after = self.base.advance(plain, State(position=x, velocity=begun, time=time), h)
+        after = self.base.stepped(plain, State(position=x, velocity=begun, time=time), drive, h)
         if system.loads:
             normals = mean_normals(system.cloth, x)
             added = system.added_mass

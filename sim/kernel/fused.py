@@ -187,7 +187,7 @@ class Kernel:
         """The problem with wind and handles set; the tensors must outlive the call it is made for."""
 
         def both(pair: tuple[Tensor, Tensor]) -> Tensor:
-            return torch.stack([self.pack(tensor) for tensor in pair])
+            return _to_blocks(torch.stack(pair), self.lanes, self.blocks).movedim(1, 0).contiguous()
 
         given = {"wind": both(drive.wind), "targets": both(drive.targets), "rate": self.pack(drive.rate)}
         if self.tied is not None:

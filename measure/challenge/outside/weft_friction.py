@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from sim.air import face_wind
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import Cloth
 from sim.effects.effect import ForceEffect
 from sim.effects.geometry import norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
@@ -34,9 +34,9 @@ class WeftFriction(ForceEffect):
     ] = 0.0
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        corners = [position[cloth.faces[:, c]] for c in range(3)]
+        corners = cloth.at_corners(position)
         weft = sum((cloth.gradients[:, 1, c, None, None] * corners[c] for c in range(3)), torch.zeros_like(corners[0]))
         tangent = weft / norm(weft).clamp(min=torch.finfo(position.dtype).tiny)
         along = (face_wind(cloth, position, velocity, wind).relative * tangent).sum(1, keepdim=True)
         push = (cloth.areas / 3)[:, None, None] * (self.coefficient * along * tangent)
-        return gather_sum([push, push, push], cloth.face_slots)
+        return cloth.shared_out(push)
