@@ -20,6 +20,9 @@ from sim.cloth import Cloth
 from sim.effects.effect import ClothEffect, Effect
 from sim.effects.field import FieldEffect, Flat, Seen, heavier
 
+_CHUNK = 36
+"""Segments at a time: bounds memory, a term takes 4 MB of them."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SideBySide(FieldEffect):
@@ -103,7 +106,7 @@ def _chunks(segments: Segments) -> list[list[int]]:
     chunks: list[list[int]] = []
     for index in sorted({s.recording for s in segments.items}):
         own = [place for place, segment in enumerate(segments.items) if segment.recording == index]
-        if chunks and len(chunks[-1]) + len(own) <= WIDEST // 2:
+        if chunks and len(chunks[-1]) + len(own) <= _CHUNK:
             chunks[-1] += own
         else:
             chunks.append(own)
