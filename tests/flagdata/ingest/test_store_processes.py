@@ -110,28 +110,33 @@ def test_kills_during_ingest_lose_nothing_acknowledged_and_the_next_ingest_compl
     lake: Lake, tmp_path: Path, write_video: Callable[..., Path], start: Callable[..., Child]
 ) -> None:
     moments = random.Random(11)
-    logs = _logs(tmp_path / "logs", 40)
-    videos = [write_video(tmp_path / f"{k}.mp4", frames=60 + k, rate=25) for k in range(10)]
+    *logs, first_log = _logs(tmp_path / "logs", 41)
+    *videos, first_video = (write_video(tmp_path / f"{k}.mp4", frames=60 + k, rate=25) for k in range(11))
+    whole = start([first_video, first_log])
+    whole.wait(1)
+    began = time.monotonic()
+    whole.wait(4)
+    pace = time.monotonic() - began
     acknowledged: set[str] = set()
     for wave in range(10):
         pair = [start([videos[wave], *logs[4 * wave : 4 * wave + 2]]), start(logs[4 * wave : 4 * wave + 4])]
         for child in pair:
             child.wait(1)
-        # A log takes 50 to 150 ms, a video about twice that: the kills fall on all of their steps.
+        # What a video and a log take together, on this machine now: the kills fall on all of their steps.
         for child in pair:
-            time.sleep(moments.uniform(0, 0.3))
+            time.sleep(moments.uniform(0, pace))
             child.kill()
         acknowledged |= {line.split()[0] for child in pair for line in child.acknowledged()}
     rows = lake.rows()["artifact"].to_pylist()
     assert 3 <= len(acknowledged) < 50  # the test has tested something
     assert acknowledged <= set(rows)
     assert len(rows) == len(set(rows))
-    last = start([*videos, *logs])
-    last.wait(1 + 50 + 1)
+    last = start([first_video, *videos, first_log, *logs])
+    last.wait(1 + 52 + 1)
     again = dict(line.split() for line in last.acknowledged())
     assert all(again[identity] == "known" for identity in rows)
     table = lake.rows().to_pylist()
-    assert len(table) == 50
+    assert len(table) == 52
     for row in table:
         assert Record.open(lake.object_path(row["object"])).frame_count == (row["frame_count"] or 0)
     collect(lake, grace=NOW)
