@@ -30,14 +30,15 @@ def test_droop_edge_speed_and_tip_spectrum_do_not_depend_on_the_step() -> None:
 
 
 def test_droop_edge_speed_and_tip_spectrum_converge_with_the_mesh() -> None:
-    # Cells of 150, 100 and 50 mm at 4 m/s, sixteen runs of 7 s: observed droop −0.499, −0.534, −0.551 m and speed 1.86,
-    # 1.78, 1.75 m/s, with standard errors of 0.005 to 0.009 m and 0.03 to 0.05 m/s.
-    means = {n: edge_statistics(n, seed=n, wind=4.0, members=16, share=1.0).mean(0) for n in (10, 15, 30)}
+    # Cells of 150, 100 and 50 mm at 4 m/s, 48 to 80 runs of 7 s: droop −0.494, −0.528, −0.551 m and speed 1.91,
+    # 1.80, 1.76 m/s, with standard errors of 0.003 m and 0.02 m/s.
+    means = {n: edge_statistics(n, seed=n, wind=4.0, members=32, share=1.0).mean(0) for n in (10, 15, 30)}
     coarse, middle, fine = means[10], means[15], means[30]
     assert np.abs(middle - fine)[:2].max() < 0.035
     assert np.abs(middle - fine)[:2].max() < np.abs(coarse - fine)[:2].max()
     assert abs(middle[2] - fine[2]) < 0.1 * fine[2]
-    # The tip's motion across the wind between 0.5 and 8 Hz, with standard errors of a tenth: 0.058, 0.032 and 0.029 m².
+    # The tip's motion across the wind between 0.5 and 8 Hz: 0.062, 0.038 and 0.028 m², so logarithms of ratios to the
+    # finest of 0.80 and 0.32, with standard errors of 0.07 by these 32 runs: 0.56 lies 3.4 from either.
     # Cells too large to fold hold the flag as a board, which swings.
     coarse_power, middle_power, fine_power = (means[n][4:].sum() for n in (10, 15, 30))
-    assert abs(math.log(middle_power / fine_power)) < 0.4 < math.log(coarse_power / fine_power)
+    assert abs(math.log(middle_power / fine_power)) < 0.56 < math.log(coarse_power / fine_power)
