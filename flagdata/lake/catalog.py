@@ -300,7 +300,7 @@ class Catalog:
         return max((int(path.name.removesuffix(_CHECKPOINT)) for path in self._checkpoints()), default=0)
 
     def _checkpoints(self) -> list[Path]:
-        return sorted(self._log.glob(f"*{_CHECKPOINT}"))
+        return list(self._log.glob(f"*{_CHECKPOINT}"))
 
     def _open(self, version: int) -> DeltaTable:
         try:

@@ -23,6 +23,11 @@ TAIL = 0.1
 _RESAMPLES = 400
 
 
+def share_as_large(null: Floats, value: float) -> float:
+    """Share of the nulls (group,) as large, the value itself counted: a permutation test's p, never 0."""
+    return (1 + int((null >= value).sum())) / (1 + len(null))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rarity:
     """Of a statistic that is large where something is missing.
@@ -39,7 +44,7 @@ class Rarity:
         """Chance of a null as large: the share of groups, beyond their highest tenth by the tail; never less than
         1/(1 + groups)."""
         if value <= self._threshold or self._reaching == 0:
-            return (1 + int((self.null >= value).sum())) / (1 + len(self.null))
+            return share_as_large(self.null, value)
         excess = (value - self._threshold) / (self._reaching * self._mean)
         return max(TAIL * (1 + excess) ** -self._reaching, self._least)
 

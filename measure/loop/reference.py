@@ -14,7 +14,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
-from measure.loop.rarity import Rarity
+from measure.loop.rarity import Rarity, share_as_large
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
@@ -224,7 +224,7 @@ class Reference:
 
     def p_alone(self, statistic: float, column: int) -> float:
         """The same for the column alone."""
-        return _p(self.scaled[:, column], statistic)
+        return share_as_large(self.scaled[:, column], statistic)
 
     def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
         """Of the global test on what some columns leave, fitted to the data."""
@@ -258,7 +258,3 @@ def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int]
 
 def _width(roots: Floats) -> Floats:
     return np.maximum(roots.std(axis=0), np.cbrt(_NOTHING))
-
-
-def _p(null: Floats, value: float) -> float:
-    return float((1 + (null >= value).sum()) / (1 + len(null)))
