@@ -20,6 +20,7 @@ from measure.loop.columns import THETA, EffectColumn
 from measure.loop.comparison import total_error
 from measure.loop.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.inference import Evidence, Fit, gains
+from measure.loop.lines import Line
 from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
 from measure.loop.verdict import Candidate, Conclusion, Estimate
@@ -56,6 +57,7 @@ RESPONSE = 0.25
 NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
 NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
 """Why an effect named is withdrawn."""
+SWINGING = "with it too, the errors swing most of all, at a frequency that goes with the wind"
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
 """Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
@@ -91,6 +93,7 @@ class Judgement:
         named: columns of the effects named.
         ranking: candidates, best first, each with the reason why it was not named.
         statistic, p_value: of the global test.
+        line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
     """
 
     conclusion: Conclusion
@@ -98,6 +101,7 @@ class Judgement:
     ranking: tuple[Weighed, ...]
     statistic: float
     p_value: float
+    line: Line | None = None
 
 
 def judge(
@@ -109,7 +113,7 @@ def judge(
         again: of columns whose models were run again, which counts in place of the linear evidence.
     """
     statistics = reference.statistics(evidence, names())
-    statistic = reference.farthest_of(statistics, evidence.fit(()).left)
+    statistic, line = reference.farthest(evidence, names()), reference.line(evidence)
     p_value = reference.rarity.p(statistic)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     corrective = [i + _FIRST for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
@@ -119,6 +123,10 @@ def judge(
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[-1]))])
+    # An effect that changes how a flag flutters, as lift does, leaves a line too; not where it is in the model.
+    rerun = (again or {}).get(ranking[0].column)
+    left = line if rerun is None else reference.line(rerun.evidence)
+    swings = left is not None and reference.rarity.p(left.far) <= level
 
     def judgement(conclusion: Conclusion, named: Sequence[Weighed], reasons: dict[int, str]) -> Judgement:
         taken = {w.column for w in named}
@@ -128,7 +136,7 @@ def judge(
         ]
         return Judgement(
             conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told), statistic=statistic,
-            p_value=p_value,
+            p_value=p_value, line=left if swings else None,
         )  # fmt: skip
 
     if p_value > level:
@@ -138,7 +146,9 @@ def judge(
     if not best.admissible or best.gains.sum() <= 0:
         reasons[best.column] = "no effect of the library predicts unseen recordings better than the base model"
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    rerun = (again or {}).get(best.column)
+    if swings and line is not None and line.far >= statistic:
+        reasons[best.column] = SWINGING
+        return judgement(Conclusion.OUTSIDE, (), reasons)
     if _field_leads(evidence, best, corrective, statistics, beyond_linear=rerun is not None):
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)

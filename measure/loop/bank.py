@@ -19,7 +19,7 @@ import torch
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
-from measure.loop.columns import THETA, Calibration, Column, fields, library, motions
+from measure.loop.columns import THETA, Calibration, Column, forces, library, motions
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
@@ -38,8 +38,8 @@ Progress = Callable[[int], object]
 
 
 def columns() -> tuple[Column, ...]:
-    """What is weighed beside the calibrated parameters: the library's strengths, then corrective fields."""
-    return (*library(), *fields(), *motions())
+    """What is weighed beside the calibrated parameters: the library's strengths, then forces of no known origin."""
+    return (*library(), *forces(), *motions())
 
 
 def names() -> tuple[str, ...]:
@@ -137,7 +137,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     buffer = BytesIO()
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
-        marker_error=own.marker_error, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
+        marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip
@@ -171,11 +171,11 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth"} <= set(content):
+        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth", "lines"} <= set(content):
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
-            error=content["error"], marker_error=content["marker_error"],
+            error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
         )  # fmt: skip
         numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
         parts.append(

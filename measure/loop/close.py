@@ -37,8 +37,9 @@ from measure.loop.attribution import (
     tied,
     withdrawn,
 )
-from measure.loop.columns import DAMPING_UNIT, THETA, Calibration, FieldColumn
+from measure.loop.columns import DAMPING_UNIT, THETA, Calibration
 from measure.loop.comparison import Fold, LeftOut, Predictions, Trial, compare, folds, predict
+from measure.loop.field import corrective_field
 from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
 from measure.loop.reference import NullBank, Reference
@@ -47,7 +48,7 @@ from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
-from measure.loop.words import assumptions, proposal, sentence, separating
+from measure.loop.words import assumptions, proposal, sentence, separating, shedding
 from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment
 
@@ -285,11 +286,18 @@ def _verdict(
             "parents": [r.source for r in setting.experiment.recordings if r.source],
         },
     )  # fmt: skip
-    smooth = [i + len(THETA) for i, c in enumerate(banks.columns()) if isinstance(c, FieldColumn)]
     return replace(
         verdict, words=sentence(verdict), separating=separating(verdict),
-        proposal=proposal(verdict, solved.evidence.fit(smooth), smooth), seconds=time.perf_counter() - began,
+        proposal=_proposal(solved, judgement), seconds=time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _proposal(solved: Solved, judgement: Judgement) -> str:
+    """What the library lacks looks like, where it has no answer or half of one."""
+    if judgement.conclusion not in (Conclusion.OUTSIDE, Conclusion.PARTLY):
+        return ""
+    field = proposal(corrective_field(solved.setting, solved.fits.yardstick))
+    return field if judgement.line is None else f"{shedding(judgement.line)} {field}"
 
 
 def _unseen(setting: Setting, refined: Refined) -> Predictions:

@@ -218,7 +218,8 @@ class Evidence:
         curvature: (segment, column, column) H = Rᵀ Σ⁻¹ R.
         score: (segment, column) g = Rᵀ Σ⁻¹ (r − μ).
         energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
-        columns: how many are the statistics'.
+        columns: how many are the statistics' and those given beside; the null model's shifts follow.
+        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -226,10 +227,19 @@ class Evidence:
     score: Floats
     energy: Floats
     columns: int
+    lines: Floats | None = None
 
     @classmethod
-    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
-        """Of segments with their wind's speed (segment,) [m/s]."""
+    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
+        """Of segments with their wind's speed (segment,) [m/s].
+
+        Args:
+            beside: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
+                columns after the statistics'.
+        """
+        if beside is not None:
+            response = np.concatenate([statistics.response, beside], axis=2)
+            statistics = replace(statistics, response=response)
         return cls._of(statistics.r, statistics, speeds, null)
 
     @classmethod
@@ -247,7 +257,8 @@ class Evidence:
         return cls(
             recording=statistics.recording, curvature=weighted @ response,
             score=np.einsum("saj,sj->sa", weighted, left),
-            energy=np.einsum("si,ij,sj->s", left, precision, left), columns=r.shape[1],
+            energy=np.einsum("si,ij,sj->s", left, precision, left), columns=statistics.response.shape[2],
+            lines=statistics.lines,
         )  # fmt: skip
 
     @property
@@ -259,7 +270,7 @@ class Evidence:
         """Of some segments; indices may repeat."""
         return Evidence(
             recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
-            energy=self.energy[chosen], columns=self.columns,
+            energy=self.energy[chosen], columns=self.columns, lines=None if self.lines is None else self.lines[chosen],
         )  # fmt: skip
 
     def _total(self) -> tuple[Floats, Floats, float]:
@@ -295,7 +306,7 @@ class Evidence:
         curvature[:, column, column] = 1.0
         return Evidence(
             recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
-            columns=self.columns,
+            columns=self.columns, lines=self.lines,
         )  # fmt: skip
 
     def drops(self, beside: Chosen = ()) -> Floats:

@@ -14,6 +14,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
+from measure.loop.lines import Line, Lines, strongest
 from measure.loop.rarity import Rarity, share_as_large
 
 Floats = NDArray[np.float64]
@@ -132,12 +133,15 @@ class _Groups:
 
     shares: list[Floats] = field(default_factory=list)
     left: list[float] = field(default_factory=list)
+    lines: list[Floats] = field(default_factory=list)
     noises: list[float] = field(default_factory=list)
     kinds: list[int] = field(default_factory=list)
 
     def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int) -> None:
         self.shares.append(unscaled(evidence, columns))
         self.left.append(evidence.fit(()).left)
+        if evidence.lines is not None:
+            self.lines.append(strongest(evidence.lines))
         self.noises.append(noise)
         self.kinds.append(kind)
 
@@ -153,15 +157,17 @@ class Reference:
 
     Some columns are near their mean in all nulls, others are far from it in some. The tests compare how far from the
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
-    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left.
+    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
+    and the most prominent line of the errors' spectra, where these are looked at.
 
     Attributes:
         scaled: (group, column), gusts the last.
         spread: (column,) mean share of nulls as noisy as the data.
-        far: (group, column + 1) how far the cube root of each is from its mean in nulls as noisy, in standard
-            deviations; that of what the base model leaves the last.
+        far: (group, column + 1 or 2) how far the cube root of each is from its mean in nulls as noisy, in standard
+            deviations; after the columns that of what the base model leaves, and the line as it is.
         kinds: (group,) of numerics.
-        centre, width: (column + 1,) mean and standard deviation of cube roots of nulls as noisy as the data.
+        centre, width: (column + 1 or 2,) mean and standard deviation of the same, of nulls as noisy as the data.
+        lines: of the nulls; None where spectra are not looked at.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
     """
 
@@ -171,6 +177,7 @@ class Reference:
     kinds: NDArray[np.int64]
     centre: Floats
     width: Floats
+    lines: Lines | None = None
     beside_gusts: Reference | None = None
 
     @classmethod
@@ -182,6 +189,9 @@ class Reference:
         """
         shares, left, noises = np.array(groups.shares), np.array(groups.left), np.array(groups.noises)
         roots = np.cbrt(np.c_[shares, left])
+        lines = Lines.of(np.array(groups.lines)) if groups.lines else None
+        if lines is not None:
+            roots = np.c_[roots, lines.standing_out(np.array(groups.lines))]
         scaled, far = np.empty_like(shares), np.empty_like(roots)
         for level in np.unique(noises):
             near = np.abs(noises - level) <= _ALIKE
@@ -195,7 +205,7 @@ class Reference:
             )  # fmt: skip
         return cls(
             scaled=scaled, spread=np.maximum(shares[near].mean(axis=0), _NOTHING), far=far,
-            kinds=np.array(groups.kinds), centre=roots[near].mean(axis=0), width=_width(roots[near]),
+            kinds=np.array(groups.kinds), centre=roots[near].mean(axis=0), width=_width(roots[near]), lines=lines,
             beside_gusts=beside_gusts,
         )  # fmt: skip
 
@@ -211,7 +221,7 @@ class Reference:
 
     @cached_property
     def rarity(self) -> Rarity:
-        """Of how far the farthest is, of all columns and what is left: the global test's."""
+        """Of how far the farthest is, of all columns, what is left and the line: the global test's."""
         return Rarity(null=self.far.max(axis=1), kinds=self.kinds)
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
@@ -228,14 +238,30 @@ class Reference:
 
     def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
         """Of the global test on what some columns leave, fitted to the data."""
-        return self.rarity.p(self.farthest_of(self.statistics(evidence, columns, chosen), evidence.fit(chosen).left))
+        return self.rarity.p(self.farthest(evidence, columns, chosen))
 
-    def farthest_of(self, statistics: Floats, left: float) -> float:
-        """How far the farthest of data is: the statistic of the global test."""
-        return float(self._far(np.append(statistics * self.spread, left)).max())
+    def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
+        """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
+        values = np.append(unscaled(evidence, columns, chosen), evidence.fit(chosen).left)
+        far, line = self._far(values, slice(len(values))), self.line(evidence)
+        return float(far.max()) if line is None else max(float(far.max()), line.far)
 
-    def _far(self, values: Floats, columns: int | slice = slice(None)) -> Floats:
-        """Of shares, and what is left the last, as `far` has it."""
+    def line(self, evidence: Evidence) -> Line | None:
+        """The most prominent one of data; None where spectra are not looked at.
+
+        Raises:
+            UsageError: they are, of the data or of the nulls alone.
+        """
+        if self.lines is None and evidence.lines is None:
+            return None
+        if self.lines is None or evidence.lines is None:
+            raise UsageError(
+                "spectra of the nulls or of the data alone", where="reference", fix="look at lines in both or in none"
+            )
+        return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+
+    def _far(self, values: Floats, columns: int | slice) -> Floats:
+        """Of shares, and what is left, as `far` has it."""
         return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
 
 

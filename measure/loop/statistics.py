@@ -12,7 +12,7 @@ E r = μ + R δ, with μ what the model's own numerics leave.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -22,6 +22,7 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column
 from measure.loop.forecast import Forecaster, Segments
+from measure.loop.lines import Spectrum
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ class Statistics:
         response: (segment, column, column) R.
         error: (segment,) mean squared prediction error [m²].
         marker_error: (segment, marker) the same of each marker.
+        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -53,12 +55,14 @@ class Statistics:
     response: Floats
     error: Floats
     marker_error: Floats
+    lines: Floats | None = None
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Statistics:
         """Of some segments."""
         return Statistics(
             recording=self.recording[chosen], r=self.r[chosen], response=self.response[chosen],
             error=self.error[chosen], marker_error=self.marker_error[chosen],
+            lines=None if self.lines is None else self.lines[chosen],
         )  # fmt: skip
 
     @classmethod
@@ -66,7 +70,7 @@ class Statistics:
         """One after another.
 
         Raises:
-            UsageError: none.
+            UsageError: none, or lines of some alone.
         """
         if not parts:
             raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
@@ -77,6 +81,13 @@ class Statistics:
         )  # fmt: skip
 
 
+def _joined(parts: Sequence[Floats | None]) -> Floats | None:
+    known = [part for part in parts if part is not None]
+    if known and len(known) < len(parts):
+        raise UsageError("spectra of some parts alone", where="statistics", fix="look at lines in all or in none")
+    return np.concatenate(known) if known else None
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Projection:
     """The directions that statistics are taken along, kept: other models' errors have r along the same ones.
@@ -84,17 +95,19 @@ class Projection:
     Attributes:
         directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
         scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
+        spectrum: what their periodograms are taken along; None where lines are not looked at.
     """
 
     directions: Tensor
     scale: Tensor
+    spectrum: Spectrum | None = None
 
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
         """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
         directions: list[Tensor] = []
         for place in range(scale.shape[1]):
-            moved = torch.stack([(change[..., place] / scale[None, :, place, None]).reshape(-1) for change in changes])
+            moved = torch.stack([_scaled(change, scale, place) for change in changes])
             directions.append(moved / moved.norm(dim=1, keepdim=True))
         return cls(directions=torch.stack(directions), scale=scale)
 
@@ -105,6 +118,23 @@ class Projection:
             for place, direction in enumerate(self.directions)
         ]
         return torch.stack(parts).double().cpu().numpy()
+
+    def lines(self, errors: Tensor) -> Floats | None:
+        """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
+        return None if self.spectrum is None else self.spectrum.prominence(errors)
+
+    def response(self, changes: Sequence[Tensor]) -> Floats:
+        """(segment, column, k) how r moves with k sensitivities (frame, marker, 3, segment) [m per unit]."""
+        parts = [
+            direction @ torch.stack([_scaled(change, self.scale, place) for change in changes], dim=1)
+            for place, direction in enumerate(self.directions)
+        ]
+        return torch.stack(parts).double().cpu().numpy()
+
+
+def _scaled(change: Tensor, scale: Tensor, place: int) -> Tensor:
+    """(frame · marker · 3,) of one segment, over its scale."""
+    return (change[..., place] / scale[None, :, place, None]).reshape(-1)
 
 
 def statistics(
@@ -128,8 +158,8 @@ def projected(
         pieces.append(Projection.along(changes, scale))
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
-        scale=torch.cat([piece.scale for piece in pieces], dim=1),
-    )
+        scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
+    )  # fmt: skip
     return Statistics.joined(parts), whole
 
 
@@ -145,7 +175,15 @@ def _pieces(
         noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities(columns, own, starts, base)
-        yield reduced(base, changes, recording[chosen], noise), changes, error_scale(base, recording[chosen], noise)
+        found = replace(
+            reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base)
+        )
+        yield found, changes, error_scale(base, recording[chosen], noise)
+
+
+def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
+    speeds = np.array([item.wind.speed for item in segments.items])
+    return Spectrum.of(forecaster.markers, forecaster.specimen.mesh.rest, speeds, segments.period)
 
 
 def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from measure.loop.attribution import RESPONSE
-from measure.loop.bank import columns
-from measure.loop.columns import THETA, FieldColumn
-from measure.loop.inference import Fit
+from measure.loop.columns import FieldColumn
+from measure.loop.field import Mode
+from measure.loop.lines import STROUHAL, Line
 from measure.loop.quantity import number, probability, with_error, with_level
 from measure.loop.titles import readable, titles
 from measure.loop.verdict import Conclusion, Verdict
@@ -28,6 +28,9 @@ _SEPARATES: dict[frozenset[str], str] = {
     frozenset({"hem-mass", "hem-stiffness"}): "the hem weighed, or the cloth hanging in calm air",
     frozenset({"shear", "vertical-wind"}): "the wind logged at the top and at the bottom of the flag",
 }
+
+
+_AXES = ("along the wind", "across the wind", "up")
 
 
 def sentence(verdict: Verdict) -> str:
@@ -61,28 +64,27 @@ def separating(verdict: Verdict) -> str:
     return "a longer recording, at one more wind speed: the effects named differ in how they grow with the wind"
 
 
-def proposal(verdict: Verdict, field: Fit, smooth: Sequence[int]) -> str:
-    """What the corrective field looks like, where the library has no answer."""
-    if verdict.conclusion not in (Conclusion.OUTSIDE, Conclusion.PARTLY):
-        return ""
-    terms: list[tuple[float, str]] = []
-    weighed = columns()
-    for column in smooth:
-        mode = weighed[column - len(THETA)]
-        if isinstance(mode, FieldColumn):
-            value, error = field.of(column)
-            terms.append((abs(value / error), f"{_where(mode)} ({with_error(value, error)}) m/s²"))
-    strongest = [text for _, text in sorted(terms, key=lambda term: -term[0])[:3]]
-    return "The smooth force field that fits best, per mass: " + "; ".join(strongest) + "."
+def proposal(modes: Sequence[Mode]) -> str:
+    """What the corrective field looks like: the modes that are told best."""
+    told = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
+    terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in told]
+    return "The smooth force field that fits best, per mass: " + "; ".join(terms) + "."
+
+
+def shedding(line: Line) -> str:
+    """What a line of the errors' spectra looks like."""
+    return (
+        f"The errors swing {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind: vortices of a cylinder of "
+        f"{number(STROUHAL / line.reduced)} m do so."
+    )
 
 
 def _where(mode: FieldColumn) -> str:
-    axis = ("along the wind", "across the wind", "up")[mode.axis]
     shapes = {
         (0, 0): "all over", (1, 0): "hoist against fly", (0, 1): "bottom against top", (1, 1): "corner against corner",
         (2, 0): "both ends against the middle",
     }  # fmt: skip
-    return f"{axis}, {shapes[mode.mode]}"
+    return f"{_AXES[mode.axis]}, {shapes[mode.mode]}"
 
 
 def assumptions(experiment: Experiment) -> tuple[str, ...]:

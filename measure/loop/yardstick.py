@@ -33,7 +33,8 @@ class Yardstick:
 
     def of(self, errors: Tensor) -> Evidence:
         """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
-        return self.evidence(replace(self.found, r=self.projection.of(errors)))
+        lines = self.projection.lines(errors)
+        return self.evidence(replace(self.found, r=self.projection.of(errors), lines=lines))
 
     def evidence(self, statistics: Statistics) -> Evidence:
         """Of all segments."""

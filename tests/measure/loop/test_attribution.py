@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.errors import UsageError
+from measure.loop.again import Rerun
 from measure.loop.attribution import (
     GUST_COLUMN,
     NOT_APART,
+    SWINGING,
     Judgement,
     alone,
     finalists,
@@ -21,6 +24,7 @@ from measure.loop.attribution import (
 from measure.loop.bank import columns, names
 from measure.loop.columns import PRIOR, THETA, EffectColumn
 from measure.loop.inference import Evidence, NullModel, Nulls
+from measure.loop.lines import REDUCED
 from measure.loop.reference import GUSTS, NullBank, Reference
 from measure.loop.statistics import Statistics
 from measure.loop.verdict import Conclusion
@@ -28,6 +32,7 @@ from measure.loop.verdict import Conclusion
 Floats = NDArray[np.float64]
 KINDS, CLOTHS, WINDS, SEGMENTS = 20, 4, 4, 4
 COUNT = len(names())
+SHED = REDUCED[40]
 CLEAR = 6.0
 """Response of a segment to an expected strength, in standard deviations of its errors."""
 
@@ -53,8 +58,9 @@ def drawn(rng: np.random.Generator, delta: Floats, numerics: Floats, speeds: Flo
     response = mixed / np.abs(EXPECTED)
     r = np.einsum("sij,sj->si", response, delta) + numerics[recording] + rng.normal(size=(len(recording), COUNT))
     return Statistics(
-        recording=recording, r=r, response=response, error=np.ones(len(r)), marker_error=np.ones((len(r), 1))
-    )
+        recording=recording, r=r, response=response, error=np.ones(len(r)), marker_error=np.ones((len(r), 1)),
+        lines=rng.exponential(size=(len(r), len(REDUCED), 3)),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -84,10 +90,11 @@ def reference(bank: NullBank) -> Reference:
     return bank.reference(12, noise=0.0, seed=1)
 
 
-def judged(
-    null: NullModel, reference: Reference, acting: dict[str, float], *, gusts: float = 0.0, seed: int = 2
-) -> Judgement:
-    """Of three recordings with strengths in units of what is expected, and a pressure that fluctuates by `gusts`."""
+def seen(
+    null: NullModel, acting: dict[str, float], *, gusts: float = 0.0, line: float = 0.0, seed: int = 2
+) -> Evidence:
+    """Of three recordings with strengths in units of what is expected, a pressure that fluctuates by `gusts`, and
+    `line` of power more at `SHED`, across the wind."""
     rng = np.random.default_rng(seed)
     delta = np.zeros((3 * SEGMENTS, COUNT))
     for name, share in acting.items():
@@ -95,7 +102,21 @@ def judged(
     delta[:, names().index(GUSTS)] += gusts * rng.normal(size=len(delta))
     speeds = np.array([3.5, 5.0, 7.0])
     own = drawn(rng, delta, np.tile(rng.normal(size=COUNT), (3, 1)), speeds)
-    return judge(Evidence.of(own, speeds[own.recording], null), reference, level=0.02)
+    assert own.lines is not None
+    own.lines[:, np.searchsorted(REDUCED, SHED), 1] += line
+    return Evidence.of(own, speeds[own.recording], null)
+
+
+def judged(
+    null: NullModel,
+    reference: Reference,
+    acting: dict[str, float],
+    *,
+    gusts: float = 0.0,
+    line: float = 0.0,
+    seed: int = 2,
+) -> Judgement:
+    return judge(seen(null, acting, gusts=gusts, line=line, seed=seed), reference, level=0.02)
 
 
 def named(judgement: Judgement) -> list[str]:
@@ -142,8 +163,45 @@ def test_an_effect_beside_gusts_is_named_with_them(null: NullModel, reference: R
 
 
 def test_a_smooth_force_is_none_of_the_library(null: NullModel, reference: Reference) -> None:
-    found = judged(null, reference, {"field.y.10": 2.0})
+    found = judged(null, reference, {"force.y.10": 2.0})
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
+
+
+def test_errors_that_swing_with_the_wind_are_none_of_the_library(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {}, line=10.0)
+    assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
+    assert found.line is not None
+    assert (found.line.reduced, found.line.axis) == (SHED, 1)
+    assert judged(null, reference, {}).line is None
+
+
+def test_an_effect_beside_a_line_explains_a_part(null: NullModel, reference: Reference) -> None:
+    # The lift is the farthest, and what it leaves still swings.
+    found = judged(null, reference, {"lift.coefficient": 1.5}, line=4.0)
+    assert (found.conclusion, named(found)) == (Conclusion.PARTLY, ["lift.coefficient"])
+    assert found.line is not None
+
+
+@pytest.mark.parametrize(("line", "conclusion"), [(0.0, Conclusion.EFFECT), (10.0, Conclusion.OUTSIDE)])
+def test_a_line_is_the_effects_own_if_its_model_has_it(
+    null: NullModel, reference: Reference, line: float, conclusion: Conclusion
+) -> None:
+    # Lift makes a flag flutter in another way: the base model's errors swing, those with the lift need not.
+    lift = names().index("lift.coefficient")
+    rerun = Rerun(
+        coefficient=float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 5.0), leftover=0.02 if line else 0.5,
+        evidence=seen(null, {}, line=line, seed=3),
+    )  # fmt: skip
+    found = judge(seen(null, {"lift.coefficient": 1.0}, line=20.0), reference, level=0.02, again={lift: rerun})
+    assert found.conclusion is conclusion
+    assert (found.line is not None) == (line > 0)
+    assert (found.ranking[0].candidate.why_not == SWINGING) == (line > 0)
+
+
+def test_spectra_of_the_data_alone_are_refused(bank: NullBank, null: NullModel) -> None:
+    blind = replace(bank.nulls, statistics=replace(bank.nulls.statistics, lines=None))
+    with pytest.raises(UsageError, match="spectra"):
+        judged(null, replace(bank, nulls=blind).reference(12, noise=0.0, seed=1), {})
 
 
 def test_a_strength_beyond_all_expectation_is_not_named(null: NullModel, reference: Reference) -> None:

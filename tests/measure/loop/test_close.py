@@ -8,14 +8,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 
 from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
 from measure.loop.close import Options, Solved, close_loop
-from measure.loop.columns import Calibration
+from measure.loop.columns import Calibration, SteadyField, fields
+from measure.loop.field import corrective_field
 from measure.loop.inference import Design
 from measure.loop.nulls import NullBatch
+from measure.loop.setting import Setting
+from measure.loop.statistics import projected
 from measure.loop.verdict import Conclusion, Estimate, Verdict
+from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 from sim.effects import EFFECTS, Effect
 
@@ -93,6 +98,22 @@ def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: 
     data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
     again = close_loop(data, Options(bank=bank, workers=2))
     assert replace(again, seconds=0.0) == replace(lifted, seconds=0.0)
+
+
+def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: Path) -> None:
+    # 3 m/s² across the wind, alike all over and so on any mesh.
+    push = SteadyField(acceleration=torch.tensor([0.0, 3.0, 0.0], dtype=torch.float64)[None, :, None])
+    setting = Setting.of(recorded(specimen, push, seed=11))
+    nominal = [setting.nominal] * len(setting.segments)
+    found, projection = projected(setting.forecaster, setting.segments, nominal, banks.columns())
+    null = banks.load(bank, words="made").model(setting.design)
+    yardstick = Yardstick(found=found, projection=projection, null=null, speeds=setting.speeds[setting.recording])
+    modes = corrective_field(setting, yardstick)
+    assert [mode.column for mode in modes] == list(fields())
+    across = next(mode for mode in modes if mode.column.name == "field.y.00")
+    assert across.value == pytest.approx(3.0, abs=3 * across.error)
+    assert across.value > 3 * across.error
+    assert max(modes, key=lambda mode: abs(mode.value / mode.error)) is across
 
 
 def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifted: Verdict) -> None:

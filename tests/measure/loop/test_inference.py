@@ -81,6 +81,21 @@ def effect(strength: float, column: int = 5) -> Floats:
     return delta
 
 
+def test_coefficients_that_nothing_was_taken_along_are_found_by_the_other_columns() -> None:
+    world = World(7)
+    null = NullModel.fit(world.nulls(), world.nulls().design)
+    speeds, strengths = np.array([3.5, 5.0, 7.0]), np.array([3.0, -2.0])
+    own = world.draw(np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=speeds)
+    beside = world.rng.normal(size=(len(own.r), COLUMNS, 2))
+    moved = replace(own, r=own.r + beside @ strengths)
+    evidence = Evidence.of(moved, speeds[own.recording], null, beside=beside)
+    assert not {COLUMNS, COLUMNS + 1} & set(evidence.nuisance)
+    fit = evidence.fit([COLUMNS, COLUMNS + 1])
+    for place, strength in enumerate(strengths):
+        value, error = fit.of(COLUMNS + place)
+        assert abs(value - strength) < 3.5 * error < 0.5 * abs(strength)
+
+
 def test_the_null_model_finds_mean_and_covariance(world: World, null: NullModel) -> None:
     speeds = np.array([3.0, 5.0, 8.0])
     features = np.stack([np.ones(3), speeds, speeds**2], axis=1)

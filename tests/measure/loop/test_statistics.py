@@ -42,6 +42,9 @@ def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecast
     small = 1e-3 * projection.scale.min() / moved.abs().max()
     expected = float(small) * found.response[:, :, column]
     np.testing.assert_allclose(projection.of(small * moved), expected, rtol=1e-9, atol=1e-12)
+    response = projection.response([moved, 2 * moved])
+    np.testing.assert_allclose(response[:, :, 0], found.response[:, :, column], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(response[:, :, 1], 2 * found.response[:, :, column], rtol=1e-9, atol=1e-12)
 
 
 def test_what_is_not_along_any_direction_does_not_count(forecaster: Forecaster, segments: Segments) -> None:

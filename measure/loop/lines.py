@@ -1,0 +1,133 @@
+"""Narrow lines in the spectra of errors, at frequencies that go with the wind: what sheds vortices upwind leaves them.
+
+Forces that come and go within a segment average to nothing along every steady column. A body of width D sheds at
+f = St U/D, St about 0.2 (Roshko, NACA TN 3169, 1954), so f/U is the same in all winds. Each segment's errors, projected
+on cos(π i u/W) along each axis of the world, have a periodogram; its prominence at a reduced frequency is the power
+there over the median of the neighbourhood, and that of some segments is the mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from measure.loop.columns import cosine
+
+Floats = NDArray[np.float64]
+
+REDUCED: Floats = np.geomspace(0.6, 4.0, 90)
+"""f/U [1/m]: above flags' own flutter and below the frame rate's half; 2 % apart, less than the lines' own width."""
+SHAPES = tuple((i, 0) for i in range(5))
+STROUHAL = 0.2
+"""f D/U of a circular cylinder from Re 300 to 2e5 (Roshko 1954)."""
+_POINTS = 128
+"""Of a transform: finer than what segments of 50 frames resolve."""
+_NEAR = 2.0
+"""Hz to either side that a line is compared with; a segment of 2 s resolves 1 Hz (Hann's window)."""
+_EDGE = 0.5
+"""Hz below the highest frequency that lines are sought."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Spectrum:
+    """What periodograms of segments are taken along.
+
+    Attributes:
+        shapes: (shape, marker) weights.
+        speeds: (segment,) of the wind [m/s].
+        period: between the frames [s].
+    """
+
+    shapes: Floats
+    speeds: Floats
+    period: float
+
+    @classmethod
+    def of(cls, markers: Floats, rest: Floats, speeds: Floats, period: float) -> Spectrum:
+        """For markers (marker, 2) on a cloth (vertex, 2) [m]."""
+        shapes = np.stack([cosine(mode, markers, rest) for mode in SHAPES]) / len(markers)
+        return cls(shapes=shapes, speeds=speeds, period=period)
+
+    def prominence(self, errors: Tensor) -> Floats:
+        """(segment, reduced frequency, shape · axis) of errors (frame, marker, 3, segment) [m]; NaN where the frames
+        are too few a second."""
+        frames, segments = errors.shape[0], errors.shape[3]
+        shapes = torch.as_tensor(self.shapes, dtype=errors.dtype, device=errors.device)
+        course = torch.einsum("km,fmcs->fskc", shapes, errors).reshape(frames, segments, -1).double().cpu().numpy()
+        window = np.hanning(frames + 2)[1:-1, None, None]
+        power = np.abs(np.fft.rfft((course - course.mean(axis=0)) * window, _POINTS, axis=0)) ** 2
+        frequency = np.fft.rfftfreq(_POINTS, self.period)
+        around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
+        ratio = power / np.maximum(around, np.finfo(np.float64).tiny)
+        found = np.full((segments, len(REDUCED), ratio.shape[2]), np.nan)
+        for place, speed in enumerate(self.speeds):
+            sought = REDUCED * speed
+            seen = sought < frequency[-1] - _EDGE
+            found[place, seen] = ratio[np.rint(sought[seen] / frequency[1]).astype(int), place]
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """The most prominent one.
+
+    Attributes:
+        far: how prominent, in nulls' standard deviations.
+        reduced: its frequency over the wind's speed [1/m].
+        axis: along which the errors swing most: 0, 1 or 2.
+    """
+
+    far: float
+    reduced: float
+    axis: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lines:
+    """How prominent lines are in nulls.
+
+    Attributes:
+        mean, deviation: (shape · axis,) of the logarithm of the most prominent line's power.
+    """
+
+    mean: Floats
+    deviation: Floats
+
+    @classmethod
+    def of(cls, groups: Floats) -> Lines:
+        """Of null groups (group, shape · axis): see `strongest`."""
+        return cls(mean=groups.mean(axis=0), deviation=np.maximum(groups.std(axis=0), 1e-6))
+
+    def standing_out(self, groups: Floats) -> Floats:
+        """(group,) of the shape and axis where it is farthest from nulls' mean, in their standard deviations."""
+        return ((groups - self.mean) / self.deviation).max(axis=1)
+
+    def line(self, prominence: Floats, *, centre: float, width: float) -> Line:
+        """Of some segments (segment, reduced frequency, shape · axis).
+
+        Args:
+            centre, width: mean and standard deviation of nulls' `standing_out`.
+        """
+        values, places = _strongest(prominence)
+        across = (values - self.mean) / self.deviation
+        best = int(np.argmax(across))
+        return Line(far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), axis=best % 3)
+
+
+def strongest(prominence: Floats) -> Floats:
+    """(shape · axis,) logarithm of the most prominent line's power, in the mean of segments (segment, reduced
+    frequency, shape · axis); only frequencies that at least half of them can show."""
+    return _strongest(prominence)[0]
+
+
+def _strongest(prominence: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    shown = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
+    if not len(shown):  # too few frames a second for any: as prominent as its neighbourhood
+        return np.zeros(prominence.shape[2]), np.zeros(prominence.shape[2], dtype=np.int64)
+    mean = np.nanmean(prominence[:, shown], axis=0)
+    places = mean.argmax(axis=0)
+    return np.log(mean.max(axis=0)), shown[places]
