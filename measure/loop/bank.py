@@ -137,7 +137,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
     buffer = BytesIO()
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
-        marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
+        marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip

@@ -57,6 +57,17 @@ class Statistics:
     marker_error: Floats
     lines: Floats | None = None
 
+    @property
+    def spectra(self) -> Floats:
+        """`lines`, which must have been looked at.
+
+        Raises:
+            UsageError: they were not.
+        """
+        if self.lines is None:
+            raise UsageError("no spectra", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
+        return self.lines
+
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Statistics:
         """Of some segments."""
         return Statistics(
@@ -77,7 +88,7 @@ class Statistics:
         return cls(
             recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
             response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
-            marker_error=np.concatenate([p.marker_error for p in parts]),
+            marker_error=np.concatenate([p.marker_error for p in parts]), lines=_joined([p.lines for p in parts]),
         )  # fmt: skip
 
 

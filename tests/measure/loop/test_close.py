@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Annotated
 
 import numpy as np
 import pytest
 import torch
+from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
 from measure.loop.close import Options, Solved, close_loop
-from measure.loop.columns import Calibration, SteadyField, fields
+from measure.loop.columns import Calibration, fields
 from measure.loop.field import corrective_field
 from measure.loop.inference import Design
 from measure.loop.nulls import NullBatch
@@ -22,9 +24,26 @@ from measure.loop.statistics import projected
 from measure.loop.verdict import Conclusion, Estimate, Verdict
 from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
+from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect
+from sim.effects.effect import ForceEffect
+from sim.effects.parameter import Value, strength
 
 DURATION, NOISE, SPEEDS = 4.6, 5e-4, (3.5, 6.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Push(ForceEffect):
+    """A force per mass across the wind, alike all over.
+
+    Attributes:
+        acceleration: of it [m/s²].
+    """
+
+    acceleration: Annotated[Value, strength(unit="m/s²", prior=(-10.0, 10.0), source="made for a test")] = 0.0
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        return torch.zeros_like(position).index_fill(1, torch.tensor(1), 1.0) * cloth.mass[:, None] * self.acceleration
 
 
 @pytest.fixture(scope="module")
@@ -101,9 +120,7 @@ def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: 
 
 
 def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: Path) -> None:
-    # 3 m/s² across the wind, alike all over and so on any mesh.
-    push = SteadyField(acceleration=torch.tensor([0.0, 3.0, 0.0], dtype=torch.float64)[None, :, None])
-    setting = Setting.of(recorded(specimen, push, seed=11))
+    setting = Setting.of(recorded(specimen, Push(acceleration=6.0), seed=11))
     nominal = [setting.nominal] * len(setting.segments)
     found, projection = projected(setting.forecaster, setting.segments, nominal, banks.columns())
     null = banks.load(bank, words="made").model(setting.design)
@@ -111,7 +128,7 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     modes = corrective_field(setting, yardstick)
     assert [mode.column for mode in modes] == list(fields())
     across = next(mode for mode in modes if mode.column.name == "field.y.00")
-    assert across.value == pytest.approx(3.0, abs=3 * across.error)
+    assert across.value == pytest.approx(6.0, abs=3 * across.error)
     assert across.value > 3 * across.error
     assert max(modes, key=lambda mode: abs(mode.value / mode.error)) is across
 

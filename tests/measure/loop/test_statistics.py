@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
+from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.statistics import projected, statistics
+from measure.loop.statistics import Statistics, projected, statistics
 from measure.observe.trajectory import Trajectory
 
 COLUMNS = (
@@ -30,6 +33,12 @@ def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, s
     alone = statistics(forecaster, segments, nominal, COLUMNS)
     np.testing.assert_array_equal(alone.r, found.r)
     np.testing.assert_array_equal(alone.response, found.response)
+    np.testing.assert_array_equal(alone.lines, found.lines)
+    np.testing.assert_allclose(projection.lines(errors), found.spectra, rtol=1e-6)
+    whole = Statistics.joined([alone.select(np.array([0])), alone.select(np.arange(1, len(segments)))])
+    np.testing.assert_array_equal(whole.spectra, found.spectra)
+    with pytest.raises(UsageError, match="spectra"):
+        Statistics.joined([alone, replace(alone, lines=None)])
 
 
 def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecaster, segments: Segments) -> None:
