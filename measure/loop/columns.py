@@ -1,4 +1,4 @@
-"""What is varied about the model, one column each: calibrated parameters, effects of the library, corrective fields.
+"""What is varied about the model, one column each: calibrated parameters, effects of the library, forces.
 
 A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
 of parameters, of effects and of the corrective field are found by simulation: `StepColumn.system` gives the batch with
