@@ -75,7 +75,7 @@ def shedding(line: Line) -> str:
     """What a line of the errors' spectra looks like."""
     return (
         f"The errors swing {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind: vortices of a cylinder of "
-        f"{number(STROUHAL / line.reduced)} m do so."
+        f"{number(STROUHAL / line.reduced, digits=2)} m do so."
     )
 
 

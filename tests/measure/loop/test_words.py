@@ -1,0 +1,30 @@
+"""What is said of what the library lacks."""
+
+from __future__ import annotations
+
+from measure.loop.columns import FieldColumn
+from measure.loop.field import Mode
+from measure.loop.lines import Line
+from measure.loop.words import proposal, shedding
+
+
+def test_the_modes_that_are_told_best_are_said_first() -> None:
+    modes = [
+        Mode(column=FieldColumn(axis=0, mode=(1, 0)), value=0.5, error=0.1),
+        Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),
+        Mode(column=FieldColumn(axis=2, mode=(2, 0)), value=-4.0, error=1.0),
+        Mode(column=FieldColumn(axis=2, mode=(1, 1)), value=9.0, error=9.0),
+    ]
+    said = proposal(modes)
+    first, second, third = said.split(": ", 1)[1].split("; ")
+    assert first.startswith("across the wind, all over (3")
+    assert second.startswith("along the wind, hoist against fly (0.5")
+    assert third.startswith("up, both ends against the middle (−4")
+    assert "corner" not in said
+
+
+def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
+    # A Strouhal number of 0.2: 1.33 Hz for each m/s is a width of 0.15 m.
+    said = shedding(Line(far=9.0, reduced=0.2 / 0.15, axis=1))
+    assert "across the wind at 1.3 Hz for each m/s" in said
+    assert "0.15 m" in said
