@@ -123,9 +123,9 @@ def judge(
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[-1]))])
-    # An effect that changes how a flag flutters, as lift does, leaves a line too; not where it is in the model.
+    # An effect that changes how a flag flutters, as lift does, leaves a line too, of which it then takes much away.
     rerun = (again or {}).get(ranking[0].column)
-    left = line if rerun is None else reference.line(rerun.evidence)
+    left = line if rerun is None else rerun.line
     swings = left is not None and reference.rarity.p(left.far) <= level
 
     def judgement(conclusion: Conclusion, named: Sequence[Weighed], reasons: dict[int, str]) -> Judgement:
@@ -157,7 +157,11 @@ def judge(
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
     useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
     others = [w for w in ranking[1:] if w.column not in useless]
-    second = _second(evidence if rerun is None else rerun.evidence, reference, best, others, level)
+    second = (
+        _second(evidence, reference, best, others, level)
+        if rerun is None
+        else _second(rerun.evidence, reference, best, others, level, swinging=rerun.line is not None)
+    )
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
@@ -211,7 +215,13 @@ def _told(ranking: Sequence[Weighed], chosen: Sequence[int], reason: str) -> tup
 
 
 def _second(
-    evidence: Evidence, reference: Reference, best: Weighed, others: Sequence[Weighed], level: float
+    evidence: Evidence,
+    reference: Reference,
+    best: Weighed,
+    others: Sequence[Weighed],
+    level: float,
+    *,
+    swinging: bool = True,
 ) -> Weighed | None:
     """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
     strength is not nothing. Beside gusts, the pressure is free in every segment.
@@ -219,6 +229,7 @@ def _second(
     Args:
         evidence: of what the best leaves, if it was run again.
         others: candidates beside the best, but for those whose models, run again, predict nothing.
+        swinging: whether lines of the errors' spectra count.
     """
     pressure = names().index(GUSTS)
     known = [best.column]
@@ -239,7 +250,8 @@ def _second(
     chosen, gained = others[able[leader]], pairs[1 + leader] - pairs[0]
     value, error = _beside(evidence, fits[able[leader]], chosen)
     lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _REACH * error
-    return chosen if lasting and reference.p_left_by(evidence, names(), [*known, chosen.column]) > level else None
+    left = reference.p_left_by(evidence, names(), [*known, chosen.column], swinging=swinging)
+    return chosen if lasting and left > level else None
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:

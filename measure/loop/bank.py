@@ -19,7 +19,7 @@ import torch
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
-from measure.loop.columns import THETA, Calibration, Column, forces, library, motions
+from measure.loop.columns import THETA, Calibration, Column, library, motions
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
@@ -38,8 +38,8 @@ Progress = Callable[[int], object]
 
 
 def columns() -> tuple[Column, ...]:
-    """What is weighed beside the calibrated parameters: the library's strengths, then forces of no known origin."""
-    return (*library(), *forces(), *motions())
+    """What is weighed beside the calibrated parameters: the library's strengths, then forces along the motion."""
+    return (*library(), *motions())
 
 
 def names() -> tuple[str, ...]:

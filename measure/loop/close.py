@@ -296,7 +296,12 @@ def _proposal(solved: Solved, judgement: Judgement) -> str:
     """What the library lacks looks like, where it has no answer or half of one."""
     if judgement.conclusion not in (Conclusion.OUTSIDE, Conclusion.PARTLY):
         return ""
-    field = proposal(corrective_field(solved.setting, solved.fits.yardstick))
+    larger = solved.larger if judgement.named else None
+    left = None if larger is None else solved.fits.errors(larger)
+    modes = corrective_field(
+        solved.setting, solved.fits.yardstick, left=left, beside=() if larger is None else larger.chosen
+    )
+    field = proposal(modes, whole=larger is None)
     return field if judgement.line is None else f"{shedding(judgement.line)} {field}"
 
 

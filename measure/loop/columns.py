@@ -2,7 +2,7 @@
 
 A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
 of parameters, of effects and of the corrective field are found by simulation: `StepColumn.system` gives the batch with
-a small step taken. Forces that are only looked along are written down.
+a small step taken. Forces along the motion, which are only looked along, are written down.
 """
 
 from __future__ import annotations
@@ -182,65 +182,17 @@ class FieldColumn(StepColumn):
         return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
 
 
-class WrittenColumn(Column):
-    """A force per mass b cos(π i u/W) cos(π j v/H) whose change of the predictions is written down, not simulated.
-
-    It is T² times the force, T their horizon: what it does to a point that is free. As a direction to look along, where
-    only nulls say what is usual, it need not be what cloth does.
-
-    Attributes:
-        mode: (i, j).
-    """
-
-    mode: tuple[int, int]
-
-    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
-        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
-
-        Args:
-            markers: (marker, 2) [m].
-            rest: (vertex, 2) of the cloth [m].
-            period: between the frames [s].
-        """
-        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
-        return self.moved(seen, period) * shape[None, :, None, None]
-
-    @abstractmethod
-    def moved(self, seen: Tensor, period: float) -> Tensor:
-        """The same of a force that is alike all over."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class ForceColumn(WrittenColumn):
-    """Along an axis of the world, steady.
+class MotionColumn(Column):
+    """A force per mass b cos(π i u/W) cos(π j v/H) along the observed motion: along its velocity, or its acceleration.
 
-    Attributes:
-        axis: 0, 1 or 2.
-    """
-
-    axis: int
-    mode: tuple[int, int]
-
-    @property
-    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return f"force.{'xyz'[self.axis]}.{self.mode[0]}{self.mode[1]}"
-
-    @property
-    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return "m/s²"
-
-    def moved(self, seen: Tensor, period: float) -> Tensor:
-        along = torch.zeros_like(seen[2:])
-        along[:, :, self.axis] = period**2
-        return along
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotionColumn(WrittenColumn):
-    """Along the observed motion: along its velocity, or its acceleration.
+    Its change of the predictions is written down, not simulated: T² times the force, T their horizon, what it does to a
+    point that is free. As a direction to look along, where only nulls say what is usual, it need not be what cloth
+    does.
 
     Attributes:
         derivative: 1 for velocity, 2 for acceleration.
+        mode: (i, j).
     """
 
     derivative: int
@@ -254,9 +206,18 @@ class MotionColumn(WrittenColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return ("1/s", "1")[self.derivative - 1]
 
-    def moved(self, seen: Tensor, period: float) -> Tensor:
+    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
+        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
+
+        Args:
+            markers: (marker, 2) [m].
+            rest: (vertex, 2) of the cloth [m].
+            period: between the frames [s].
+        """
         first, middle, last = seen[:-2], seen[1:-1], seen[2:]
-        return (last - first) * (period / 2) if self.derivative == 1 else last - 2 * middle + first
+        moved = (last - first) * (period / 2) if self.derivative == 1 else last - 2 * middle + first
+        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
+        return moved * shape[None, :, None, None]
 
 
 def cosine(mode: tuple[int, int], places: Floats, rest: Floats) -> Floats:
@@ -306,13 +267,8 @@ def library() -> tuple[EffectColumn, ...]:
     return columns
 
 
-def forces() -> tuple[ForceColumn, ...]:
-    """Steady forces."""
-    return tuple(ForceColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
-
-
 def fields() -> tuple[FieldColumn, ...]:
-    """The corrective field's modes: the same forces, simulated."""
+    """The corrective field's modes: steady forces."""
     return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
 
 

@@ -1,4 +1,4 @@
-"""The corrective field: the smooth steady force that fits best, where the library has no answer.
+"""The corrective field: the smooth steady force that fits best, where the library has no answer, or half of one.
 
 It is looked for last and only then: its modes are simulated along the data alone, and fitted to the errors along the
 directions that the nulls know.
@@ -6,7 +6,10 @@ directions that the nulls know.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from torch import Tensor
 
 from measure.loop.columns import THETA, FieldColumn, fields
 from measure.loop.inference import Evidence
@@ -28,16 +31,23 @@ class Mode:
     error: float
 
 
-def corrective_field(setting: Setting, yardstick: Yardstick) -> tuple[Mode, ...]:
-    """Its modes, fitted together to what the nominal model leaves."""
+def corrective_field(
+    setting: Setting, yardstick: Yardstick, *, left: Tensor | None = None, beside: Sequence[int] = ()
+) -> tuple[Mode, ...]:
+    """Its modes, fitted together.
+
+    Args:
+        left: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the nominal one.
+        beside: columns of that model, whose strengths are fitted with the field.
+    """
     forecaster, segments, modes = setting.forecaster, setting.segments, fields()
     nominal = [setting.nominal] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     changes = forecaster.sensitivities(modes, segments, nominal, base)[len(THETA) :]
-    evidence = Evidence.of(
-        yardstick.found, yardstick.speeds, yardstick.null, beside=yardstick.projection.response(changes)
-    )
-    first = yardstick.found.r.shape[1]
-    fit = evidence.fit(range(first, first + len(modes)))
-    found = (fit.of(first + place) for place in range(len(modes)))
-    return tuple(Mode(column=c, value=v, error=e) for c, (v, e) in zip(modes, found, strict=True))
+    found = yardstick.found if left is None else replace(yardstick.found, r=yardstick.projection.of(left))
+    response = yardstick.projection.response(changes)
+    evidence = Evidence.of(found, yardstick.speeds, yardstick.null, beside=response)
+    first = found.r.shape[1]
+    fit = evidence.fit([*beside, *range(first, first + len(modes))])
+    fitted = (fit.of(first + place) for place in range(len(modes)))
+    return tuple(Mode(column=c, value=v, error=e) for c, (v, e) in zip(modes, fitted, strict=True))

@@ -3,11 +3,13 @@
 Forces that come and go within a segment average to nothing along every steady column. A body of width D sheds at
 f = St U/D, St about 0.2 (Roshko, NACA TN 3169, 1954), so f/U is the same in all winds. Each segment's errors, projected
 on cos(π i u/W) along each axis of the world, have a periodogram; its prominence at a reduced frequency is the power
-there over the median of the neighbourhood, and that of some segments is the mean.
+there over the median of the neighbourhood, and that of some segments is the geometric mean: a line that one of them
+shows alone is none that goes with the wind.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +21,9 @@ from measure.loop.columns import cosine
 
 Floats = NDArray[np.float64]
 
-REDUCED: Floats = np.geomspace(0.6, 4.0, 90)
-"""f/U [1/m]: bodies 5 to 33 cm wide; above the flutter of a flag of 1.5 m, at about 0.3, whose harmonics nulls have
-too. 2 % apart: less than the lines' own width."""
+REDUCED: Floats = np.geomspace(1.0, 4.0, 70)
+"""f/U [1/m]: bodies 5 to 20 cm wide. Below are the harmonics of the flutter of a flag of 1.5 m, at about 0.3, by which
+nulls of some numerics stand out. 2 % apart: less than the lines' own width."""
 SHAPES = tuple((i, 0) for i in range(5))
 STROUHAL = 0.2
 """f D/U of a circular cylinder from Re 300 to 2e5 (Roshko 1954)."""
@@ -56,19 +58,42 @@ class Spectrum:
     def prominence(self, errors: Tensor) -> Floats:
         """(segment, reduced frequency, shape · axis) of errors (frame, marker, 3, segment) [m]; NaN where the frames
         are too few a second."""
+        power, frequency = self._power(errors), self._frequency
+        around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
+        return self._with_the_wind(power / np.maximum(around, np.finfo(np.float64).tiny))
+
+    def share_left(self, line: Line, before: Tensor, after: Tensor) -> float:
+        """Power of a line in errors (frame, marker, 3, segment) [m], over that in others."""
+        place = int(np.argmin(np.abs(REDUCED - line.reduced)))
+        old, new = (
+            float(np.nansum(self._with_the_wind(self._power(errors))[:, place, line.direction]))
+            for errors in (before, after)
+        )
+        return new / old if old > 0 else math.inf
+
+    def _power(self, errors: Tensor) -> Floats:
+        """(frequency, segment, shape · axis) [m²]."""
         frames, segments = errors.shape[0], errors.shape[3]
         shapes = torch.as_tensor(self.shapes, dtype=errors.dtype, device=errors.device)
         course = torch.einsum("km,fmcs->fskc", shapes, errors).reshape(frames, segments, -1).double().cpu().numpy()
         window = np.hanning(frames + 2)[1:-1, None, None]
-        power = np.abs(np.fft.rfft((course - course.mean(axis=0)) * window, _POINTS, axis=0)) ** 2
-        frequency = np.fft.rfftfreq(_POINTS, self.period)
-        around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
-        ratio = power / np.maximum(around, np.finfo(np.float64).tiny)
-        found = np.full((segments, len(REDUCED), ratio.shape[2]), np.nan)
+        spectrum = np.fft.rfft((course - course.mean(axis=0)) * window, _POINTS, axis=0)
+        return spectrum.real**2 + spectrum.imag**2
+
+    @property
+    def _frequency(self) -> Floats:
+        """Of the transforms [Hz]."""
+        return np.fft.rfftfreq(_POINTS, self.period)
+
+    def _with_the_wind(self, values: Floats) -> Floats:
+        """(segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the frames are
+        too few a second."""
+        frequency = self._frequency
+        found = np.full((values.shape[1], len(REDUCED), values.shape[2]), np.nan)
         for place, speed in enumerate(self.speeds):
             sought = REDUCED * speed
             seen = sought < frequency[-1] - _EDGE
-            found[place, seen] = ratio[np.rint(sought[seen] / frequency[1]).astype(int), place]
+            found[place, seen] = values[np.rint(sought[seen] / frequency[1]).astype(int), place]
         return found
 
 
@@ -79,12 +104,17 @@ class Line:
     Attributes:
         far: how prominent, in nulls' standard deviations.
         reduced: its frequency over the wind's speed [1/m].
-        axis: along which the errors swing most: 0, 1 or 2.
+        direction: place among shapes · axes in which the errors swing most.
     """
 
     far: float
     reduced: float
-    axis: int
+    direction: int
+
+    @property
+    def axis(self) -> int:
+        """Along which: 0, 1 or 2."""
+        return self.direction % 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,12 +146,12 @@ class Lines:
         values, places = _strongest(prominence)
         across = (values - self.mean) / self.deviation
         best = int(np.argmax(across))
-        return Line(far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), axis=best % 3)
+        return Line(far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), direction=best)
 
 
 def strongest(prominence: Floats) -> Floats:
-    """(shape · axis,) logarithm of the most prominent line's power, in the mean of segments (segment, reduced
-    frequency, shape · axis); only frequencies that at least half of them can show."""
+    """(shape · axis,) logarithm of the most prominent line's power, its mean over segments (segment, reduced frequency,
+    shape · axis); only frequencies that at least half of them can show."""
     return _strongest(prominence)[0]
 
 
@@ -129,6 +159,6 @@ def _strongest(prominence: Floats) -> tuple[Floats, NDArray[np.int64]]:
     shown = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
     if not len(shown):  # too few frames a second for any: as prominent as its neighbourhood
         return np.zeros(prominence.shape[2]), np.zeros(prominence.shape[2], dtype=np.int64)
-    mean = np.nanmean(prominence[:, shown], axis=0)
+    mean = np.nanmean(np.log(np.maximum(prominence[:, shown], np.finfo(np.float64).tiny)), axis=0)
     places = mean.argmax(axis=0)
-    return np.log(mean.max(axis=0)), shown[places]
+    return mean.max(axis=0), shown[places]

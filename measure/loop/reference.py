@@ -236,14 +236,22 @@ class Reference:
         """The same for the column alone."""
         return share_as_large(self.scaled[:, column], statistic)
 
-    def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
-        """Of the global test on what some columns leave, fitted to the data."""
-        return self.rarity.p(self.farthest(evidence, columns, chosen))
+    def p_left_by(
+        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int], *, swinging: bool = True
+    ) -> float:
+        """Of the global test on what some columns leave, fitted to the data.
 
-    def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
+        Args:
+            swinging: whether lines of the errors' spectra count.
+        """
+        return self.rarity.p(self.farthest(evidence, columns, chosen, swinging=swinging))
+
+    def farthest(
+        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = (), *, swinging: bool = True
+    ) -> float:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
         values = np.append(unscaled(evidence, columns, chosen), evidence.fit(chosen).left)
-        far, line = self._far(values, slice(len(values))), self.line(evidence)
+        far, line = self._far(values, slice(len(values))), self.line(evidence) if swinging else None
         return float(far.max()) if line is None else max(float(far.max()), line.far)
 
     def line(self, evidence: Evidence) -> Line | None:

@@ -64,11 +64,16 @@ def separating(verdict: Verdict) -> str:
     return "a longer recording, at one more wind speed: the effects named differ in how they grow with the wind"
 
 
-def proposal(modes: Sequence[Mode]) -> str:
-    """What the corrective field looks like: the modes that are told best."""
+def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
+    """What the corrective field looks like: the modes that are told best.
+
+    Args:
+        whole: whether it stands for all that the base model lacks, or for what a named effect leaves.
+    """
     told = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
     terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in told]
-    return "The smooth force field that fits best, per mass: " + "; ".join(terms) + "."
+    fitted = "fits best" if whole else "fits best what is left"
+    return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
 
 
 def shedding(line: Line) -> str:

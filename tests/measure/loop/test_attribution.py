@@ -162,8 +162,8 @@ def test_an_effect_beside_gusts_is_named_with_them(null: NullModel, reference: R
     assert found.conclusion is Conclusion.EFFECT
 
 
-def test_a_smooth_force_is_none_of_the_library(null: NullModel, reference: Reference) -> None:
-    found = judged(null, reference, {"force.y.10": 2.0})
+def test_a_force_along_the_motion_is_none_of_the_library(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {"motion.1.10": 2.0})
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
 
 
@@ -187,10 +187,10 @@ def test_a_line_is_the_effects_own_if_its_model_has_it(
     null: NullModel, reference: Reference, line: float, conclusion: Conclusion
 ) -> None:
     # Lift makes a flag flutter in another way: the base model's errors swing, those with the lift need not.
-    lift = names().index("lift.coefficient")
+    lift, left = names().index("lift.coefficient"), seen(null, {}, line=line, seed=3)
     rerun = Rerun(
         coefficient=float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 5.0), leftover=0.02 if line else 0.5,
-        evidence=seen(null, {}, line=line, seed=3),
+        evidence=left, line=reference.line(left) if line else None,
     )  # fmt: skip
     found = judge(seen(null, {"lift.coefficient": 1.0}, line=20.0), reference, level=0.02, again={lift: rerun})
     assert found.conclusion is conclusion

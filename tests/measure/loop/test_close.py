@@ -131,6 +131,13 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     assert across.value == pytest.approx(6.0, abs=3 * across.error)
     assert across.value > 3 * across.error
     assert max(modes, key=lambda mode: abs(mode.value / mode.error)) is across
+    # Of errors without the part of them that such a force makes, none of it is left.
+    segments, forecaster = setting.segments, setting.forecaster
+    errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    change = forecaster.sensitivities([across.column], segments, nominal, errors)[-1]
+    rest = corrective_field(setting, yardstick, left=errors - across.value * change)
+    unmoved = next(mode for mode in rest if mode.column == across.column)
+    assert abs(unmoved.value) < across.error
 
 
 def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifted: Verdict) -> None:

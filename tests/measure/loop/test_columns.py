@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from measure.loop.columns import THETA, Calibration, FieldColumn, fields, forces, library, motions
+from measure.loop.columns import THETA, Calibration, FieldColumn, fields, library, motions
 from measure.loop.model import Model
 from sim.effects import EFFECTS
 from sim.material import named
@@ -71,7 +71,7 @@ def test_a_field_mode_is_a_force_per_mass_along_its_axis() -> None:
 
 
 def test_the_modes_are_different_columns() -> None:
-    every = (*fields(), *forces(), *motions())
+    every = (*library(), *fields(), *motions())
     assert len({column.name for column in every}) == len(every)
 
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from measure.loop.columns import THETA, Calibration, EffectColumn, FieldColumn, ForceColumn, MotionColumn
+from measure.loop.columns import THETA, Calibration, EffectColumn, FieldColumn, MotionColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
@@ -71,34 +71,6 @@ def test_a_motion_column_is_the_observed_motion_at_the_frames_of_the_errors(
             before = segment.start + (segments.first - 1) * period
             expected = period**2 * shape * (v + a * before if derivative == 1 else a)
             np.testing.assert_allclose(change[0, :, :, place].numpy(), expected, atol=1e-9)
-
-
-def test_a_steady_force_moves_free_points_by_its_acceleration(
-    forecaster: Forecaster, own_recording: Trajectory
-) -> None:
-    # a T²: half of it in the period, half by the velocity that the period before has left.
-    segments = Segments.of([own_recording])
-    nominal, period = [NOMINAL] * len(segments), 1 / own_recording.rate
-    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-    shape = np.cos(np.pi * forecaster.markers[:, 0] / 0.75) * np.cos(2 * np.pi * forecaster.markers[:, 1] / 0.5)
-    for axis in range(3):
-        change = forecaster.sensitivity(ForceColumn(axis=axis, mode=(1, 2)), segments, nominal, base)
-        expected = np.zeros(base.shape)
-        expected[:, :, axis] = period**2 * shape[None, :, None]
-        np.testing.assert_allclose(change.numpy(), expected, atol=1e-12)
-
-
-def test_a_steady_force_moves_cloth_the_way_it_moves_free_points(
-    forecaster: Forecaster, own_recording: Trajectory
-) -> None:
-    segments = Segments.of([own_recording])
-    nominal = [NOMINAL] * len(segments)
-    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-    simulated = forecaster.sensitivity(FieldColumn(axis=1, mode=(0, 0)), segments, nominal, base)
-    written = forecaster.sensitivity(ForceColumn(axis=1, mode=(0, 0)), segments, nominal, base)
-    # The air brakes it, and it is tied: less far, along the same.
-    assert float((simulated * written).sum() / simulated.norm() / written.norm()) > 0.5
-    assert float(simulated.norm() / written.norm()) < 1.0
 
 
 def test_a_force_along_the_velocity_moves_cloth_about_as_it_moves_free_points(

@@ -21,10 +21,11 @@ def test_the_modes_that_are_told_best_are_said_first() -> None:
     assert second.startswith("along the wind, hoist against fly (0.5")
     assert third.startswith("up, both ends against the middle (−4")
     assert "corner" not in said
+    assert "fits best what is left, per mass: across" in proposal(modes, whole=False)
 
 
 def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
     # A Strouhal number of 0.2: 1.33 Hz for each m/s is a width of 0.15 m.
-    said = shedding(Line(far=9.0, reduced=0.2 / 0.15, axis=1))
+    said = shedding(Line(far=9.0, reduced=0.2 / 0.15, direction=1))
     assert "across the wind at 1.3 Hz for each m/s" in said
     assert "0.15 m" in said
