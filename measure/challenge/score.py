@@ -4,7 +4,8 @@ Definitions, in the words of the sheet:
 
 - *False positive*: a null whose base model was not found sufficient. A refusal of the data counts as one.
 - *Half-detection strength*: the impact (see `Key.impact`) at which half are detected, of a class of effects (see
-  `rates.Power`). Identification is graded on sets of one effect at twice that or more.
+  `rates.Power`). Identification is graded on sets of one effect at twice that or more; effects from outside the
+  library are called strong by twice that of a class that was not seen.
 - *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its class did.
 - *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a single claim.
 - *None of the library*: the verdict says so, or that the library explains only a part.
@@ -115,6 +116,15 @@ class Sheet:
         return [o for o in self.of_kind(Kind.ONE) if o.key.impact >= ENOUGH * power.half[_class(o)][0]]
 
     @property
+    def strong_outside(self) -> list[Outcome]:
+        """Of sets with an effect from outside the library, at twice the half-detection strength of a class of effects
+        that was not seen, or more."""
+        power = self.power
+        if power is None:
+            return []
+        return [o for o in self.of_kind(Kind.OUTSIDE) if o.key.impact >= ENOUGH * power.overall[0]]
+
+    @property
     def half_strengths(self) -> dict[str, HalfStrength]:
         """Effect → the strength that is detected half of the time: that of its class as an impact, times the median of
         strength over impact in its own sets, which are proportional while effects are weak."""
@@ -207,6 +217,7 @@ class Sheet:
             ),
             "false discoveries among claims": self.false_discoveries,
             "recall of none of the library": self.outside_recall,
+            "recall of none of the library, strong": self.share(self.strong_outside, lambda o: o.outside_said),
             "none of the library, said wrongly of one effect": self.share(one, lambda o: o.outside_said),
             "control separated": self.separated,
             "interval covers the true strength": self.coefficients.covered,

@@ -86,10 +86,14 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     parts += [f"Time for a set: {_words([o.seconds for o in sheet.outcomes], 0.9, 'slowest decile')} s.", ""]
     parts.append(
         "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects are those of "
-        f"{ENOUGH:g} times that, {len(sheet.strong)} sets."
+        f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library {len(sheet.strong_outside)}, by the "
+        "half-detection strength of a class that was not seen."
     )
     parts += ["", "| group | half detected at | sets |", "|---|---|---|"]
     parts += _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
+    if sheet.power is not None:
+        half, low, high = (_MILLI * value for value in sheet.power.overall)
+        parts.append(f"| class: one not seen | {_digits(half)} [{_digits(low)}, {_digits(high)}] mm | – |")
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
     parts += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
     parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))

@@ -103,6 +103,9 @@ def test_who_sees_from_a_threshold_on_has_the_half_detection_strength_there() ->
         assert low < half < high
     assert all(o.key.impact > 5e-3 for o in result.strong)
     assert result.shares["top-1, strong"].value == 1
+    assert all(o.key.impact > 5e-3 for o in result.strong_outside)
+    assert result.shares["recall of none of the library, strong"].value == 1
+    assert result.outside_recall.value == pytest.approx(0.5, abs=0.05)
     assert result.shares["top-1, all of one effect"].value == pytest.approx(0.5, abs=0.02)
 
 
