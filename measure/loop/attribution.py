@@ -50,6 +50,10 @@ _BEYOND = 3.0
 _BETTER = 1.5
 """A corrective field whose statistic is larger by this factor says that the library has no answer."""
 
+_ENOUGH = 0.02
+"""Level at which a larger model is rejected, if the base model's is not lower: nulls say what numerics do to the base
+model, and somewhat less than what they do to one with an effect."""
+
 RESPONSE = 0.25
 """Relative standard error of a strength by what the fit's mesh does to an effect, which nulls do not show: strengths of
 22 effects that were named rightly in two challenges scattered about the true ones by so much beyond their errors."""
@@ -107,9 +111,10 @@ class Judgement:
 def judge(
     evidence: Evidence, reference: Reference, *, level: float, again: Mapping[int, Rerun] | None = None
 ) -> Judgement:
-    """Weigh the library against the evidence of all recordings, at a level of the global test.
+    """Weigh the library against the evidence of all recordings.
 
     Args:
+        level: of the global test.
         again: of columns whose models were run again, which counts in place of the linear evidence.
     """
     statistics = reference.statistics(evidence, names())
@@ -153,14 +158,15 @@ def judge(
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
-    if best.candidate.leftover > level:
+    enough = min(level, _ENOUGH)
+    if best.candidate.leftover > enough:
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
     useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
     others = [w for w in ranking[1:] if w.column not in useless]
     second = (
-        _second(evidence, reference, best, others, level)
+        _second(evidence, reference, best, others, enough)
         if rerun is None
-        else _second(rerun.evidence, reference, best, others, level, swinging=rerun.line is not None)
+        else _second(rerun.evidence, reference, best, others, enough, swinging=rerun.line is not None)
     )
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)

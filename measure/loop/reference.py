@@ -22,6 +22,8 @@ _GROUPS = 400
 _LEAST = 24
 _KINDS = 4
 """Null recordings below which no test at 2 % can be held, and of how many kinds of numerics."""
+_MANY, _OF_MANY, _OF_FEW = 100, 0.05, 0.02
+"""Kinds of numerics from which on the usual level of the tests is the first of these, else the second."""
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
 
@@ -101,6 +103,11 @@ class NullBank:
                 f"{count} null recordings of {kinds} numerics", where="null bank",
                 fix=f"simulate at least {_LEAST} of {_KINDS}, better 200 of 12",
             )  # fmt: skip
+
+    @property
+    def level(self) -> float:
+        """Of the global test that is usual by these nulls: few kinds of numerics hold it worse than its name says."""
+        return _OF_MANY if len(np.unique(self.nulls.numerics)) >= _MANY else _OF_FEW
 
     def model(self, design: Design) -> NullModel:
         """Learnt from all, for data of a design."""
