@@ -86,8 +86,8 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     parts += [f"Time for a set: {_words([o.seconds for o in sheet.outcomes], 0.9, 'slowest decile')} s.", ""]
     parts.append(
         "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects are those of "
-        f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library {len(sheet.strong_outside)}, by that "
-        "of a class that was not seen."
+        f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library {len(sheet.strong_outside)}, by "
+        "that of a class that was not seen."
     )
     parts += ["", "| group | half detected at | sets |", "|---|---|---|"]
     parts += _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))

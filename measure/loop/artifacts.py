@@ -156,7 +156,7 @@ def _recipe(closed: Closed) -> dict[str, Any]:
     if options.bank is not None:
         bank = digest(" ".join(file_hash(path) for path in sorted(options.bank.glob("nulls-*.npz"))))
     return {
-        "close-loop": 1, "experiment": fingerprint(closed.experiment), "level": closed.verdict.test.level,
+        "close-loop": 1, "experiment": fingerprint(closed.experiment), "level": options.level,
         "nulls": None if options.bank is not None else options.nulls, "bank": bank,
     }  # fmt: skip
 

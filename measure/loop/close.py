@@ -66,7 +66,7 @@ class Options:
 
     Attributes:
         seed: of the nulls.
-        level: of the global test; None for that of the nulls: see `NullBank.level`.
+        level: of the global test.
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
@@ -77,13 +77,13 @@ class Options:
     """
 
     seed: int = 0
-    level: float | None = None
+    level: float = 0.05
     nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1
 
     def __post_init__(self) -> None:
-        if self.level is not None and not 0 < self.level < 1:
+        if not 0 < self.level < 1:
             raise UsageError(f"a level of {self.level!r}", where="close-loop", fix="give one between 0 and 1")
         if self.nulls < FEWEST_NULLS or self.workers < 1:
             raise UsageError(
@@ -117,18 +117,17 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     yardstick = Yardstick(found=found, projection=projection, null=bank.model(setting.design), speeds=speeds)
     evidence = yardstick.evidence(found)
     fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
-    level = bank.level if options.level is None else options.level
-    judgement = judge(evidence, reference, level=level)
+    judgement = judge(evidence, reference, level=options.level)
     if judgement.conclusion is not Conclusion.SUFFICIENT:
         tell("before and after", 0, 1)
         again = run_again(fits, reference, finalists(judgement), workers=options.workers)
-        judgement = judge(evidence, reference, level=level, again=again)
+        judgement = judge(evidence, reference, level=options.level, again=again)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     if solved.doubtful and solved.doubtful == judgement.named[1:]:
         solved = replace(solved, judgement=alone(judgement, NOT_APART))
     judgement, trial = _settled(solved, options, tell)
     tell("before and after", 1, 1)
-    return _verdict(solved, judgement, bank, trial, level=level, seed=options.seed, began=began)
+    return _verdict(solved, judgement, bank, trial, options, began)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -263,7 +262,7 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
 
 
 def _verdict(
-    solved: Solved, judgement: Judgement, bank: NullBank, trial: Trial, *, level: float, seed: int, began: float
+    solved: Solved, judgement: Judgement, bank: NullBank, trial: Trial, options: Options, began: float
 ) -> Verdict:
     setting, larger = solved.setting, solved.larger if judgement.named else None
     before = _unseen(setting, solved.base)
@@ -275,14 +274,14 @@ def _verdict(
         test=NullTest(
             statistic=judgement.statistic, null=[float(v) for v in rarity.null],
             p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=_INTERVAL),
-            level=level, critical=rarity.critical(level), nulls=bank.words,
+            level=options.level, critical=rarity.critical(options.level), nulls=bank.words,
         ),
         parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
         comparisons=trial.comparisons,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         assumptions=assumptions(setting.experiment),
         provenance={
-            "seed": seed, "code": code_version(),
+            "seed": options.seed, "code": code_version(),
             "parents": [r.source for r in setting.experiment.recordings if r.source],
         },
     )  # fmt: skip
