@@ -139,7 +139,8 @@ def _loop(shell: Transcript, seed: int) -> Path:
         made = make_tracks(recipe, shell.folder, advance=advance)
     shell.show("close-loop", "--recipe", made.recipe.name, "--lake", "lake", "--out", "loop")
     models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
-    shell.show("simulate", models[-1], "--lake", "lake")
+    with_effects = [name for name in models if not name.endswith("-base")]
+    shell.show("simulate", (with_effects or models)[0], "--lake", "lake")
     unit = "" if made.unit == "1" else f" {made.unit}"
     say(f"\nWhat acted was {made.effect}, {made.parameter} {made.strength:g}{unit}.")
     return shell.folder / "loop" / "report.html"
