@@ -92,8 +92,7 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     parts += ["", "| group | half detected at | sets |", "|---|---|---|"]
     parts += _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
     if sheet.power is not None:
-        half, low, high = (_MILLI * value for value in sheet.power.overall)
-        parts.append(f"| class: one not seen | {_digits(half)} [{_digits(low)}, {_digits(high)}] mm | – |")
+        parts.append(_half_row("class: one not seen", sheet.power.overall, "–"))
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
     parts += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
     parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
@@ -168,11 +167,12 @@ def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[st
 def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[str]:
     if power is None:
         return []
-    return [
-        f"| {what}: {name} | {_digits(_MILLI * half)} [{_digits(_MILLI * low)}, {_digits(_MILLI * high)}] mm | "
-        f"{counts[name]} |"
-        for name, (half, low, high) in power.half.items()
-    ]
+    return [_half_row(f"{what}: {name}", bounds, str(counts[name])) for name, bounds in power.half.items()]
+
+
+def _half_row(group: str, bounds: tuple[float, float, float], count: str) -> str:
+    half, low, high = (_digits(_MILLI * value) for value in bounds)
+    return f"| {group} | {half} [{low}, {high}] mm | {count} |"
 
 
 def _curve(power: Power | None) -> dict[str, Any] | None:

@@ -120,7 +120,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
             return None
         errors = fits.errors(fitted)
         evidence = fits.yardstick.of(errors)
-        line = _own(fits.yardstick.projection, reference.line(evidence), fits.errors(fits.base), errors)
+        line = _own(fits.yardstick.projection, reference.line(evidence), unaided, errors)
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, left(fitted), strict=True):
             gains[outside] = old - new
@@ -132,7 +132,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
 
     with ThreadPoolExecutor(max_workers=workers) as pool:
         list(pool.map(fits.of, [(), *((column,) for column in candidates)]))
-        before = left(fits.base)
+        before, unaided = left(fits.base), fits.errors(fits.base)
         found = dict(zip(candidates, pool.map(rerun, candidates), strict=True))
     return {column: made for column, made in found.items() if made is not None}
 

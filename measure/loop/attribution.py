@@ -163,11 +163,10 @@ def judge(
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
     useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
     others = [w for w in ranking[1:] if w.column not in useless]
-    second = (
-        _second(evidence, reference, best, others, enough)
-        if rerun is None
-        else _second(rerun.evidence, reference, best, others, enough, swinging=rerun.line is not None)
-    )
+    second = _second(
+        evidence if rerun is None else rerun.evidence, reference, best, others, enough,
+        swinging=rerun is None or rerun.line is not None,
+    )  # fmt: skip
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
@@ -227,7 +226,7 @@ def _second(
     others: Sequence[Weighed],
     level: float,
     *,
-    swinging: bool = True,
+    swinging: bool,
 ) -> Weighed | None:
     """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
     strength is not nothing. Beside gusts, the pressure is free in every segment.
