@@ -1,4 +1,4 @@
-"""`flagdata challenge make | run | score`."""
+"""`flagdata challenge make | bank | run | score`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def challenge() -> None:
 
     \b
       flagdata challenge make out/challenge --seed 7 --sets 60 --workers 2
-      flagdata challenge run out/challenge --workers 2
+      flagdata challenge bank out/bank --seed 8 --workers 2
+      flagdata challenge run out/challenge --bank out/bank --workers 2
       flagdata challenge score out/challenge --out docs/results
     """
 
@@ -49,6 +50,28 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
         document("challenge-made", {"folder": str(made.path), "sets": made.manifest()["sets"]})
     else:
         click.echo(str(made.path))
+
+
+@challenge.command()
+@_FOLDER
+@click.option("--recipe", default="standard", show_default=True, help="Of the catalog by name, or a .toml file.")
+@click.option("--seed", type=click.IntRange(min=0), required=True, help="Of all that is drawn; not the challenge's.")
+@click.option("--kinds", type=click.IntRange(min=4), default=112, show_default=True, help="Of meshes and methods.")
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes that simulate.")
+@json_option
+def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json: bool) -> None:
+    """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
+    from measure.challenge.nulls import null_batches
+    from measure.challenge.recipe import load
+    from measure.loop import bank as banks
+
+    batches = null_batches(load(recipe), seed=seed, kinds=kinds)
+    with progress(kinds, label="null recordings", unit="kind") as advance:
+        banks.build(folder, batches, workers=workers, progress=advance)
+    if as_json:
+        document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.BATCH})
+    else:
+        click.echo(str(folder))
 
 
 @challenge.command()

@@ -26,7 +26,7 @@ class Outcome:
         conclusion: None where the data were refused.
         named: effects, the best ranked first.
         ranking: candidates as in the verdict.
-        comparisons: as in the verdict.
+        comparisons, apart: as in the verdict.
         seconds: it took.
         oracle: comparison → error of the true model [m], where it is known.
     """
@@ -37,6 +37,7 @@ class Outcome:
     ranking: tuple[Mapping[str, Any], ...]
     comparisons: tuple[Mapping[str, Any], ...]
     seconds: float
+    apart: Mapping[str, Any] | None = None
     oracle: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -51,6 +52,7 @@ class Outcome:
         return cls(
             key=key, conclusion=Conclusion(verdict["conclusion"]), named=tuple(named),
             ranking=tuple(verdict["ranking"]), comparisons=tuple(verdict["comparisons"]), seconds=filing.seconds,
+            apart=verdict.get("apart"),
         )  # fmt: skip
 
     @property
@@ -122,6 +124,14 @@ class Outcome:
         if least is None:
             return entry["share"]
         return (before - after) / (before - least) if before > least else None
+
+    @property
+    def separated(self) -> bool | None:
+        """Whether one effect was named alone and the wrong-effect control is worse on what was left out, by an interval
+        that does not reach zero; None where none was named, or no control was run."""
+        if not self.named or self.apart is None:
+            return None
+        return self.conclusion is not Conclusion.ONE_OF and self.apart["low"] > 0
 
     @property
     def control_gap(self) -> float | None:

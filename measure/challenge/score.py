@@ -11,8 +11,10 @@ Definitions, in the words of the sheet:
 - *None of the library*: the verdict says so, or that the library explains only a part.
 - *E_red*: (before − after)/(before − oracle), the oracle being the true model with the fitter's numerics; the median
   over a set's comparisons, where an effect was named.
-- *Control separated*: where one effect was named, the same freedom spent on the best wrong effect leaves an error that
-  is larger by more than half the width of the reduction's interval.
+- *Control separated*: the same freedom spent on the best wrong effect leaves a larger misfit on the recordings left out
+  in turn, by an interval of the paired difference that does not reach zero. Of all sets with an effect of the library
+  where effects were named and a control was run; "one of" counts as not separated. *By a single recording*: the mean
+  difference is larger than the mean half-width of the single comparisons' intervals.
 """
 
 from __future__ import annotations
@@ -156,6 +158,11 @@ class Sheet:
 
     @property
     def separated(self) -> Share:
+        found = [o.separated for o in self.of_kind(Kind.ONE, Kind.PAIR)]
+        return Share.of(apart for apart in found if apart is not None)
+
+    @property
+    def separated_singly(self) -> Share:
         gaps = [o.control_gap for o in self.of_kind(Kind.ONE, Kind.PAIR)]
         return Share.of(gap > 1.0 for gap in gaps if gap is not None)
 
@@ -220,6 +227,7 @@ class Sheet:
             "recall of none of the library, strong": self.share(self.strong_outside, lambda o: o.outside_said),
             "none of the library, said wrongly of one effect": self.share(one, lambda o: o.outside_said),
             "control separated": self.separated,
+            "control separated by a single recording": self.separated_singly,
             "interval covers the true strength": self.coefficients.covered,
             "data refused": self.share(self.outcomes, lambda o: o.refused),
         }

@@ -51,6 +51,11 @@ class Trial:
     recording: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
+    def control(self) -> Estimate | None:
+        """Control less after, a segment [nat]; None without a control."""
+        return None if self.apart is None else a_segment(self.apart, self.recording)
+
+    @property
     def failed(self) -> bool:
         """Whether the effect does not lower the errors, or the control lowers them more, by two standard errors."""
         worse = self.apart is not None and _above(-self.apart, self.recording)

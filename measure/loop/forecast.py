@@ -44,6 +44,45 @@ segments take 34 s by 72 members at a time, 20 s by 400 (with 486 vertices 54 an
 _WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
 
 
+@dataclass(frozen=True, kw_only=True)
+class Cut:
+    """How recordings are cut into segments.
+
+    Attributes:
+        stride: recorded frames from one that is used to the next.
+        period: between those [s].
+        warm: how many of them a segment begins with that do not count.
+        length: how many count.
+    """
+
+    stride: int
+    period: float
+    warm: int
+    length: int
+
+    @classmethod
+    def of(cls, rate: float, frames: int) -> Cut:
+        """Of recordings of so many frames, or more: frames about a horizon apart, segments of 2 s, or half of what
+        there is.
+
+        Args:
+            rate: [Hz].
+        """
+        stride = max(1, round(rate * HORIZON))
+        period = stride / rate
+        warm = round(_WARM_UP / period)
+        length = min(round(_SEGMENT / period), (math.ceil(frames / stride) - warm - 2) // 2)
+        return cls(stride=stride, period=period, warm=warm, length=length)
+
+    def segments(self, frames: int) -> int:
+        """How many a recording holds; a remainder is left out."""
+        return (math.ceil(frames / self.stride) - self.warm - 2) // self.length
+
+    def lasting(self, segments: int) -> float:
+        """How long a recording is that holds so many [s]."""
+        return (segments * self.length + self.warm + 3) * self.period
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Segment:
     """A stretch of a recording.
@@ -91,11 +130,8 @@ class Segments:
             InputError: recordings of different markers or rates, untracked points, or shorter than a segment.
         """
         first = recordings[0]
-        stride = max(1, round(first.rate * HORIZON))
-        period = stride / first.rate
-        warm = round(_WARM_UP / period)
-        shortest = min(math.ceil(len(r.positions) / stride) for r in recordings) - warm - 2
-        length = min(round(_SEGMENT / period), shortest // 2)
+        cut = Cut.of(first.rate, min(len(r.positions) for r in recordings))
+        period, warm, length = cut.period, cut.warm, cut.length
         items: list[Segment] = []
         for index, recording in enumerate(recordings):
             if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
@@ -108,15 +144,14 @@ class Segments:
                     "a marker was lost in some frames", where=f"recording {recording.name!r}",
                     fix="fill short gaps (measure.observe.fill), or drop the marker",
                 )  # fmt: skip
-            frames = recording.positions[::stride]
+            frames = recording.positions[:: cut.stride]
             if length * period < _SHORTEST:
                 needed = 2 * _SHORTEST + (warm + 2) * period
                 raise InputError(
                     f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
                     where=f"recording {recording.name!r}", fix="record for 10 s or more",
                 )  # fmt: skip
-            count = (len(frames) - warm - 2) // length
-            for place in range(count):
+            for place in range(cut.segments(len(recording.positions))):
                 begin = place * length
                 items.append(
                     Segment(

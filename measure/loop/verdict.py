@@ -184,6 +184,8 @@ class Verdict:
         assumptions: what was taken as given.
         separating: the cheapest experiment that would tell the named effects apart; empty where one is named.
         proposal: what the corrective field looks like and the terms it proposes, where the library has no answer.
+        apart: half misfit of the wrong-effect control less that of what was named, a segment, over all recordings left
+            out in turn [nat]; None where no control was run.
         findings: remarks on the data (kind, text).
         provenance: seed, versions, parents, recipe.
         seconds: wall time.
@@ -200,6 +202,7 @@ class Verdict:
     assumptions: tuple[str, ...] = ()
     separating: str = ""
     proposal: str = ""
+    apart: Estimate | None = None
     findings: tuple[tuple[str, str], ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0

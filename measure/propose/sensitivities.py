@@ -14,14 +14,10 @@ from torch import Tensor
 
 from measure.loop.columns import Calibration, Column
 from measure.loop.forecast import WIDEST, Forecaster, Segments
-from measure.loop.statistics import Statistics, reduced
 from measure.propose.terms import MASS, TermColumn
 from sim.cloth import Cloth
 from sim.effects.effect import ClothEffect, Effect
 from sim.effects.field import FieldEffect, Flat, Seen, heavier
-
-_CHUNK = 36
-"""Segments at a time: bounds memory, a term takes 4 MB of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,30 +89,3 @@ def _bundle(
         column.name: (base - errors[..., place * count : (place + 1) * count]) / step
         for place, column in enumerate(columns)
     }
-
-
-def statistics(forecaster: Forecaster, segments: Segments, columns: Sequence[Column]) -> Statistics:
-    """As `measure.loop.statistics.statistics` from the nominal calibration."""
-    parts = [_statistics(forecaster, segments.select(chosen), columns) for chosen in _chunks(segments)]
-    return Statistics.joined(parts)
-
-
-def _chunks(segments: Segments) -> list[list[int]]:
-    """Segments that are taken together: of one recording always, for they share weights."""
-    chunks: list[list[int]] = []
-    for index in sorted({s.recording for s in segments.items}):
-        own = [place for place, segment in enumerate(segments.items) if segment.recording == index]
-        if chunks and len(chunks[-1]) + len(own) <= _CHUNK:
-            chunks[-1] += own
-        else:
-            chunks.append(own)
-    return chunks
-
-
-def _statistics(forecaster: Forecaster, segments: Segments, columns: Sequence[Column]) -> Statistics:
-    nominal = [Calibration()] * len(segments)
-    base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-    changes = forecaster.sensitivities((), segments, nominal, base)
-    along = of_columns(forecaster, segments, base, columns)
-    changes += [along[column.name] for column in columns]
-    return reduced(base, changes, segments.recording, segments.noise)

@@ -57,6 +57,7 @@ def page(verdict: Verdict) -> str:
         "remark": sentences.test_remark(verdict.test),
         "named": named,
         "rejected": sentences.rejected(verdict),
+        "control_summary": sentences.control_summary(verdict),
         "warnings": sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict),
         "after_label": sentences.after_label(verdict),
         "has_after": any(quantity.known(c.after) for c in verdict.comparisons),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from measure.loop.quantity import known, level_text, number, probability
+from measure.loop.quantity import estimate_text, known, level_text, number, probability
 from measure.loop.titles import title, titles
 from measure.loop.verdict import Candidate, Conclusion, Estimate, NullTest, Verdict
 
@@ -82,6 +82,19 @@ def control_warnings(verdict: Verdict) -> list[str]:
         elif c.apart.low <= 0:
             found.append(f"{_begun(c.what)}: the control {c.control_name} cannot be told from the named effect there.")
     return found
+
+
+def control_summary(verdict: Verdict) -> str:
+    """The wrong-effect control over all that was left out, in a sentence; empty where none was run."""
+    apart = verdict.apart
+    if apart is None or not known(apart):
+        return ""
+    control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
+    told = "the named effect is told from it" if apart.low > 0 else "the named effect is not told from it"
+    return (
+        f"With {control} instead, the misfit of what was left out is larger by {estimate_text(apart)} nat a segment "
+        f"({level_text(apart.level)}): {told}."
+    )
 
 
 def reduction_warnings(verdict: Verdict) -> list[str]:

@@ -42,6 +42,8 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
         yield _item(sentences.candidate_title(verdict, candidate), _weighed(candidate))
     for comparison in verdict.comparisons:
         yield _item(comparison.what, _compared(comparison, sentences.after_label(verdict)))
+    if control := sentences.control_summary(verdict):
+        yield _item("control", control)
     for warning in sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict):
         yield _item("beware", warning)
     for parameter in verdict.parameters:

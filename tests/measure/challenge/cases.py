@@ -89,6 +89,7 @@ def verdict(conclusion: Conclusion, *named: str, **options: Any) -> Verdict:
         test=NullTest(statistic=1.0, null=[], p_value=estimate(0.5), level=0.05, critical=None, nulls=""),
         ranking=options.get("ranking", tuple(candidate(name) for name in named)),
         comparisons=options.get("comparisons", (comparison(),) if named else ()), residuals=(),
+        apart=options.get("apart", estimate(1.0, 0.5) if named else None),
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from measure.challenge.recipe import Kind
 from measure.challenge.score import Sheet, graded
 from measure.loop.verdict import Conclusion, Verdict
 from sim.effects import EFFECTS
-from tests.measure.challenge.cases import acting, candidate, comparison, filing, key, verdict
+from tests.measure.challenge.cases import acting, candidate, comparison, estimate, filing, key, verdict
 
 LIBRARY = ("lift", "added-mass", "pole-wake", "shear", "full-hoist")
 
@@ -176,7 +176,28 @@ def test_the_corrective_field_names_no_effect() -> None:
     assert outcome.claims == ()
 
 
-def test_the_control_is_separated_beyond_half_the_width_of_the_reduction() -> None:
+@pytest.mark.parametrize(
+    ("conclusion", "half", "separated"),
+    [(Conclusion.EFFECT, 0.5, True), (Conclusion.EFFECT, 1.5, False), (Conclusion.ONE_OF, 0.5, False)],
+)
+def test_the_control_is_separated_where_its_interval_does_not_reach_zero(
+    conclusion: Conclusion, half: float, separated: bool
+) -> None:
+    """Worse by 1 nat a segment; several named are not told apart."""
+    said = verdict(conclusion, "lift", apart=estimate(1.0, half))
+    outcome = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
+    assert outcome.separated is separated
+    assert graded("x", [outcome]).separated.value == separated
+
+
+def test_without_a_control_nothing_is_said_of_it() -> None:
+    alone = verdict(Conclusion.EFFECT, "lift", apart=None)
+    assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", alone)).separated is None
+    none = Outcome.of(key("a", Kind.NULL), filing("a", verdict(Conclusion.SUFFICIENT, apart=estimate(1.0, 0.5))))
+    assert none.separated is None
+
+
+def test_by_a_single_recording_the_control_is_separated_beyond_half_the_width() -> None:
     """The interval of the reduction is ± 1 mm: a control worse by 3 mm is separated, by 0.5 mm is not."""
 
     def gap(control: float | None) -> float | None:

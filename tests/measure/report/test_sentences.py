@@ -10,6 +10,7 @@ import pytest
 from measure.loop.titles import titles
 from measure.loop.verdict import Conclusion, NullTest
 from measure.report import sentences
+from measure.report.page import page
 from measure.report.words import words
 from tests.measure.report.verdicts import about, verdict
 
@@ -70,6 +71,17 @@ def test_a_control_that_cannot_be_told_from_the_named_effect_is_pointed_out() ->
     (warning,) = sentences.control_warnings(replace(whole, comparisons=(near, far)))
     assert "cannot be told from the named effect" in warning
     assert "worse by 0.3 [−0.1, 0.7] nat a segment" in words(replace(whole, comparisons=(near,))).replace("\n    ", " ")
+
+
+@pytest.mark.parametrize(("half", "told"), [(0.2, "is told from it"), (0.4, "is not told from it")])
+def test_the_control_over_all_that_was_left_out_is_summed_up(half: float, told: str) -> None:
+    whole = replace(verdict(Conclusion.EFFECT), apart=about(0.3, half, unit="1"))
+    summary = sentences.control_summary(whole)
+    assert summary.startswith("With tangential-linear-drag instead")
+    assert told in summary
+    assert summary in page(whole)
+    assert summary in " ".join(words(whole).replace("\n    ", " ").split())
+    assert sentences.control_summary(verdict(Conclusion.EFFECT)) == ""
 
 
 def test_a_reduction_whose_interval_holds_zero_is_pointed_out() -> None:

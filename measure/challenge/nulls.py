@@ -1,0 +1,54 @@
+"""Null recordings for the sets of a challenge, by what every participant knows of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flagdata.rng import child_seed, stream
+from measure.challenge.folder import MODEL_COLUMNS, MODEL_ROWS
+from measure.challenge.meshes import layout
+from measure.challenge.recipe import ChallengeRecipe
+from measure.loop import bank as banks
+from measure.loop.forecast import Cut
+from measure.loop.nulls import NullBatch
+from measure.observe.trajectory import Specimen
+from sim import handles
+from sim.material import named
+from sim.mesh import grid
+
+_HEIGHT = 2.0  # m: of the lower corner, as in the sets
+_BEYOND = 0.1
+"""How much wider than the recipe's the range of winds is, on either side."""
+
+
+def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[NullBatch]:
+    """For an amortised null: so many meshes and methods, each with its cloth, rate, noise and layout of markers.
+
+    Of the recipe its cloths, markers, rates, noises and winds are used. Its numerics are not: those are the truth's.
+
+    Args:
+        seed: of all that is drawn; not the challenge's.
+    """
+    mesh = grid(width=recipe.width, height=recipe.height, columns=MODEL_COLUMNS, rows=MODEL_ROWS)
+    held = handles.corners(mesh.rest)
+    along_pole = np.array([(0.0, 0.0, _HEIGHT + mesh.rest[vertex, 1]) for vertex in held])
+    speeds = ((1 - _BEYOND) * recipe.speed.low, (1 + _BEYOND) * recipe.speed.high)
+    made: list[NullBatch] = []
+    for index in range(kinds):
+        own = child_seed(seed, "null", index)
+        rng = stream(own, "design")
+        rate = float(recipe.rates[int(rng.integers(len(recipe.rates)))])
+        noise = recipe.noises[int(rng.integers(len(recipe.noises)))]
+        frames = round(recipe.duration * rate)
+        cut = Cut.of(rate, frames)
+        specimen = Specimen(
+            mesh=mesh, material=named(recipe.materials[index % len(recipe.materials)]), held=held, anchors=along_pole,
+            stiffness=handles.ARCSIM_STIFFNESS, anchors_told=False,
+        )  # fmt: skip
+        made.append(
+            banks.prior_batch(
+                specimen, markers=layout(recipe, stream(own, "layout")), rate=rate, noise=noise, speeds=speeds,
+                duration=cut.lasting(banks.each(recipe.count * cut.segments(frames))), seed=own,
+            )
+        )  # fmt: skip
+    return made
