@@ -61,11 +61,13 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 @json_option
 def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json: bool) -> None:
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
-    from measure.challenge.nulls import null_batches
+    from measure.challenge.nulls import claim, null_batches
     from measure.challenge.recipe import load
     from measure.loop import bank as banks
 
-    batches = null_batches(load(recipe), seed=seed, kinds=kinds)
+    loaded = load(recipe)
+    batches = null_batches(loaded, seed=seed, kinds=kinds)
+    claim(folder, loaded, seed=seed)
     with progress(kinds, label="null recordings", unit="kind") as advance:
         banks.build(folder, batches, workers=workers, progress=advance)
     if as_json:

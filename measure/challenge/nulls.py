@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
+from pathlib import Path
+
 import numpy as np
 
+from flagdata.errors import ConflictError, InputError
+from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import child_seed, stream
-from measure.challenge.folder import MODEL_COLUMNS, MODEL_ROWS
+from measure.challenge.folder import MODEL_COLUMNS, MODEL_ROWS, write_json
 from measure.challenge.meshes import layout
 from measure.challenge.recipe import ChallengeRecipe
 from measure.loop import bank as banks
@@ -28,6 +34,9 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
 
     Args:
         seed: of all that is drawn; not the challenge's.
+
+    Raises:
+        InputError: recordings too short for a segment.
     """
     mesh = grid(width=recipe.width, height=recipe.height, columns=MODEL_COLUMNS, rows=MODEL_ROWS)
     held = handles.corners(mesh.rest)
@@ -41,6 +50,10 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
         noise = recipe.noises[int(rng.integers(len(recipe.noises)))]
         frames = round(recipe.duration * rate)
         cut = Cut.of(rate, frames)
+        if not cut.enough:
+            raise InputError(
+                f"recordings of {recipe.duration:g} s are too short", where=recipe.title, fix="let them last for 10 s"
+            )
         specimen = Specimen(
             mesh=mesh, material=named(recipe.materials[index % len(recipe.materials)]), held=held, anchors=along_pole,
             stiffness=handles.ARCSIM_STIFFNESS, anchors_told=False,
@@ -52,3 +65,23 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
             )
         )  # fmt: skip
     return made
+
+
+def claim(folder: Path, recipe: ChallengeRecipe, *, seed: int) -> None:
+    """Note what the nulls of a folder are made from, so that a build that was stopped goes on with the same.
+
+    Raises:
+        ConflictError: the folder's are of another recipe or seed.
+    """
+    made = {"recipe": recipe_hash(asdict(recipe)), "title": recipe.title, "seed": seed}
+    path = folder / "bank.json"
+    if not path.exists():
+        write_json(path, {**made, "code": code_version()})
+        return
+    noted = json.loads(path.read_text(encoding="utf-8"))
+    for key in ("title", "recipe", "seed"):
+        if noted.get(key) != made[key]:
+            raise ConflictError(
+                f"its nulls are of {key} {noted.get(key)!r}, not {made[key]!r}", where=str(folder),
+                fix="name a folder that is not there yet",
+            )  # fmt: skip

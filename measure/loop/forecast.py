@@ -74,6 +74,11 @@ class Cut:
         length = min(round(_SEGMENT / period), (math.ceil(frames / stride) - warm - 2) // 2)
         return cls(stride=stride, period=period, warm=warm, length=length)
 
+    @property
+    def enough(self) -> bool:
+        """Whether a segment is long enough to say anything."""
+        return self.length * self.period >= _SHORTEST
+
     def segments(self, frames: int) -> int:
         """How many a recording holds; a remainder is left out."""
         return (math.ceil(frames / self.stride) - self.warm - 2) // self.length
@@ -145,7 +150,7 @@ class Segments:
                     fix="fill short gaps (measure.observe.fill), or drop the marker",
                 )  # fmt: skip
             frames = recording.positions[:: cut.stride]
-            if length * period < _SHORTEST:
+            if not cut.enough:
                 needed = 2 * _SHORTEST + (warm + 2) * period
                 raise InputError(
                     f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
