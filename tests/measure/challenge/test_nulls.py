@@ -16,6 +16,7 @@ from measure.challenge import nulls
 from measure.challenge.command import challenge
 from measure.challenge.recipe import ChallengeRecipe, parse
 from measure.loop import bank as banks
+from measure.loop.forecast import Cut
 from measure.loop.nulls import NullBatch
 from tests.measure.challenge.cases import TINY
 
@@ -35,12 +36,10 @@ def test_they_are_of_the_recipes_cloths_winds_rates_and_noises(recipe: Challenge
         assert len(batch.markers) == 30
         assert all(2.7 <= speed <= 8.8 for speed in batch.speeds)
         # Two recordings of 10 s hold four segments of 2 s each: as many, by four winds of one cloth.
-        held = (
-            round(batch.duration * batch.rate)
-            / round(0.04 * batch.rate)
-            // (2.0 * batch.rate / round(0.04 * batch.rate))
-        )
-        assert held == 2
+        frames = round(batch.duration * batch.rate)
+        cut = Cut.of(batch.rate, frames)
+        assert cut.length * cut.period == pytest.approx(2.0)
+        assert cut.segments(frames) == 2
 
 
 def test_more_kinds_add_to_those_that_are_there(recipe: ChallengeRecipe) -> None:

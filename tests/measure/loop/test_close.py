@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import CorruptError, InputError, UsageError
 from measure.loop import bank as banks
 from measure.loop.close import Options, Solved, close_loop
 from measure.loop.columns import Calibration, fields
