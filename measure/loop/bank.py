@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
 from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
@@ -26,7 +25,6 @@ from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
 from measure.loop.statistics import Statistics, statistics
-from measure.loop.weights import Usual
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 from sim.integrate.split import SplitEuler
@@ -35,10 +33,6 @@ BATCH = 8
 WINDS = 4
 """Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
 by the cloth, so that few cloths of many numerics say more than many of few."""
-PILOTS = 12
-"""Batches that tell what errors are usual. They are others than those that are kept: no null has a part in how it is
-weighed, as data have none."""
-_USUAL = "usual.npz"
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
@@ -94,18 +88,14 @@ def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(math.log(span[0]), math.log(span[1]))))
 
 
-def evaluate(
-    batch: NullBatch, numerics: int, weighed: Sequence[Column], usual: Usual | None = None
-) -> tuple[Nulls, float]:
+def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tuple[Nulls, float]:
     """Simulate a batch and take its statistics along columns, from the nominal calibration; with the duration of a
-    segment [s].
-
-    Args:
-        usual: what errors of other nulls are like.
-    """
-    forecaster, segments = _recorded(batch)
+    segment [s]."""
+    recordings = batch.simulate()
+    segments = Segments.of(recordings).tied(_anchors(batch, recordings))
+    forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     nominal = Calibration()
-    found = statistics(forecaster, segments, [nominal] * len(segments), weighed, usual=usual)
+    found = statistics(forecaster, segments, [nominal] * len(segments), weighed)
     offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
@@ -114,19 +104,6 @@ def evaluate(
         cloth=np.full(len(found.recording), batch.specimen.material.fingerprint),
     )  # fmt: skip
     return nulls, segments.duration
-
-
-def errors_of(batch: NullBatch) -> Usual:
-    """What the base model's errors on a batch are like, at the nominal calibration."""
-    forecaster, segments = _recorded(batch)
-    errors = forecaster.errors(*forecaster.system(segments, [Calibration()] * len(segments)), segments)
-    return Usual.of(errors, segments, batch.specimen.mesh.rest)
-
-
-def _recorded(batch: NullBatch) -> tuple[Forecaster, Segments]:
-    recordings = batch.simulate()
-    segments = Segments.of(recordings).tied(_anchors(batch, recordings))
-    return Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler()), segments
 
 
 def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
@@ -139,8 +116,7 @@ def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
-    """Evaluate the batches that the folder lacks, each into a file of its own, after what errors are usual was found
-    by others like them.
+    """Evaluate the batches that the folder lacks, each into a file of its own.
 
     Args:
         progress: called with the number of batches done.
@@ -153,47 +129,22 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
     with ProcessPoolExecutor(
         max_workers=workers, mp_context=context, initializer=torch.set_num_threads, initargs=(1,)
     ) as pool:
-        if missing and not (folder / _USUAL).exists():
-            every = max(1, len(batches) // PILOTS)
-            pilots = [replace(batch, seed=child_seed(batch.seed, "null", "usual")) for batch in batches[::every]]
-            _put_usual(folder, Usual.pooled(list(pool.map(errors_of, pilots[:PILOTS]))))
-        usual = _usual(folder) if missing else None
-        running = [pool.submit(_keep, folder, batches[index], index, usual) for index in missing]
+        running = [pool.submit(_keep, folder, batches[index], index) for index in missing]
         for done in as_completed(running):
             done.result()
             if progress is not None:
                 progress(1)
 
 
-def _put_usual(folder: Path, usual: Usual) -> None:
-    buffer = BytesIO()
-    np.savez(
-        buffer, shapes=np.array(usual.shapes), covariance=usual.covariance, rest=np.array(usual.rest)
-    )  # fmt: skip
-    put_if_absent(folder / _USUAL, buffer.getvalue())
-
-
-def _usual(folder: Path) -> Usual:
-    """Raises CorruptError: not there, or unreadable."""
-    try:
-        with np.load(folder / _USUAL) as stored:
-            along, across = (int(number) for number in stored["shapes"])
-            return Usual(shapes=(along, across), covariance=stored["covariance"], rest=float(stored["rest"]))
-    except (OSError, ValueError, EOFError, KeyError) as error:
-        raise CorruptError(
-            f"what errors are usual is not known: {error}", where=str(folder / _USUAL), fix="build the bank again"
-        ) from error
-
-
-def _keep(folder: Path, batch: NullBatch, index: int, usual: Usual | None) -> None:
-    nulls, duration = evaluate(batch, index, columns(), usual)
+def _keep(folder: Path, batch: NullBatch, index: int) -> None:
+    nulls, duration = evaluate(batch, index, columns())
     own = nulls.statistics
     buffer = BytesIO()
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
-        anchors_told=np.array(batch.specimen.anchors_told), rest=np.array(0.0 if usual is None else usual.rest),
+        anchors_told=np.array(batch.specimen.anchors_told),
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -213,7 +164,6 @@ def load(folder: Path, *, words: str) -> NullBank:
     paths = sorted(folder.glob("nulls-*.npz"))
     if not paths:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
-    usual = _usual(folder)
     parts: list[Nulls] = []
     durations: set[float] = set()
     told: set[bool] = set()
@@ -226,14 +176,8 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth", "lines", "rest"} <= set(
-            content
-        ):
+        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth", "lines"} <= set(content):
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
-        if float(content["rest"]) != usual.rest:
-            raise CorruptError(
-                f"weighed by other nulls than {_USUAL} tells", where=str(path), fix="build into a folder of its own"
-            )
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
             error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
@@ -255,10 +199,5 @@ def load(folder: Path, *, words: str) -> NullBank:
             where=str(folder), fix="build a bank of one design into a folder of its own",
         )  # fmt: skip
     return NullBank(
-        nulls=Nulls.joined(parts),
-        columns=names(),
-        duration=durations.pop(),
-        words=words,
-        anchors_told=told.pop(),
-        usual=usual,
+        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_told=told.pop()
     )

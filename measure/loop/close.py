@@ -106,13 +106,12 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     torch.set_num_threads(1)
     tell = stage or (lambda what, done, total: None)
     setting = Setting.of(experiment)
-    bank = _bank(setting, options, tell)
     tell("sensitivities", 0, 1)
     found, projection = projected(
-        setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns(),
-        usual=bank.usual,
-    )  # fmt: skip
+        setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns()
+    )
     tell("sensitivities", 1, 1)
+    bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
     reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
     yardstick = Yardstick(found=found, projection=projection, null=bank.model(setting.design), speeds=speeds)

@@ -16,7 +16,6 @@ from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
 from measure.loop.lines import Line, Lines, strongest
 from measure.loop.rarity import Rarity, share_as_large
-from measure.loop.weights import Usual
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
@@ -84,7 +83,6 @@ class NullBank:
         duration: of a segment [s].
         words: how they were made.
         anchors_told: whether they were predicted with the anchors they were simulated with.
-        usual: what errors are like in space, by other nulls; None where their statistics count all shapes alike.
 
     Raises:
         InputError: too few of them, or all of the same numerics.
@@ -95,7 +93,6 @@ class NullBank:
     duration: float
     words: str
     anchors_told: bool = True
-    usual: Usual | None = None
 
     def __post_init__(self) -> None:
         count, kinds = len(np.unique(self.nulls.statistics.recording)), len(np.unique(self.nulls.numerics))

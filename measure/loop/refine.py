@@ -14,7 +14,6 @@ from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
 from measure.loop.statistics import Statistics, reduced
-from measure.loop.weights import Usual, Weights
 from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
@@ -89,12 +88,11 @@ def refine(
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=Calibration(), effects=effects).moved(cut(np.array(values, dtype=np.float64)))
     part = _part(yardstick.null, [*range(len(THETA)), *chosen])
-    usual = yardstick.projection.weights.usual
-    reached = _round(forecaster, segments, model, part, yardstick.speeds, tuple(chosen), usual)
+    reached = _round(forecaster, segments, model, part, yardstick.speeds, tuple(chosen))
     for _ in range(ROUNDS - 1):
         if reached.stays:
             break
-        reached = _round(forecaster, segments, reached.model, part, yardstick.speeds, tuple(chosen), usual)
+        reached = _round(forecaster, segments, reached.model, part, yardstick.speeds, tuple(chosen))
     every = np.ones(len(segments), dtype=bool)
     return replace(reached, model=finished(forecaster, segments, yardstick, reached.model, chosen, every))
 
@@ -126,10 +124,9 @@ def _round(
     null: NullModel,
     speeds: Floats,
     chosen: tuple[int, ...],
-    usual: Usual | None,
 ) -> Refined:
     for _ in range(_HALVINGS):
-        found = _linearised(forecaster, segments, origin, usual)
+        found = _linearised(forecaster, segments, origin)
         if np.isfinite(found.r).all() and np.isfinite(found.response).all():
             break
         origin = origin.halved()
@@ -158,15 +155,14 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
     )  # fmt: skip
 
 
-def _linearised(forecaster: Forecaster, segments: Segments, model: Model, usual: Usual | None) -> Statistics:
+def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
     base = forecaster.errors(*model.system(forecaster, segments), segments)
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
     changes = []
     for place, size in enumerate(sizes):
         moved, taken = _stepped(model, place, size)
         changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / taken)
-    weights = Weights.of(base, segments, forecaster.specimen.mesh.rest, usual)
-    return reduced(weights, base, changes, segments.recording)
+    return reduced(base, changes, segments.recording, segments.noise)
 
 
 def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:

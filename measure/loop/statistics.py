@@ -1,12 +1,12 @@
 """Prediction errors and sensitivities, brought down to a few numbers a segment: all that inference needs.
 
-With e the errors and s_i the sensitivity of the predictions to column i, a segment gives
+With e the errors, s_i the sensitivity of the predictions to column i and w weights of the markers, a segment gives
 
-    r_i = ⟨e, s_i⟩ / √⟨s_i, s_i⟩,   R_ij = ⟨s_i, s_j⟩ / √⟨s_i, s_i⟩,
+    r_i = Σ w e·s_i / √(Σ w s_i²),   R_ij = Σ w s_i·s_j / √(Σ w s_i²),
 
-inner products summed over frames, weighed by what errors are usual (see `weights`): the errors' size
-along the direction of each column, and how coefficients δ move it, E r = μ + R δ, with μ what the model's own numerics
-leave.
+sums over frames and markers, w the inverse mean square of a marker's errors in the recording beyond what its noise
+explains: the errors' size along the direction of each column, and how coefficients δ move it,
+E r = μ + R δ, with μ what the model's own numerics leave.
 """
 
 from __future__ import annotations
@@ -23,12 +23,18 @@ from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.lines import Spectrum
-from measure.loop.weights import Usual, Weights
 
 Floats = NDArray[np.float64]
 
 _CHUNK = 64
 """Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
+_CLIP = 4.0
+"""Errors beyond so many times a marker's root mean square count as that much (Huber): folds snap in ways no effect
+explains."""
+
+_NOISE = 6.0
+"""Variance of e by markers of variance 1: each frame's weighs 1, the one before 2, the one before that 1, in amplitude,
+as for a point that moves evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,30 +104,28 @@ class Projection:
     """The directions that statistics are taken along, kept: other models' errors have r along the same ones.
 
     Attributes:
-        directions: (segment, column, frame · marker · 3) weighed sensitivities of length 1.
-        weights: by the base model's errors.
+        directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
+        scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
         spectrum: what their periodograms are taken along; None where lines are not looked at.
     """
 
     directions: Tensor
-    weights: Weights
+    scale: Tensor
     spectrum: Spectrum | None = None
 
     @classmethod
-    def along(cls, changes: Sequence[Tensor], weights: Weights) -> Projection:
-        """Along sensitivities (frame, marker, 3, segment) [m per unit]."""
-        stacked = torch.stack(list(changes))
+    def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
+        """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
         directions: list[Tensor] = []
-        for place in range(stacked.shape[-1]):
-            moved = weights.scaled(stacked[..., place], place).double()
-            weighed = weights.weighed(moved)
-            directions.append((weighed / (weighed * moved).sum(dim=1, keepdim=True).sqrt()).to(stacked.dtype))
-        return cls(directions=torch.stack(directions), weights=weights)
+        for place in range(scale.shape[1]):
+            moved = torch.stack([_scaled(change, scale, place) for change in changes])
+            directions.append(moved / moved.norm(dim=1, keepdim=True))
+        return cls(directions=torch.stack(directions), scale=scale)
 
     def of(self, errors: Tensor) -> Floats:
         """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
         parts = [
-            direction @ self.weights.errors(errors[..., place], place).to(direction.dtype)
+            direction @ _weighed(errors[..., place], self.scale[:, place]).to(direction.dtype)
             for place, direction in enumerate(self.directions)
         ]
         return torch.stack(parts).double().cpu().numpy()
@@ -132,71 +136,60 @@ class Projection:
 
     def response(self, changes: Sequence[Tensor]) -> Floats:
         """(segment, column, k) how r moves with k sensitivities (frame, marker, 3, segment) [m per unit]."""
-        stacked = torch.stack(list(changes))
         parts = [
-            direction @ self.weights.scaled(stacked[..., place], place).to(direction.dtype).T
+            direction @ torch.stack([_scaled(change, self.scale, place) for change in changes], dim=1)
             for place, direction in enumerate(self.directions)
         ]
         return torch.stack(parts).double().cpu().numpy()
 
 
+def _scaled(change: Tensor, scale: Tensor, place: int) -> Tensor:
+    """(frame · marker · 3,) of one segment, over its scale."""
+    return (change[..., place] / scale[None, :, place, None]).reshape(-1)
+
+
 def statistics(
-    forecaster: Forecaster,
-    segments: Segments,
-    calibrations: Sequence[Calibration],
-    columns: Sequence[Column],
-    *,
-    usual: Usual | None = None,
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> Statistics:
     """Run the base model, its parameters and every column along segments, each with its calibration.
 
     The columns of the result are `THETA`'s, then those given.
-
-    Args:
-        usual: what errors of nulls are like; None to count all shapes alike.
     """
-    return Statistics.joined([found for found, _, _ in _pieces(forecaster, segments, calibrations, columns, usual)])
+    return Statistics.joined([found for found, _, _ in _pieces(forecaster, segments, calibrations, columns)])
 
 
 def projected(
-    forecaster: Forecaster,
-    segments: Segments,
-    calibrations: Sequence[Calibration],
-    columns: Sequence[Column],
-    *,
-    usual: Usual | None = None,
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> tuple[Statistics, Projection]:
     """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
     pieces: list[Projection] = []
-    for found, changes, weights in _pieces(forecaster, segments, calibrations, columns, usual):
+    for found, changes, scale in _pieces(forecaster, segments, calibrations, columns):
         parts.append(found)
-        pieces.append(Projection.along(changes, weights))
+        pieces.append(Projection.along(changes, scale))
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
-        weights=Weights.joined([piece.weights for piece in pieces]), spectrum=_spectrum(forecaster, segments),
+        scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
     )  # fmt: skip
     return Statistics.joined(parts), whole
 
 
 def _pieces(
-    forecaster: Forecaster,
-    segments: Segments,
-    calibrations: Sequence[Calibration],
-    columns: Sequence[Column],
-    usual: Usual | None,
-) -> Iterator[tuple[Statistics, list[Tensor], Weights]]:
-    """Statistics of some segments at a time, with the sensitivities and the weights of their errors."""
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> Iterator[tuple[Statistics, list[Tensor], Tensor]]:
+    """Statistics of some segments at a time, with the sensitivities and the scale of their errors."""
     recording = segments.recording
     # Segments of one recording share weights, and so stay in one chunk.
     for chosen in _chunks(recording):
         own = segments.select(chosen)
         starts = [calibrations[i] for i in chosen]
+        noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities(columns, own, starts, base)
-        weights = Weights.of(base, own, forecaster.specimen.mesh.rest, usual)
-        lines = _spectrum(forecaster, own).prominence(base)
-        yield replace(reduced(weights, base, changes, recording[chosen]), lines=lines), changes, weights
+        found = replace(
+            reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base)
+        )
+        yield found, changes, error_scale(base, recording[chosen], noise)
 
 
 def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
@@ -214,19 +207,38 @@ def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def reduced(weights: Weights, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]) -> Statistics:
-    """Of errors and sensitivities (frame, marker, 3, segment)."""
+def error_scale(base: Tensor, recording: NDArray[np.int64], noise: Floats) -> Tensor:
+    """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m]."""
+    mean = (base**2).mean((0, 2))
+    scale = torch.empty_like(mean)
+    for index in np.unique(recording):
+        own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
+        squared = mean[:, own].mean(1)
+        noisy = _NOISE * float(noise[recording == index][0]) ** 2
+        scale[:, own] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
+    return scale
+
+
+def _weighed(error: Tensor, scale: Tensor) -> Tensor:
+    """(frame · marker · 3,) errors (frame, marker, 3) over their scale (marker,), long ones clipped."""
+    error = error / scale[None, :, None]
+    size = error.norm(dim=2, keepdim=True) / 3**0.5
+    return (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1)
+
+
+def reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64], noise: Floats) -> Statistics:
+    """Of segments with their errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m]."""
     mean = (base**2).mean((0, 2))  # (marker, segment)
     r = np.empty((len(recording), len(changes)))
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
+    scale = error_scale(base, recording, noise)
     for place in range(len(recording)):
-        error = weights.errors(base[..., place], place).double()
-        moved = weights.scaled(stacked[..., place], place).double()
-        weighed = weights.weighed(moved)
-        inner = (weighed @ moved.T).cpu().numpy()
+        error = _weighed(base[..., place], scale[:, place]).double()
+        moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
+        inner = (moved @ moved.T).cpu().numpy()
         length = np.sqrt(np.diag(inner))
-        r[place] = (weighed @ error).cpu().numpy() / length
+        r[place] = (moved @ error).cpu().numpy() / length
         response[place] = inner / length[:, None]
     return Statistics(
         recording=recording, r=r, response=response, error=mean.mean(0).double().cpu().numpy() * 3,

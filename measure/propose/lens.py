@@ -21,8 +21,7 @@ from measure.loop.columns import THETA, Calibration, Column
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model
-from measure.loop.statistics import Projection, Statistics, reduced
-from measure.loop.weights import Usual, Weights
+from measure.loop.statistics import Projection, Statistics, error_scale, reduced
 from measure.loop.yardstick import Yardstick
 from measure.propose.sensitivities import of_columns
 
@@ -41,24 +40,20 @@ class Lens:
         segments: what is looked at.
         base: errors of the nominal model (frame, marker, 3, segment) [m].
         directions: sensitivities there, of the calibrated parameters and of what is weighed.
-        usual: what errors of the nulls are like; None to count all shapes alike.
     """
 
     forecaster: Forecaster
     segments: Segments
     base: Tensor
     directions: tuple[Tensor, ...]
-    usual: Usual | None = None
 
     @classmethod
-    def of(
-        cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column], *, usual: Usual | None = None
-    ) -> Lens:
-        """Along the calibrated parameters and some columns: those of the nulls, of what errors are usual there."""
+    def of(cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column]) -> Lens:
+        """Along the calibrated parameters and some columns: those of the nulls."""
         nominal = [Calibration()] * len(segments)
         base = forecaster.errors(*forecaster.system(segments, nominal), segments)
         along = forecaster.sensitivities(weighed, segments, nominal, base)
-        return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along), usual=usual)
+        return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
     def select(self, chosen: NDArray[np.int64]) -> Lens:
         """Of some segments."""
@@ -69,10 +64,10 @@ class Lens:
 
     def yardstick(self, null: NullModel, of_recordings: Floats) -> Yardstick:
         """The measure of any model's errors along the lens, of speeds by recording [m/s]."""
-        weights = self._weights(self.base)
+        recording, noise = self.segments.recording, self.segments.noise
         return Yardstick(
-            found=reduced(weights, self.base, self.directions, self.segments.recording),
-            projection=Projection.along(self.directions, weights),
+            found=reduced(self.base, self.directions, recording, noise),
+            projection=Projection.along(self.directions, error_scale(self.base, recording, noise)),
             null=null, speeds=self.speeds(of_recordings),
         )  # fmt: skip
 
@@ -106,12 +101,9 @@ class Lens:
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
         """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
-        found = reduced(self._weights(base), base, [*self.directions, *changes], self.segments.recording)
+        found = reduced(base, [*self.directions, *changes], self.segments.recording, self.segments.noise)
         count = len(self.directions)
         return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
-
-    def _weights(self, errors: Tensor) -> Weights:
-        return Weights.of(errors, self.segments, self.forecaster.specimen.mesh.rest, self.usual)
 
     def speeds(self, of_recordings: Floats) -> Floats:
         """(segment,) of the wind [m/s], of speeds by recording."""

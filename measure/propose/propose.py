@@ -154,7 +154,7 @@ def weigh(
     parts = split(setting.segments, setting.speeds)
     null = bank.model(setting.design)
     stage("terms", 0, 1)
-    whole = Lens.of(setting.forecaster, setting.segments, weighed, usual=bank.usual)
+    whole = Lens.of(setting.forecaster, setting.segments, weighed)
     lens = whole.select(np.flatnonzero(parts.seen))
     speeds = lens.speeds(setting.speeds)
     tried = _tried(lens, null, speeds, candidates, [*known, *controls])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +12,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from flagdata.errors import CorruptError, InputError, UsageError
+from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
 from measure.loop.close import Options, Solved, close_loop
 from measure.loop.columns import Calibration, fields
@@ -195,17 +194,3 @@ def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen,
 def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(UsageError):
         Options(**wrong)  # pyright: ignore[reportArgumentType]
-
-
-def test_nulls_are_refused_that_were_weighed_by_others(bank: Path, tmp_path: Path) -> None:
-    copied = Path(shutil.copytree(bank, tmp_path / "bank"))
-    usual = banks.load(copied, words="made").usual
-    assert usual is not None
-    with np.load(copied / "usual.npz") as stored:
-        content = {name: stored[name] for name in stored.files}
-    np.savez(copied / "usual.npz", **{**content, "rest": 2 * content["rest"]})
-    with pytest.raises(CorruptError, match="weighed by other nulls"):
-        banks.load(copied, words="made")
-    (copied / "usual.npz").unlink()
-    with pytest.raises(CorruptError, match="what errors are usual"):
-        banks.load(copied, words="made")

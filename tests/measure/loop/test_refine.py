@@ -13,14 +13,13 @@ from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import NullModel
 from measure.loop.model import Model
 from measure.loop.statistics import Statistics
-from measure.loop.weights import Usual
 
 LIFT = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
 FAR = Model(calibration=Calibration(density=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),))
 NOTHING = cast(Forecaster, None), cast(Segments, None)
 
 
-def linearised(_: Forecaster, __: Segments, model: Model, ___: Usual | None = None) -> Statistics:
+def linearised(_: Forecaster, __: Segments, model: Model) -> Statistics:
     """Of models that run from 70 % of the nominal density on; the data are the model."""
     count, size = len(THETA) + len(model.effects), 4
     r = np.full((size, count), np.nan if model.calibration.density < 0.7 else 0.0)
@@ -49,7 +48,7 @@ def test_a_model_that_diverges_is_drawn_back(
     monkeypatch.setattr(refine, "_linearised", linearised)
     model = Model(calibration=FAR.calibration, effects=effects)
     found = refine._round(  # pyright: ignore[reportPrivateUsage]
-        *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects), None
+        *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects)
     )
     assert found.origin.calibration.density == pytest.approx(0.5**0.5)
     assert [strength for _, strength in found.origin.effects] == [strength / 2 for _, strength in effects]
@@ -60,7 +59,7 @@ def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(refine, "_linearised", lambda *_: lost)
     with pytest.raises(refine.DivergedError, match="does not stay one"):
         refine._round(  # pyright: ignore[reportPrivateUsage]
-            *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), (), None
+            *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), ()
         )
 
 

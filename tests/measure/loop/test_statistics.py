@@ -48,7 +48,7 @@ def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecast
     column = 4
     moved = forecaster.sensitivity(COLUMNS[1], segments, nominal, base)
     # So small a coefficient that no error is clipped.
-    small = 1e-3 * projection.weights.scale.min() / moved.abs().max()
+    small = 1e-3 * projection.scale.min() / moved.abs().max()
     expected = float(small) * found.response[:, :, column]
     np.testing.assert_allclose(projection.of(small * moved), expected, rtol=1e-9, atol=1e-12)
     response = projection.response([moved, 2 * moved])
@@ -58,11 +58,10 @@ def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecast
 
 def test_what_is_not_along_any_direction_does_not_count(forecaster: Forecaster, segments: Segments) -> None:
     found, projection = projected(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
-    scale = projection.weights.scale
-    shape = (-1, *scale.shape[:1], 3)
+    shape = (-1, *projection.scale.shape[:1], 3)
     directions = projection.directions[0]
     noise = torch.randn(directions.shape[1], dtype=directions.dtype, generator=torch.Generator().manual_seed(1))
     span, _ = torch.linalg.qr(directions.T)
-    orthogonal = (noise - span @ (span.T @ noise)).reshape(shape) * scale[None, :, 0, None]
+    orthogonal = (noise - span @ (span.T @ noise)).reshape(shape) * projection.scale[None, :, 0, None]
     errors = torch.stack([0.1 * orthogonal] * len(segments), dim=-1)
     assert np.abs(projection.of(errors)[0]).max() < 1e-9 * np.abs(found.r).max() + 1e-9
