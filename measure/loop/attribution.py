@@ -52,7 +52,8 @@ _BETTER = 1.5
 
 _ENOUGH = 0.02
 """Level at which a larger model is rejected, if the base model's is not lower: nulls say what numerics do to the base
-model, and somewhat less than what they do to one with an effect."""
+model, and somewhat less than what they do to one with an effect. Of gusts no model is fitted: a pressure that is free in
+every segment is judged at the level itself."""
 
 RESPONSE = 0.25
 """Relative standard error of a strength by what the fit's mesh does to an effect, which nulls do not show: strengths of
@@ -158,7 +159,7 @@ def judge(
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
-    enough = min(level, _ENOUGH)
+    enough = level if best.column == GUST_COLUMN else min(level, _ENOUGH)
     if best.candidate.leftover > enough:
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
     useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
