@@ -52,8 +52,8 @@ _BETTER = 1.5
 
 _ENOUGH = 0.02
 """Level at which a larger model is rejected, if the base model's is not lower: nulls say what numerics do to the base
-model, and somewhat less than what they do to one with an effect. Of gusts no model is fitted: a pressure that is free in
-every segment is judged at the level itself."""
+model, and somewhat less than what they do to one with an effect. Of gusts no model is fitted: what a pressure that is
+free in every segment leaves is judged at the level itself."""
 
 RESPONSE = 0.25
 """Relative standard error of a strength by what the fit's mesh does to an effect, which nulls do not show: strengths of

@@ -159,6 +159,17 @@ def test_two_effects_are_both_named(null: NullModel, reference: Reference) -> No
     assert set(named(found)) == {"lift.coefficient", "hem-mass.line_density"}
 
 
+def test_what_gusts_leave_is_judged_at_the_tests_own_level(null: NullModel, reference: Reference) -> None:
+    """What an effect leaves is judged at 0.02, if the test's level is not lower."""
+    for gusts, acting in ((0.5, {}), (0.0, {"vertical-wind.inclination": 1.0})):
+        evidence = seen(null, acting, gusts=gusts, line=0.0, seed=2)
+        left = judge(evidence, reference, level=0.02).ranking[0].candidate.leftover
+        assert left > 0.02
+        assert judge(evidence, reference, level=0.9 * left).conclusion is Conclusion.EFFECT
+        above = judge(evidence, reference, level=1.1 * left)
+        assert (above.conclusion is Conclusion.EFFECT and len(above.named) == 1) == (gusts == 0.0)
+
+
 def test_a_pressure_that_fluctuates_is_called_gusts(null: NullModel, reference: Reference) -> None:
     found = judged(null, reference, {}, gusts=0.5)
     assert named(found) == ["gusts"]
