@@ -127,8 +127,8 @@ class Outcome:
 
     @property
     def separated(self) -> bool | None:
-        """Whether one effect was named alone and the wrong-effect control is worse on what was left out, by an interval
-        that does not reach zero; None where none was named, or no control was run."""
+        """Whether the wrong-effect control is worse than what was named on what was left out, by an interval that does
+        not reach zero, and not one of several was named; None where none was, or no control was run."""
         if not self.named or self.apart is None:
             return None
         return self.conclusion is not Conclusion.ONE_OF and self.apart["low"] > 0
