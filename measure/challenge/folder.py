@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 _EPOCH = 1_600_000_000  # of every file of a set: when it was written would tell what was simulated with it
 MODEL_COLUMNS, MODEL_ROWS = 15, 10
 """Cells of the participant's mesh: 176 vertices."""
+HEIGHT = 2.0
+"""Of a flag's lower corner [m]."""
 
 
 @dataclass(frozen=True)

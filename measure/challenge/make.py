@@ -82,7 +82,7 @@ def make(
 def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key, flight: Flight) -> dict[str, str]:
     markers = layout(recipe, stream(seed, "markers"))
     weights = seen(recipe.numerics[key.numerics], markers, width=recipe.width, height=recipe.height)
-    place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), 2.0)
+    place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), files.HEIGHT)
     names = _NAMES[: recipe.count]
     positions: dict[str, NDArray[np.float32]] = {}
     for index, (name, track) in enumerate(zip(names, flight.positions, strict=True)):

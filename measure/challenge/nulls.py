@@ -11,7 +11,7 @@ import numpy as np
 from flagdata.errors import ConflictError, InputError
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import child_seed, stream
-from measure.challenge.folder import MODEL_COLUMNS, MODEL_ROWS, write_json
+from measure.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
 from measure.challenge.meshes import layout
 from measure.challenge.recipe import ChallengeRecipe
 from measure.loop import bank as banks
@@ -21,10 +21,6 @@ from measure.observe.trajectory import Specimen
 from sim import handles
 from sim.material import named
 from sim.mesh import grid
-
-_HEIGHT = 2.0  # m: of the lower corner, as in the sets
-_BEYOND = 0.1
-"""How much wider than the recipe's the range of winds is, on either side."""
 
 
 def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[NullBatch]:
@@ -40,8 +36,8 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
     """
     mesh = grid(width=recipe.width, height=recipe.height, columns=MODEL_COLUMNS, rows=MODEL_ROWS)
     held = handles.corners(mesh.rest)
-    along_pole = np.array([(0.0, 0.0, _HEIGHT + mesh.rest[vertex, 1]) for vertex in held])
-    speeds = ((1 - _BEYOND) * recipe.speed.low, (1 + _BEYOND) * recipe.speed.high)
+    along_pole = np.array([(0.0, 0.0, HEIGHT + mesh.rest[vertex, 1]) for vertex in held])
+    speeds = banks.around(recipe.speed.low, recipe.speed.high)
     made: list[NullBatch] = []
     for index in range(kinds):
         own = child_seed(seed, "null", index)

@@ -52,6 +52,11 @@ def each(segments: int) -> int:
     return max(2, math.ceil(segments / WINDS))
 
 
+def around(slowest: float, fastest: float) -> tuple[float, float]:
+    """The winds of nulls for data of such winds [m/s]: somewhat beyond them."""
+    return 0.9 * slowest, 1.1 * fastest
+
+
 def prior_batch(
     specimen: Specimen,
     *,

@@ -116,14 +116,12 @@ class Segments:
     Attributes:
         items: the segments.
         markers: (marker, 2) [m].
-        period: between the frames used [s].
-        warm: how many frames of each are warm-up.
+        cut: how the recordings were cut.
     """
 
     items: tuple[Segment, ...]
     markers: Floats
-    period: float
-    warm: int
+    cut: Cut
 
     @classmethod
     def of(cls, recordings: Sequence[Trajectory]) -> Segments:
@@ -136,7 +134,7 @@ class Segments:
         """
         first = recordings[0]
         cut = Cut.of(first.rate, min(len(r.positions) for r in recordings))
-        period, warm, length = cut.period, cut.warm, cut.length
+        period, span = cut.period, cut.warm + 2 + cut.length
         items: list[Segment] = []
         for index, recording in enumerate(recordings):
             if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
@@ -151,20 +149,20 @@ class Segments:
                 )  # fmt: skip
             frames = recording.positions[:: cut.stride]
             if not cut.enough:
-                needed = 2 * _SHORTEST + (warm + 2) * period
+                needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
                     f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
                     where=f"recording {recording.name!r}", fix="record for 10 s or more",
                 )  # fmt: skip
             for place in range(cut.segments(len(recording.positions))):
-                begin = place * length
+                begin = place * cut.length
                 items.append(
                     Segment(
                         recording=index, start=begin * period, wind=recording.wind, noise=recording.noise,
-                        positions=frames[begin : begin + length + warm + 2],
+                        positions=frames[begin : begin + span],
                     )
                 )  # fmt: skip
-        return cls(items=tuple(items), markers=first.markers, period=period, warm=warm)
+        return cls(items=tuple(items), markers=first.markers, cut=cut)
 
     def tied(self, anchors: Sequence[Floats]) -> Segments:
         """With cloths tied where each recording's (held, 3) are [m]."""
@@ -190,6 +188,16 @@ class Segments:
         return np.stack([item.positions for item in self.items], axis=-1)
 
     @property
+    def period(self) -> float:
+        """Between the frames used [s]."""
+        return self.cut.period
+
+    @property
+    def warm(self) -> int:
+        """How many frames of each are warm-up."""
+        return self.cut.warm
+
+    @property
     def first(self) -> int:
         """The first frame of a segment that counts."""
         return self.warm + 2
@@ -197,7 +205,7 @@ class Segments:
     @property
     def duration(self) -> float:
         """Of what counts of a segment [s]."""
-        return (len(self.items[0].positions) - self.first) * self.period
+        return self.cut.length * self.period
 
     def __len__(self) -> int:
         return len(self.items)

@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
-from measure.loop.forecast import Cut
 from measure.loop.reference import NullBank
 from measure.loop.setting import Setting, Stage
 
@@ -49,12 +48,11 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
     """Null recordings over the priors of the cloth, of the winds of an experiment; those of one cloth hold as many
     segments as the data."""
     first, segments = setting.experiment.recordings[0], setting.segments
-    cut = Cut.of(first.rate, min(len(r.positions) for r in setting.experiment.recordings))
     batches = [
         banks.prior_batch(
             setting.experiment.specimen, markers=first.markers, rate=first.rate, noise=first.noise,
-            duration=cut.lasting(banks.each(len(segments))),
-            speeds=(0.9 * float(setting.speeds.min()), 1.1 * float(setting.speeds.max())),
+            duration=segments.cut.lasting(banks.each(len(segments))),
+            speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
             seed=child_seed(seed, "null", index),
         )
         for index in range(math.ceil(nulls / banks.BATCH))
