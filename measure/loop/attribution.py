@@ -128,7 +128,7 @@ def judge(
         _weigh(evidence, reference, column, effect, own, statistics, (again or {}).get(column))
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
-    ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[-1]))])
+    ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
     # An effect that changes how a flag flutters, as lift does, leaves a line too, of which it then takes much away.
     rerun = (again or {}).get(ranking[0].column)
     left = line if rerun is None else rerun.line

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from flagdata.errors import CorruptError, NotFoundError
+from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
 from measure.loop.columns import THETA, Calibration, Column, library, motions
@@ -33,6 +33,8 @@ BATCH = 8
 WINDS = 4
 """Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
 by the cloth, so that few cloths of many numerics say more than many of few."""
+_KEPT = {"anchors_told", "period", "cloth", "lines", "turning"}
+"""What batches of older versions lack, some or all."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
@@ -149,9 +151,15 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
         marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
-        anchors_told=np.array(batch.specimen.anchors_told),
+        anchors_told=np.array(batch.specimen.anchors_told), turned=_moments(own).r, turning=_moments(own).response,
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
+
+
+def _moments(own: Statistics) -> Statistics:
+    if own.turning is None:
+        raise UsageError("no moments", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
+    return own.turning
 
 
 def _file(folder: Path, index: int) -> Path:
@@ -181,11 +189,17 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth", "lines"} <= set(content):
+        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth", "lines", "turning"} <= set(
+            content
+        ):
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
             error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
+            turning=Statistics(
+                recording=content["recording"] + count, r=content["turned"], response=content["turning"],
+                error=content["error"], marker_error=content["marker_error"],
+            ),
         )  # fmt: skip
         numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
         parts.append(

@@ -50,11 +50,13 @@ class NullModel:
         covariance: (column, column) Σ of one segment, about the mean of its experiment.
         shifts: (shift, column) how μ moves from one experiment to another: principal directions, each as long as its
             standard deviation. Where no null is of the design's cloth, how it moves from cloth to cloth is among them.
+        turning: the same of moments about the pole; None where they are not looked at.
     """
 
     coefficients: Floats
     covariance: Floats
     shifts: Floats
+    turning: NullModel | None = None
 
     @classmethod
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
@@ -73,7 +75,11 @@ class NullModel:
         if design.cloth in by_cloth:
             coefficients[0] += by_cloth[design.cloth]
             means = means - np.stack([by_cloth[cloth] for cloth in nulls.cloth[first]])
-        return cls(coefficients=coefficients[:_POWERS], covariance=covariance, shifts=_principal(means, covariance))
+        turning = nulls.statistics.turning
+        return cls(
+            coefficients=coefficients[:_POWERS], covariance=covariance, shifts=_principal(means, covariance),
+            turning=None if turning is None else cls.fit(replace(nulls, statistics=turning), design),
+        )  # fmt: skip
 
     def mean(self, speeds: Floats) -> Floats:
         """(segment, column)."""
@@ -220,6 +226,7 @@ class Evidence:
         energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
         columns: how many are the statistics' and those given beside; the null model's shifts follow.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
+        turning: the same of moments about the pole; None where they are not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -228,6 +235,7 @@ class Evidence:
     energy: Floats
     columns: int
     lines: Floats | None = None
+    turning: Evidence | None = None
 
     @classmethod
     def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
@@ -240,12 +248,19 @@ class Evidence:
         if beside is not None:
             response = np.concatenate([statistics.response, beside], axis=2)
             statistics = replace(statistics, response=response)
-        return cls._of(statistics.r, statistics, speeds, null)
+        own = cls._of(statistics.r, statistics, speeds, null)
+        if statistics.turning is None or null.turning is None or beside is not None:
+            return own
+        return replace(own, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod
     def of_nulls(cls, nulls: Nulls, null: NullModel) -> Evidence:
         """Of null segments, with what their calibrations explain taken out."""
-        return cls._of(nulls.clean, nulls.statistics, nulls.speeds, null)
+        turning = nulls.statistics.turning
+        own = cls._of(nulls.clean, nulls.statistics, nulls.speeds, null)
+        if turning is None or null.turning is None:
+            return own
+        return replace(own, turning=cls.of_nulls(replace(nulls, statistics=turning), null.turning))
 
     @classmethod
     def _of(cls, r: Floats, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
@@ -271,6 +286,7 @@ class Evidence:
         return Evidence(
             recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
             energy=self.energy[chosen], columns=self.columns, lines=None if self.lines is None else self.lines[chosen],
+            turning=None if self.turning is None else self.turning.select(chosen),
         )  # fmt: skip
 
     def _total(self) -> tuple[Floats, Floats, float]:
@@ -307,6 +323,7 @@ class Evidence:
         return Evidence(
             recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
             columns=self.columns, lines=self.lines,
+            turning=None if self.turning is None else self.turning.freed(column),
         )  # fmt: skip
 
     def drops(self, beside: Chosen = ()) -> Floats:

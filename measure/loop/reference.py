@@ -328,11 +328,20 @@ _ALIKE = 1.5e-3
 
 
 def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
-    """Of some segments: each column's drop over what is left with it, and the likelihood ratio of gusts.
+    """Of some segments: each column's drop over what is left with it, and the likelihood ratio of gusts; where moments
+    about the pole are looked at, then the same drops of these, and what they leave.
 
     Args:
         beside: columns that are fitted already.
     """
     drops, left = evidence.drops(beside), evidence.fit(beside).left
     gusts = fluctuation(evidence, columns.index(GUSTS), beside).likelihood
-    return np.append(drops / np.maximum(left - drops, 1e-9), max(gusts, 0.0))
+    found = np.append(_shares(drops, left), max(gusts, 0.0))
+    if evidence.turning is None:
+        return found
+    drops, left = evidence.turning.drops(beside), evidence.turning.fit(beside).left
+    return np.concatenate([found, _shares(drops, left), [left]])
+
+
+def _shares(drops: Floats, left: float) -> Floats:
+    return drops / np.maximum(left - drops, 1e-9)

@@ -22,6 +22,7 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column
 from measure.loop.forecast import Forecaster, Segments
+from measure.loop.lever import Lever
 from measure.loop.lines import Spectrum
 
 Floats = NDArray[np.float64]
@@ -48,6 +49,7 @@ class Statistics:
         error: (segment,) mean squared prediction error [m²].
         marker_error: (segment, marker) the same of each marker.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
+        turning: the same of the errors' moment about the pole, see `lever`; None where not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -56,6 +58,7 @@ class Statistics:
     error: Floats
     marker_error: Floats
     lines: Floats | None = None
+    turning: Statistics | None = None
 
     @property
     def spectra(self) -> Floats:
@@ -74,6 +77,7 @@ class Statistics:
             recording=self.recording[chosen], r=self.r[chosen], response=self.response[chosen],
             error=self.error[chosen], marker_error=self.marker_error[chosen],
             lines=None if self.lines is None else self.lines[chosen],
+            turning=None if self.turning is None else self.turning.select(chosen),
         )  # fmt: skip
 
     @classmethod
@@ -85,10 +89,14 @@ class Statistics:
         """
         if not parts:
             raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
+        turning = [p.turning for p in parts if p.turning is not None]
+        if turning and len(turning) < len(parts):
+            raise UsageError("moments of some parts alone", where="statistics", fix="look at them in all or in none")
         return cls(
             recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
             response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
             marker_error=np.concatenate([p.marker_error for p in parts]), lines=_joined([p.lines for p in parts]),
+            turning=cls.joined(turning) if turning else None,
         )  # fmt: skip
 
 
@@ -107,11 +115,15 @@ class Projection:
         directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
         scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
         spectrum: what their periodograms are taken along; None where lines are not looked at.
+        lever: what their moments are taken by; None where they are not looked at.
+        turning: (segment, column, frame) the sensitivities' moments, of length 1.
     """
 
     directions: Tensor
     scale: Tensor
     spectrum: Spectrum | None = None
+    lever: Lever | None = None
+    turning: Tensor | None = None
 
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
@@ -129,6 +141,13 @@ class Projection:
             for place, direction in enumerate(self.directions)
         ]
         return torch.stack(parts).double().cpu().numpy()
+
+    def turned(self, errors: Tensor) -> Floats | None:
+        """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
+        if self.lever is None or self.turning is None:
+            return None
+        moment = self.lever.moment(errors[None])[0].to(self.turning)
+        return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def lines(self, errors: Tensor) -> Floats | None:
         """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
@@ -155,7 +174,7 @@ def statistics(
 
     The columns of the result are `THETA`'s, then those given.
     """
-    return Statistics.joined([found for found, _, _ in _pieces(forecaster, segments, calibrations, columns)])
+    return Statistics.joined([found for found, *_ in _pieces(forecaster, segments, calibrations, columns)])
 
 
 def projected(
@@ -164,20 +183,26 @@ def projected(
     """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
     pieces: list[Projection] = []
-    for found, changes, scale in _pieces(forecaster, segments, calibrations, columns):
+    levers: list[Lever] = []
+    turning: list[Tensor] = []
+    for found, changes, scale, lever in _pieces(forecaster, segments, calibrations, columns):
         parts.append(found)
         pieces.append(Projection.along(changes, scale))
+        levers.append(lever)
+        moved = lever.moment(torch.stack(changes)).double().permute(2, 0, 1)
+        turning.append(moved / _length(moved))
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
+        lever=Lever.joined(levers), turning=torch.cat(turning),
     )  # fmt: skip
     return Statistics.joined(parts), whole
 
 
 def _pieces(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
-) -> Iterator[tuple[Statistics, list[Tensor], Tensor]]:
-    """Statistics of some segments at a time, with the sensitivities and the scale of their errors."""
+) -> Iterator[tuple[Statistics, list[Tensor], Tensor, Lever]]:
+    """Statistics of some segments at a time, with the sensitivities, the scale of their errors and their lever."""
     recording = segments.recording
     # Segments of one recording share weights, and so stay in one chunk.
     for chosen in _chunks(recording):
@@ -186,10 +211,29 @@ def _pieces(
         noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities(columns, own, starts, base)
+        lever = Lever.of(base, own, forecaster.specimen)
         found = replace(
-            reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base)
-        )
-        yield found, changes, error_scale(base, recording[chosen], noise)
+            reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base),
+            turning=_turned(lever, base, changes, recording[chosen]),
+        )  # fmt: skip
+        yield found, changes, error_scale(base, recording[chosen], noise), lever
+
+
+def _turned(lever: Lever, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]) -> Statistics:
+    """Of moments of errors and sensitivities (frame, marker, 3, segment)."""
+    moment = lever.moment(base[None])[0].double()  # (frame, segment)
+    moved = lever.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
+    length = _length(moved)
+    size = (moment**2).mean(0).cpu().numpy()
+    return Statistics(
+        recording=recording, r=torch.einsum("scf,fs->sc", moved / length, moment).cpu().numpy(),
+        response=((moved / length) @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
+    )  # fmt: skip
+
+
+def _length(moved: Tensor) -> Tensor:
+    """(segment, column, 1) of (segment, column, frame), never nothing: some columns have no moment."""
+    return moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
 
 
 def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:

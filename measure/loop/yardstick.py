@@ -33,8 +33,11 @@ class Yardstick:
 
     def of(self, errors: Tensor) -> Evidence:
         """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
-        lines = self.projection.lines(errors)
-        return self.evidence(replace(self.found, r=self.projection.of(errors), lines=lines))
+        lines, turned = self.projection.lines(errors), self.projection.turned(errors)
+        turning = self.found.turning
+        if turning is not None and turned is not None:
+            turning = replace(turning, r=turned)
+        return self.evidence(replace(self.found, r=self.projection.of(errors), lines=lines, turning=turning))
 
     def evidence(self, statistics: Statistics) -> Evidence:
         """Of all segments."""
