@@ -33,7 +33,7 @@ BATCH = 8
 WINDS = 4
 """Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
 by the cloth, so that few cloths of many numerics say more than many of few."""
-_KEPT = {"anchors_told", "period", "cloth", "lines", "turning"}
+_KEPT = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment"}
 """What batches of older versions lack, some or all."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
@@ -152,6 +152,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
         marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_told), turned=_moments(own).r, turning=_moments(own).response,
+        moment=_moments(own).error,
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -189,16 +190,14 @@ def load(folder: Path, *, words: str) -> NullBank:
             raise CorruptError(
                 f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
             ) from error
-        if tuple(content["columns"]) != names() or not {"anchors_told", "period", "cloth", "lines", "turning"} <= set(
-            content
-        ):
+        if tuple(content["columns"]) != names() or not set(content) >= _KEPT:
             raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
             error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
             turning=Statistics(
                 recording=content["recording"] + count, r=content["turned"], response=content["turning"],
-                error=content["error"], marker_error=content["marker_error"],
+                error=content["moment"], marker_error=content["moment"][:, None],
             ),
         )  # fmt: skip
         numerics = np.full(len(own.r), int(path.stem.split("-")[1]))

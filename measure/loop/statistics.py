@@ -49,7 +49,8 @@ class Statistics:
         error: (segment,) mean squared prediction error [m²].
         marker_error: (segment, marker) the same of each marker.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
-        turning: the same of the errors' moment about the pole, see `lever`; None where not looked at.
+        turning: the same of the errors' moment about the pole, see `lever`, its `error` in m⁸/s⁴; None where not
+            looked at.
     """
 
     recording: NDArray[np.int64]
@@ -224,7 +225,7 @@ def _turned(lever: Lever, base: Tensor, changes: Sequence[Tensor], recording: ND
     moment = lever.moment(base[None])[0].double()  # (frame, segment)
     moved = lever.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
     length = _length(moved)
-    size = (moment**2).mean(0).cpu().numpy()
+    size = ((moment * lever.scale) ** 2).mean(0).cpu().numpy()
     return Statistics(
         recording=recording, r=torch.einsum("scf,fs->sc", moved / length, moment).cpu().numpy(),
         response=((moved / length) @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
