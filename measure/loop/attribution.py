@@ -23,6 +23,7 @@ from measure.loop.inference import Evidence, Fit, gains
 from measure.loop.lines import Line
 from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
+from measure.loop.steadiness import steady
 from measure.loop.verdict import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
 from sim.effects.parameter import Parameter
@@ -294,14 +295,13 @@ def _weigh(
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
     z = value / error if error > 0 else 0.0
     gained, leftover = linear, again.leftover if again else reference.p_left_by(evidence, names(), [column])
+    left, about, null = evidence, 0.0, effect.described.null
     if again is not None:
-        gained, value = again.gains, again.coefficient
-    null = effect.described.null
+        gained, value, left, about = again.gains, again.coefficient, again.evidence, again.coefficient
     by_recording = []
-    for index in np.unique(evidence.recording):
-        own = evidence.select(evidence.recording == index).fit([column])
-        single, claimed = own.of(column)
-        by_recording.append(estimate(single, claimed * error / fit.of(column)[1], effect.unit))
+    for index in np.unique(left.recording):
+        single, claimed = left.select(left.recording == index).fit([column]).of(column)
+        by_recording.append(estimate(null + about + single, claimed * error / fit.of(column)[1], effect.unit))
     return Weighed(
         column=column, error=error, gains=gained, recording=evidence.recording,
         admissible=_plausible(effect.described, value, error),
@@ -311,7 +311,7 @@ def _weigh(
             z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
-            by_recording=tuple(by_recording),
+            by_recording=tuple(by_recording), steady=steady(by_recording),
         ),
     )  # fmt: skip
 

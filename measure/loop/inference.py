@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.errors import UsageError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.statistics import Statistics
 
@@ -69,6 +70,7 @@ class NullModel:
         means = np.stack([left[experiment == index].mean(axis=0) for index in range(experiment.max() + 1)])
         within = left - means[experiment]
         covariance = within.T @ within / max(len(left) - len(means) - features.shape[1], 1)
+        covariance += np.diag(np.full(len(covariance), _UNSEEN * np.diag(covariance).mean()))
         covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(left))
         first = np.unique(experiment, return_index=True)[1]
         by_cloth = _by_cloth(means, nulls.numerics[first], nulls.cloth[first], covariance)
@@ -152,6 +154,8 @@ class Nulls:
 
 
 _POWERS = 3
+_UNSEEN = 1e-9
+"""Share of the mean variance that a column has of which nothing is seen, as of an effect without a moment."""
 
 
 def _features(speeds: Floats) -> Floats:
@@ -243,14 +247,19 @@ class Evidence:
 
         Args:
             beside: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
-                columns after the statistics'.
+                columns after the statistics', and moments are not looked at.
+
+        Raises:
+            UsageError: moments of the statistics or of the nulls alone.
         """
         if beside is not None:
             response = np.concatenate([statistics.response, beside], axis=2)
             statistics = replace(statistics, response=response)
         own = cls._of(statistics.r, statistics, speeds, null)
-        if statistics.turning is None or null.turning is None or beside is not None:
+        if beside is not None or (statistics.turning is None and null.turning is None):
             return own
+        if statistics.turning is None or null.turning is None:
+            raise UsageError("moments of nulls or data alone", where="evidence", fix="look at them in both or in none")
         return replace(own, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod
@@ -333,7 +342,7 @@ class Evidence:
         solved = np.linalg.solve(curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]])
         own = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
         slope = score - curvature[active].T @ solved[:, -1]
-        drops = slope**2 / np.maximum(own, 1e-9 * np.diag(curvature))
+        drops = slope**2 / np.maximum(own, np.maximum(1e-9 * np.diag(curvature), np.finfo(np.float64).tiny))
         drops[active] = 0.0
         return drops[: self.columns]
 

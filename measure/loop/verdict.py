@@ -44,7 +44,9 @@ class Candidate:
         gain_error: its standard error.
         behind: how many standard errors of the paired difference it lies behind the best candidate; 0 for the best.
         leftover: p-value of what the model with it still leaves unexplained.
-        by_recording: strength fitted on each recording alone, in the order of the recordings: is it stable?
+        by_recording: strength fitted on each recording alone, in the order of the recordings; of a candidate that was
+            run again about what it then has.
+        steady: p-value of one strength in all of these; None of a single recording, and of what no law says is one.
         why_not: why it was not named; empty where it was.
     """
 
@@ -59,6 +61,7 @@ class Candidate:
     behind: float
     leftover: float
     by_recording: tuple[Estimate, ...] = ()
+    steady: float | None = None
     why_not: str = ""
     null: float = 0.0
 

@@ -34,9 +34,8 @@ class Yardstick:
     def of(self, errors: Tensor) -> Evidence:
         """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
         lines, turned = self.projection.lines(errors), self.projection.turned(errors)
-        turning = self.found.turning
-        if turning is not None and turned is not None:
-            turning = replace(turning, r=turned)
+        known = self.found.turning
+        turning = None if known is None or turned is None else replace(known, r=turned)
         return self.evidence(replace(self.found, r=self.projection.of(errors), lines=lines, turning=turning))
 
     def evidence(self, statistics: Statistics) -> Evidence:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2, kstest, uniform
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UsageError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls, gains
@@ -215,6 +215,35 @@ def test_drops_are_those_of_fits(world: World, null: NullModel) -> None:
     assert evidence.drops()[5] == pytest.approx(without - with_it, rel=1e-6)
     beside = evidence.fit([4]).left - evidence.fit([4, 5]).left
     assert evidence.drops([4])[5] == pytest.approx(beside, rel=1e-6)
+
+
+def test_a_column_of_which_nothing_is_seen_says_nothing() -> None:
+    """An effect without a moment, among moments: neither it nor the others are disturbed."""
+    world = World(5)
+    nulls, unseen = world.nulls(), 7
+
+    def blind(statistics: Statistics) -> Statistics:
+        r, response = statistics.r.copy(), statistics.response.copy()
+        r[:, unseen] = response[:, unseen, :] = response[:, :, unseen] = 0.0
+        return replace(statistics, r=r, response=response)
+
+    null = NullModel.fit(replace(nulls, statistics=blind(nulls.statistics)), nulls.design)
+    speeds = np.repeat([3.5, 5.0, 7.0], SEGMENTS)
+    found = world.draw(
+        np.tile(effect(0.6), (3, 1)), recordings=3, numerics=np.zeros(3), speeds=np.array([3.5, 5.0, 7.0])
+    )
+    evidence = Evidence.of(blind(found), speeds, null)
+    drops = evidence.drops()
+    assert drops[unseen] == 0.0
+    assert np.argmax(drops) == 5
+    value, error = evidence.fit([5]).of(5)
+    assert abs(value - 0.6) < 4 * error
+
+
+def test_moments_of_nulls_or_data_alone_are_refused(world: World, null: NullModel) -> None:
+    own = world.draw(np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=np.full(3, 5.0))
+    with pytest.raises(UsageError, match="moments of nulls or data alone"):
+        Evidence.of(replace(own, turning=own), np.full(3 * SEGMENTS, 5.0), null)
 
 
 def test_always_fitted_columns_never_drop(world: World, null: NullModel) -> None:
