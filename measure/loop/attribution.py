@@ -161,7 +161,7 @@ def judge(
         return judgement(Conclusion.OUTSIDE, (), reasons)
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
     enough = level if best.column == GUST_COLUMN else min(level, _ENOUGH)
-    if best.candidate.leftover > enough:
+    if best.candidate.leftover > enough and not unsteady(best.candidate):
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
     useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
     others = [w for w in ranking[1:] if w.column not in useless]
@@ -172,6 +172,11 @@ def judge(
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
+
+
+def unsteady(candidate: Candidate) -> bool:
+    """Whether its strength is another in every recording: another law in the wind would be a better one."""
+    return candidate.steady is not None and candidate.steady <= _ENOUGH
 
 
 def _field_leads(
@@ -231,7 +236,7 @@ def _second(
     swinging: bool,
 ) -> Weighed | None:
     """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
-    strength is not nothing. Beside gusts, the pressure is free in every segment.
+    strength is not nothing, both as strong in every recording. Beside gusts, the pressure is free in every segment.
 
     Args:
         evidence: of what the best leaves, if it was run again.
@@ -257,14 +262,39 @@ def _second(
     chosen, gained = others[able[leader]], pairs[1 + leader] - pairs[0]
     value, error = _beside(evidence, fits[able[leader]], chosen)
     lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _REACH * error
-    left = reference.p_left_by(evidence, names(), [*known, chosen.column], swinging=swinging)
-    return chosen if lasting and left > level else None
+    both = [*known, chosen.column]
+    left = reference.p_left_by(evidence, names(), both, swinging=swinging)
+    constant = all(_steady_beside(evidence, both, w) for w in (best, chosen) if w.column in both)
+    return chosen if lasting and constant and left > level else None
+
+
+def _steady_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed) -> bool:
+    """Whether a strength is the same in all recordings, where some columns are fitted to each."""
+    larger = weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
+    found = steady(_each(evidence, chosen, weighed.column, about=0.0, larger=larger, unit="1"))
+    return found is None or found > _ENOUGH
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
     """A strength in a joint fit, and its standard error, as much larger than Σ says as when it is fitted alone."""
     value, claimed = fit.of(weighed.column)
     return value, claimed * weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
+
+
+def _each(
+    evidence: Evidence, chosen: Sequence[int], column: int, *, about: float, larger: float, unit: str
+) -> tuple[Estimate, ...]:
+    """The strength of a column in each recording alone, where some columns are fitted to it.
+
+    Args:
+        about: the strength in the model that the evidence is of.
+        larger: by how much its standard errors are larger than Σ says.
+    """
+    made: list[Estimate] = []
+    for index in np.unique(evidence.recording):
+        value, claimed = evidence.select(evidence.recording == index).fit(chosen).of(column)
+        made.append(estimate(about + value, larger * claimed, unit))
+    return tuple(made)
 
 
 def _described(weighed: Weighed) -> Parameter:
@@ -295,13 +325,11 @@ def _weigh(
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
     z = value / error if error > 0 else 0.0
     gained, leftover = linear, again.leftover if again else reference.p_left_by(evidence, names(), [column])
-    left, about, null = evidence, 0.0, effect.described.null
+    left, null = evidence, effect.described.null
     if again is not None:
-        gained, value, left, about = again.gains, again.coefficient, again.evidence, again.coefficient
-    by_recording = []
-    for index in np.unique(left.recording):
-        single, claimed = left.select(left.recording == index).fit([column]).of(column)
-        by_recording.append(estimate(null + about + single, claimed * error / fit.of(column)[1], effect.unit))
+        gained, value, left = again.gains, again.coefficient, again.evidence
+    about = null + (value if again else 0.0)
+    by_recording = _each(left, [column], column, about=about, larger=error / fit.of(column)[1], unit=effect.unit)
     return Weighed(
         column=column, error=error, gains=gained, recording=evidence.recording,
         admissible=_plausible(effect.described, value, error),
@@ -311,7 +339,7 @@ def _weigh(
             z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
-            by_recording=tuple(by_recording), steady=steady(by_recording),
+            by_recording=by_recording, steady=steady(by_recording),
         ),
     )  # fmt: skip
 

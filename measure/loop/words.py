@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from measure.loop.attribution import RESPONSE
+from measure.loop.attribution import RESPONSE, unsteady
 from measure.loop.columns import FieldColumn
 from measure.loop.field import Mode
 from measure.loop.lines import STROUHAL, Line
@@ -50,8 +50,21 @@ def sentence(verdict: Verdict) -> str:
             f"They would be: {found}."
         )
     if verdict.conclusion is Conclusion.PARTLY:
-        return f"{rejected} It is partly explained by {found}; what is left is more than nulls leave."
+        return f"{rejected} It is partly explained by {found}; {_incomplete(verdict)}."
     return f"{rejected} It lacks {found}; with it, what is left is what nulls leave."
+
+
+def _incomplete(verdict: Verdict) -> str:
+    """Why what is named is not enough."""
+    for candidate in verdict.ranking:
+        if not candidate.why_not and unsteady(candidate):
+            each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
+            unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
+            return (
+                f"recording by recording it is {each}{unit}, which is more than chance "
+                f"(p = {probability(candidate.steady)}): another law in the wind would be a better one"
+            )
+    return "what is left is more than nulls leave"
 
 
 def separating(verdict: Verdict) -> str:

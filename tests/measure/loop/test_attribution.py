@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -68,7 +69,8 @@ def bank() -> NullBank:
     return made(seed=1)
 
 
-def made(seed: int) -> NullBank:
+def made(seed: int, *, moments: bool = False) -> NullBank:
+    """A bank of nulls, with moments about the pole or without."""
     rng = np.random.default_rng(seed)
     recordings = KINDS * CLOTHS * WINDS
     offsets = np.repeat(rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS * SEGMENTS, axis=0)
@@ -76,6 +78,8 @@ def made(seed: int) -> NullBank:
     shifts = np.repeat(rng.normal(size=(KINDS * CLOTHS, COUNT)), WINDS, axis=0)
     speeds = rng.uniform(3, 8, recordings)
     own = drawn(rng, delta, shifts, speeds)
+    if moments:
+        own = replace(own, turning=replace(drawn(rng, delta, shifts[::-1], speeds), lines=None))
     nulls = Nulls(
         statistics=own, speeds=speeds[own.recording], offsets=offsets, noise=np.zeros(len(offsets)),
         period=np.full(len(offsets), 0.04), cloth=np.full(len(offsets), "made"),
@@ -94,27 +98,46 @@ def reference(bank: NullBank) -> Reference:
     return bank.reference(12, noise=0.0, seed=1)
 
 
-def seen(
-    null: NullModel, acting: dict[str, float], *, gusts: float = 0.0, line: float = 0.0, seed: int = 2
-) -> Evidence:
-    """Of three recordings with strengths in units of what is expected, a pressure that fluctuates by `gusts`, and
-    `line` of power more at `SHED`, across the wind."""
-    rng = np.random.default_rng(seed)
+Acting = Mapping[str, float | tuple[float, float, float]]
+
+
+def strengths(acting: Acting) -> Floats:
+    """(segment, column) of three recordings, from shares of what is expected, of all or of each."""
     delta = np.zeros((3 * SEGMENTS, COUNT))
     for name, share in acting.items():
-        delta[:, names().index(name)] = share * EXPECTED[names().index(name)]
+        each = np.repeat(np.broadcast_to(share, 3), SEGMENTS)
+        delta[:, names().index(name)] = each * EXPECTED[names().index(name)]
+    return delta
+
+
+def seen(
+    null: NullModel,
+    acting: Acting,
+    *,
+    gusts: float = 0.0,
+    line: float = 0.0,
+    seed: int = 2,
+    moments: Acting | None = None,
+) -> Evidence:
+    """Of three recordings with strengths in units of what is expected, a pressure that fluctuates by `gusts`, and
+    `line` of power more at `SHED`, across the wind; beside them moments of other strengths."""
+    rng = np.random.default_rng(seed)
+    delta = strengths(acting)
     delta[:, names().index(GUSTS)] += gusts * rng.normal(size=len(delta))
     speeds = np.array([3.5, 5.0, 7.0])
     own = drawn(rng, delta, np.tile(rng.normal(size=COUNT), (3, 1)), speeds)
     assert own.lines is not None
     own.lines[:, np.searchsorted(REDUCED, SHED), 1] += line
+    if moments is not None:
+        turned = drawn(rng, strengths(moments), np.tile(rng.normal(size=COUNT), (3, 1)), speeds)
+        own = replace(own, turning=replace(turned, lines=None))
     return Evidence.of(own, speeds[own.recording], null)
 
 
 def judged(
     null: NullModel,
     reference: Reference,
-    acting: dict[str, float],
+    acting: Acting,
     *,
     gusts: float = 0.0,
     line: float = 0.0,
@@ -190,6 +213,37 @@ def test_an_effect_beside_gusts_is_named_with_them(null: NullModel, reference: R
 def test_a_force_along_the_motion_is_none_of_the_library(null: NullModel, reference: Reference) -> None:
     found = judged(null, reference, {"motion.1.10": 2.0})
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.6])
+def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
+    null: NullModel, reference: Reference, beside: float
+) -> None:
+    """A wind that rises by a speed, fitted as one that rises by an angle; its mean is the same as that of the first."""
+    hem = {"hem-mass.line_density": beside} if beside else {}
+    same = judged(null, reference, {"vertical-wind.inclination": 1.0} | hem)
+    other = judged(null, reference, {"vertical-wind.inclination": (1.8, 0.8, 0.4)} | hem)
+    assert same.conclusion is Conclusion.EFFECT
+    assert other.conclusion is Conclusion.PARTLY
+    assert named(other) == ["vertical-wind.inclination"]
+    first, second = same.ranking[0].candidate.steady, other.ranking[0].candidate.steady
+    assert first is not None
+    assert second is not None
+    assert second < 0.02 < first
+
+
+def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -> None:
+    bank = made(seed=7, moments=True)
+    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+    drag, lift = {"tangential-quadratic-drag.coefficient": 1.0}, {"lift.coefficient": 1.0}
+
+    def found(acting: Acting, moments: Acting) -> Judgement:
+        return judge(seen(null, acting, moments=moments), reference, level=0.02)
+
+    assert found({}, {}).conclusion is Conclusion.SUFFICIENT
+    assert found({}, drag).conclusion is not Conclusion.SUFFICIENT
+    assert (found(lift, lift).conclusion, named(found(lift, lift))) == (Conclusion.EFFECT, list(lift))
+    assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (Conclusion.PARTLY, list(lift))
 
 
 def test_errors_that_swing_with_the_wind_are_none_of_the_library(null: NullModel, reference: Reference) -> None:
