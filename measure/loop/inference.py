@@ -321,7 +321,10 @@ class Evidence:
         return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))
 
     def freed(self, column: int) -> Evidence:
-        """With a coefficient of a column that is free in every segment: what is left across it."""
+        """With a coefficient of a column that is free in every segment: what is left across it.
+
+        Moments about the pole are not looked at: what fluctuates within a segment moves them all the same.
+        """
         own = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
         along, slope = self.curvature[:, column], self.score[:, column]
         curvature = self.curvature - along[:, :, None] * along[:, None, :] / own[:, None, None]
@@ -332,7 +335,6 @@ class Evidence:
         return Evidence(
             recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
             columns=self.columns, lines=self.lines,
-            turning=None if self.turning is None else self.turning.freed(column),
         )  # fmt: skip
 
     def drops(self, beside: Chosen = ()) -> Floats:
