@@ -298,9 +298,10 @@ class Reference:
         self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = (), *, swinging: bool = True
     ) -> float:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
-        values = np.append(unscaled(evidence, columns, chosen), evidence.fit(chosen).left)
-        far, line = self._far(values, slice(len(values))), self.line(evidence) if swinging else None
-        return float(far.max()) if line is None else max(float(far.max()), line.far)
+        shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
+        far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
+        line = self.line(evidence) if swinging else None
+        return far if line is None else max(far, line.far)
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.
@@ -316,8 +317,8 @@ class Reference:
             )
         return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
 
-    def _far(self, values: Floats, columns: int | slice) -> Floats:
-        """Of shares, and what is left, as `far` has it."""
+    def _far(self, values: Floats | float, columns: int | slice) -> Floats:
+        """Of shares, or what is left, as `far` has it."""
         return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
 
 
