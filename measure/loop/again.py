@@ -121,7 +121,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
         if fitted is None:
             return None
         errors = fits.errors(fitted)
-        evidence = _less_moments(fits.yardstick.of(errors), bare)
+        evidence = less_moments(fits.yardstick.of(errors), bare)
         line = _own(fits.yardstick.projection, reference.line(evidence), unaided, errors)
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, left(fitted), strict=True):
@@ -140,7 +140,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
     return {column: made for column, made in found.items() if made is not None}
 
 
-def _less_moments(evidence: Evidence, before: Evidence) -> Evidence:
+def less_moments(evidence: Evidence, before: Evidence) -> Evidence:
     """Without the moments that a model leaves, if it takes away much of their misfit."""
     if evidence.turning is None or before.turning is None:
         return evidence

@@ -204,13 +204,14 @@ class Reference:
     Some columns are near their mean in all nulls, others are far from it in some. The tests compare how far from the
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
     nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
-    and the most prominent line of the errors' spectra, where these are looked at.
+    the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
+    Evidence whose moments are not to count goes without them.
 
     What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
     had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).
 
     Attributes:
-        scaled: (group, column), gusts the last.
+        scaled: (group, column) of `unscaled`: columns, gusts, then moments.
         spread: (column,) mean share of nulls as noisy as the data.
         far: (group, column + 1 or 2) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
             standard deviations; after the columns that of what the base model leaves, and the line as it is.
@@ -273,8 +274,9 @@ class Reference:
         return Rarity(null=self.far.max(axis=1), kinds=self.kinds)
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
-        """(column,) of data, gusts the last, where some columns are fitted already."""
-        return unscaled(evidence, columns, beside) / self.spread
+        """(column,) of data, as `scaled` has them, where some columns are fitted already."""
+        shares = unscaled(evidence, columns, beside)
+        return shares / self.spread[: len(shares)]
 
     def p_family(self, statistic: float, column: int) -> float:
         """Chance that in nulls any is as far as this column."""

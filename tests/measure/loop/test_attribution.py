@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.loop.again import Rerun
+from measure.loop.again import Rerun, less_moments
 from measure.loop.attribution import (
     GUST_COLUMN,
     NOT_APART,
@@ -246,6 +246,24 @@ def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -
     assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (Conclusion.PARTLY, list(lift))
 
 
+def test_moments_that_an_effect_takes_much_of_do_not_count_against_it() -> None:
+    bank = made(seed=7, moments=True)
+    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+    drag, lift = {"tangential-quadratic-drag.coefficient": 1.0}, {"lift.coefficient": 1.5}
+    before, after = seen(null, {}, moments=drag | lift), seen(null, {}, moments=drag)
+    assert after.turning is not None
+    assert before.turning is not None
+    assert after.turning.fit(()).left < 0.75 * before.turning.fit(()).left
+    explained = less_moments(after, before)
+    assert explained.turning is None
+    assert less_moments(after, after).turning is after.turning
+    assert reference.p_left_by(after, names(), []) < 0.02 < reference.p_left_by(explained, names(), [])
+    # What counts else is as it was.
+    np.testing.assert_array_equal(
+        reference.statistics(explained, names()), reference.statistics(after, names())[: COUNT + 1]
+    )
+
+
 def test_beside_gusts_moments_are_not_looked_at() -> None:
     """Two true gusts of a challenge left 3.1 and 3.4 by the columns, of 3.9 that nulls leave, and 6.6 and 8.2 by the
     moments: a pressure that swings within a segment moves them however it is set free from one to the next."""
@@ -334,8 +352,6 @@ def test_a_second_effect_that_failed_leaves_a_part_explained(null: NullModel, re
 
 def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Reference) -> None:
     """An effect whose model, run again, predicts nothing is not named."""
-    from measure.loop.again import Rerun
-
     rng = np.random.default_rng(2)
     delta = np.zeros((12, COUNT))
     place = names().index("lift.coefficient")
