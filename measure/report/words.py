@@ -75,6 +75,8 @@ def _weighed(candidate: Candidate) -> str:
         f"held-out gain {gain} nat",
         f"p = {probability(candidate.leftover)} for what it leaves",
     ]
+    if candidate.steady is not None:
+        parts.append(f"p = {probability(candidate.steady)} of one strength in all recordings")
     return _joined(parts)
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from measure.loop.columns import FieldColumn
 from measure.loop.field import Mode
 from measure.loop.lines import Line
-from measure.loop.words import proposal, shedding
+from measure.loop.verdict import Conclusion
+from measure.loop.words import proposal, sentence, shedding
+from tests.measure.report.verdicts import verdict
 
 
 def test_the_modes_that_are_told_best_are_said_first() -> None:
@@ -22,6 +26,17 @@ def test_the_modes_that_are_told_best_are_said_first() -> None:
     assert third.startswith("up, both ends against the middle (−4")
     assert "corner" not in said
     assert "fits best what is left, per mass: across" in proposal(modes, whole=False)
+
+
+def test_a_strength_that_is_another_in_every_recording_is_told_with_its_values() -> None:
+    partly = verdict(Conclusion.PARTLY)
+    assert "what is left is more than nulls leave" in sentence(partly)
+    ranking = [replace(c, steady=None if c.why_not else 0.001) for c in partly.ranking]
+    said = sentence(replace(partly, ranking=tuple(ranking)))
+    each = ", ".join(f"{e.value:.2g}" for e in next(c for c in ranking if not c.why_not).by_recording)
+    assert f"recording by recording it is {each}" in said
+    assert "p = 0.0010" in said or "p = 0.001" in said
+    assert "more than nulls leave" not in said
 
 
 def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
