@@ -34,7 +34,7 @@ WINDS = 4
 """Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
 by the cloth, so that few cloths of many numerics say more than many of few."""
 _KEPT = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment"}
-"""What batches of older versions lack, some or all."""
+"""What batches of older versions lack, some of it or all."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
@@ -69,7 +69,7 @@ def prior_batch(
     speeds: tuple[float, float],
     seed: int,
 ) -> NullBatch:
-    """Null experiments over the priors: of four cloths, each in four winds.
+    """Null experiments over the priors: of two cloths, each in four winds.
 
     Density and bending are log-uniform about the nominal ones, damping log-uniform: half of the batches have little of
     it and explicit steps, half the whole range. The winds of a cloth are drawn one from each quarter of `speeds`.
