@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -105,6 +105,10 @@ class NullBank:
     def model(self, design: Design) -> NullModel:
         """Learnt from all, for data of a design."""
         return NullModel.fit(self.nulls, design)
+
+    def without_moments(self) -> NullBank:
+        """For those who look at the errors alone."""
+        return replace(self, nulls=replace(self.nulls, statistics=replace(self.nulls.statistics, turning=None)))
 
     def reference(self, segments: int, *, noise: float, seed: int) -> Reference:
         """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
