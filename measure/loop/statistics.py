@@ -190,8 +190,7 @@ def projected(
         parts.append(found)
         pieces.append(Projection.along(changes, scale))
         levers.append(lever)
-        moved = lever.moment(torch.stack(changes)).double().permute(2, 0, 1)
-        turning.append(moved / _length(moved))
+        turning.append(_moments(lever, changes)[1])
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
@@ -223,18 +222,18 @@ def _pieces(
 def _turned(lever: Lever, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]) -> Statistics:
     """Of moments of errors and sensitivities (frame, marker, 3, segment)."""
     moment = lever.moment(base[None])[0].double()  # (frame, segment)
-    moved = lever.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
-    length = _length(moved)
+    moved, directions = _moments(lever, changes)
     size = ((moment * lever.scale) ** 2).mean(0).cpu().numpy()
     return Statistics(
-        recording=recording, r=torch.einsum("scf,fs->sc", moved / length, moment).cpu().numpy(),
-        response=((moved / length) @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
+        recording=recording, r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
+        response=(directions @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
     )  # fmt: skip
 
 
-def _length(moved: Tensor) -> Tensor:
-    """(segment, column, 1) of (segment, column, frame), never nothing: some columns have no moment."""
-    return moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
+def _moments(lever: Lever, changes: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+    """(segment, column, frame) of sensitivities (frame, marker, 3, segment); and of length 1, where there is any."""
+    moved = lever.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
+    return moved, moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
 
 
 def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
