@@ -270,15 +270,19 @@ def _second(
 
 def _steady_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed) -> bool:
     """Whether a strength is the same in all recordings, where some columns are fitted to each."""
-    larger = weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
-    found = steady(_each(evidence, chosen, weighed.column, about=0.0, larger=larger, unit="1"))
+    found = steady(_each(evidence, chosen, weighed.column, about=0.0, larger=_larger(evidence, weighed), unit="1"))
     return found is None or found > _ENOUGH
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
     """A strength in a joint fit, and its standard error, as much larger than Σ says as when it is fitted alone."""
     value, claimed = fit.of(weighed.column)
-    return value, claimed * weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
+    return value, claimed * _larger(evidence, weighed)
+
+
+def _larger(evidence: Evidence, weighed: Weighed) -> float:
+    """By how much a strength's standard error is larger than Σ says when it is fitted alone."""
+    return weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
 
 
 def _each(
