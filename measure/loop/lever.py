@@ -61,8 +61,4 @@ class Lever:
 
 def shares(specimen: Specimen, markers: Floats) -> Floats:
     """(marker,) of a cloth's area [m²], that of the vertices brought onto markers (marker, 2) [m]."""
-    rest, faces = specimen.mesh.rest, specimen.mesh.faces
-    sides = rest[faces[:, 1:]] - rest[faces[:, :1]]
-    area = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
-    owned = np.bincount(faces.ravel(), weights=np.repeat(area / 3, 3), minlength=len(rest))
-    return owned @ onto(markers, rest)
+    return specimen.mesh.vertex_areas @ onto(markers, specimen.mesh.rest)
