@@ -40,7 +40,8 @@ Progress = Callable[[int], object]
 
 
 def columns() -> tuple[Column, ...]:
-    """What is weighed beside the calibrated parameters: the library's strengths, then forces along the motion."""
+    """What is weighed beside the calibrated parameters: the library's strengths, then forces along and across the
+    motion."""
     return (*library(), *motions())
 
 

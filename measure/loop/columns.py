@@ -2,7 +2,7 @@
 
 A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
 of parameters, of effects and of the corrective field are found by simulation: `StepColumn.system` gives the batch with
-a small step taken. Forces along the motion, which are only looked along, are written down.
+a small step taken. Forces along the motion and across it, which are only looked along, are written down.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from flagdata.errors import UsageError
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, apply
 from sim.effects.effect import ForceEffect
+from sim.effects.geometry import left_of
 from sim.effects.parameter import Parameter
 from sim.material import Material
 from sim.state import State
@@ -78,7 +79,7 @@ class Column(ABC):
     """One direction.
 
     Attributes:
-        name: "lift.coefficient", "field.x.10", "motion.1.20".
+        name: "lift.coefficient", "field.x.10", "motion.1.20", "across.00".
         unit: of the coefficient.
     """
 
@@ -182,17 +183,41 @@ class FieldColumn(StepColumn):
         return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
 
 
-@dataclass(frozen=True, kw_only=True)
-class MotionColumn(Column):
-    """A force per mass b cos(π i u/W) cos(π j v/H) along the observed motion: along its velocity, or its acceleration.
+class WrittenColumn(Column):
+    """A force per mass b f cos(π i u/W) cos(π j v/H), f seen in the motion.
 
     Its change of the predictions is written down, not simulated: T² times the force, T their horizon, what it does to a
     point that is free. As a direction to look along, where only nulls say what is usual, it need not be what cloth
     does.
 
     Attributes:
-        derivative: 1 for velocity, 2 for acceleration.
         mode: (i, j).
+    """
+
+    mode: tuple[int, int]
+
+    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
+        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
+
+        Args:
+            markers: (marker, 2) [m].
+            rest: (vertex, 2) of the cloth [m].
+            period: between the frames [s].
+        """
+        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
+        return self._moved(seen, period) * shape[None, :, None, None]
+
+    @abstractmethod
+    def _moved(self, seen: Tensor, period: float) -> Tensor:
+        """(frame − 2, marker, 3, segment) T² f [m per unit]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionColumn(WrittenColumn):
+    """Along the observed motion: its velocity, or its acceleration.
+
+    Attributes:
+        derivative: 1 for velocity, 2 for acceleration.
     """
 
     derivative: int
@@ -206,18 +231,35 @@ class MotionColumn(Column):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return ("1/s", "1")[self.derivative - 1]
 
-    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
-        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
+    def _moved(self, seen: Tensor, period: float) -> Tensor:
+        return _velocity(seen) * period if self.derivative == 1 else seen[2:] - 2 * seen[1:-1] + seen[:-2]
 
-        Args:
-            markers: (marker, 2) [m].
-            rest: (vertex, 2) of the cloth [m].
-            period: between the frames [s].
-        """
-        first, middle, last = seen[:-2], seen[1:-1], seen[2:]
-        moved = (last - first) * (period / 2) if self.derivative == 1 else last - 2 * middle + first
-        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
-        return moved * shape[None, :, None, None]
+
+@dataclass(frozen=True, kw_only=True)
+class AcrossColumn(WrittenColumn):
+    """Across the observed velocity v, horizontally: z × v, as of a frame that turns about the vertical.
+
+    Mirrored in the plane of wind and gravity it changes its sign, and what the base model does hardly changes (ArcSim's
+    bending alone knows the faces of a cloth).
+    """
+
+    mode: tuple[int, int]
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"across.{self.mode[0]}{self.mode[1]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return "1/s"
+
+    def _moved(self, seen: Tensor, period: float) -> Tensor:
+        return left_of(_velocity(seen), axis=2) * period
+
+
+def _velocity(seen: Tensor) -> Tensor:
+    """(frame − 2, …) of seen places (frame, …), times the period between frames: [m]."""
+    return (seen[2:] - seen[:-2]) / 2
 
 
 def cosine(mode: tuple[int, int], places: Floats, rest: Floats) -> Floats:
@@ -272,6 +314,7 @@ def fields() -> tuple[FieldColumn, ...]:
     return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
 
 
-def motions() -> tuple[MotionColumn, ...]:
-    """Forces along the observed motion."""
-    return tuple(MotionColumn(derivative=derivative, mode=mode) for derivative in (1, 2) for mode in _MOTIONS)
+def motions() -> tuple[WrittenColumn, ...]:
+    """Forces along the observed motion, and across it."""
+    along = (MotionColumn(derivative=derivative, mode=mode) for derivative in (1, 2) for mode in _MOTIONS)
+    return (*along, AcrossColumn(mode=(0, 0)))

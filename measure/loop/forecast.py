@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
-from measure.loop.columns import THETA, Calibration, Column, FieldColumn, MotionColumn, SteadyField, StepColumn
+from measure.loop.columns import THETA, Calibration, Column, FieldColumn, SteadyField, StepColumn, WrittenColumn
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.handles import Handles
@@ -318,7 +318,7 @@ class Forecaster:
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> Tensor:
         """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
-        if isinstance(column, MotionColumn):
+        if isinstance(column, WrittenColumn):
             seen, rest = self._real(segments.positions), self.specimen.mesh.rest
             return column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
         if not isinstance(column, StepColumn):

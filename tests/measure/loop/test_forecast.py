@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from measure.loop.columns import THETA, Calibration, EffectColumn, FieldColumn, MotionColumn
+from measure.loop.columns import THETA, AcrossColumn, Calibration, EffectColumn, FieldColumn, MotionColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
@@ -71,6 +71,27 @@ def test_a_motion_column_is_the_observed_motion_at_the_frames_of_the_errors(
             before = segment.start + (segments.first - 1) * period
             expected = period**2 * shape * (v + a * before if derivative == 1 else a)
             np.testing.assert_allclose(change[0, :, :, place].numpy(), expected, atol=1e-9)
+
+
+def test_a_column_across_the_motion_is_what_a_slowly_turning_frame_does(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    # Seen from a frame that turns at Ω, a point of steady velocity has the acceleration −2 Ω z × v (Coriolis), and in
+    # one period moves by that times T² beyond even motion.
+    period, v, turned = 1 / own_recording.rate, np.array([0.3, -0.2, 0.1]), 1e-4
+    t = np.arange(len(own_recording.positions))[:, None, None] * period
+    moving = replace(own_recording, positions=np.zeros_like(own_recording.positions[:1]) + v * (t - t.mean()))
+    angle = -turned * t[:, 0, 0]
+    cos, sin, still = np.cos(angle), np.sin(angle), np.ones_like(angle)
+    turn = np.stack([[cos, -sin, 0 * still], [sin, cos, 0 * still], [0 * still, 0 * still, still]])
+    there = replace(moving, positions=np.einsum("ijf,fmj->fmi", turn, moving.positions))
+    beyond = there.positions[2:] - 2 * there.positions[1:-1] + there.positions[:-2]
+    segments = Segments.of([there])
+    base = forecaster.errors(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
+    change = forecaster.sensitivity(AcrossColumn(mode=(0, 0)), segments, [NOMINAL] * len(segments), base)
+    for place, segment in enumerate(segments.items):
+        frame = round(segment.start / period) + segments.first - 2
+        np.testing.assert_allclose(-2 * turned * change[0, :, :, place].numpy(), beyond[frame], rtol=1e-3, atol=1e-10)
 
 
 def test_a_force_along_the_velocity_moves_cloth_about_as_it_moves_free_points(

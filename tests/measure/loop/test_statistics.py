@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from measure.loop.columns import Calibration, EffectColumn
+from measure.loop.columns import AcrossColumn, Calibration, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.statistics import Statistics, projected, statistics
 from measure.observe.trajectory import Trajectory
@@ -54,6 +54,27 @@ def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecast
     response = projection.response([moved, 2 * moved])
     np.testing.assert_allclose(response[:, :, 0], found.response[:, :, column], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(response[:, :, 1], 2 * found.response[:, :, column], rtol=1e-9, atol=1e-12)
+
+
+def test_mirrored_across_the_wind_only_what_pushes_across_the_motion_changes_its_sign(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    # Base model, lift and added mass do not know left from right: cloth mirrored in the plane of wind and gravity moves
+    # as the mirror image, but for its small bending, which by ArcSim's tables knows the faces.
+    columns = (*COLUMNS, AcrossColumn(mode=(0, 0)))
+    mirrored = replace(own_recording, positions=own_recording.positions * [1.0, -1.0, 1.0])
+    found, image = (
+        statistics(forecaster, own, [Calibration(density=1.1)] * len(own), columns)
+        for own in (Segments.of([own_recording]), Segments.of([mirrored]))
+    )
+    alike, signs = [0, 2, 3, 4, 5], np.array([1.0, 1.0, 1.0, 1.0, -1.0])
+    turning, turned = found.turning, image.turning
+    assert turning is not None
+    assert turned is not None
+    for own, other in ((found.r, image.r), (turning.r, turned.r)):
+        close = 0.005 * np.abs(own).max()
+        assert np.abs(own[:, -1]).min() > 5 * close
+        np.testing.assert_allclose(other[:, alike], signs * own[:, alike], atol=close)
 
 
 def test_what_is_not_along_any_direction_does_not_count(forecaster: Forecaster, segments: Segments) -> None:
