@@ -77,7 +77,7 @@ class Options:
     """
 
     seed: int = 0
-    level: float = 0.02
+    level: float = 0.03
     nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1

@@ -53,7 +53,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 @click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 160 (the default) or more.")
 @click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              help="Of the global test; 0.02 by default.")  # fmt: skip
+              help="Of the global test; 0.03 by default.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes; by default one for each core.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
