@@ -215,7 +215,7 @@ def test_a_force_along_the_motion_is_none_of_the_library(null: NullModel, refere
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
 
 
-@pytest.mark.parametrize("beside", [0.0, 0.6])
+@pytest.mark.parametrize("beside", [0.0, 0.5])
 def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
     null: NullModel, reference: Reference, beside: float
 ) -> None:
