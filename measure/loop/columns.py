@@ -232,7 +232,7 @@ class MotionColumn(WrittenColumn):
         return ("1/s", "1")[self.derivative - 1]
 
     def _moved(self, seen: Tensor, period: float) -> Tensor:
-        return _velocity(seen) * period if self.derivative == 1 else seen[2:] - 2 * seen[1:-1] + seen[:-2]
+        return _travelled(seen) * period if self.derivative == 1 else seen[2:] - 2 * seen[1:-1] + seen[:-2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,11 +254,11 @@ class AcrossColumn(WrittenColumn):
         return "1/s"
 
     def _moved(self, seen: Tensor, period: float) -> Tensor:
-        return left_of(_velocity(seen), axis=2) * period
+        return left_of(_travelled(seen), axis=2) * period
 
 
-def _velocity(seen: Tensor) -> Tensor:
-    """(frame − 2, …) of seen places (frame, …), times the period between frames: [m]."""
+def _travelled(seen: Tensor) -> Tensor:
+    """(frame − 2, …) what the velocity makes of a period between frames, by central differences of (frame, …) [m]."""
     return (seen[2:] - seen[:-2]) / 2
 
 
