@@ -26,10 +26,10 @@ from measure.loop.yardstick import Yardstick
 
 Floats = NDArray[np.float64]
 _TAKEN = 0.25
-"""Share of a line's power, or of the moments' misfit, that an effect takes away if these are its own, whatever its
-strength on the fit's mesh: of the flutter that a lift of 1.9 had left it took 0.4, of a vortex street's lines no effect
-takes more than 0.03; of their own moments lifts and reactive loads took 0.42 to 0.54, and left what the mesh does to
-them, a drag that a turning pole passed for took none."""
+"""Share of a line's power, of the moments' misfit, or of a swing of the wind's course, that an effect takes away if
+these are its own, whatever its strength on the fit's mesh: of the flutter that a lift of 1.9 had left it took 0.4, of a
+vortex street's lines no effect takes more than 0.03; of their own moments lifts and reactive loads took 0.42 to 0.54,
+and left what the mesh does to them, a drag that a turning pole passed for took none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +93,8 @@ class Rerun:
         coefficient: fitted to all recordings.
         gains: (segment,) held-out gain: see `inference.gains`.
         leftover: p-value of the global test on what it leaves.
-        evidence: of what it leaves; without moments about the pole, where it takes away much of them.
+        evidence: of what it leaves; without moments about the pole or the wind's course, where it takes away much of
+            them.
         line: of the errors' spectra that it leaves; None where there is none, or it takes away much of its power.
     """
 
@@ -121,7 +122,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
         if fitted is None:
             return None
         errors = fits.errors(fitted)
-        evidence = less_moments(fits.yardstick.of(errors), bare)
+        evidence = less_swing(less_moments(fits.yardstick.of(errors), bare), bare)
         line = _own(fits.yardstick.projection, reference.line(evidence), unaided, errors)
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, left(fitted), strict=True):
@@ -146,6 +147,15 @@ def less_moments(evidence: Evidence, before: Evidence) -> Evidence:
         return evidence
     taken = evidence.turning.fit(()).left < (1 - _TAKEN) * before.turning.fit(()).left
     return replace(evidence, turning=None) if taken else evidence
+
+
+def less_swing(evidence: Evidence, before: Evidence) -> Evidence:
+    """Without the wind's course as a model leaves it, if it takes away much of what swings most."""
+    swing, whole = evidence.swing, before.swing
+    if swing is None or whole is None:
+        return evidence
+    most = int(np.argmax(np.abs(whole)))
+    return replace(evidence, course=None) if abs(swing[most]) < (1 - _TAKEN) * abs(whole[most]) else evidence
 
 
 def _own(projection: Projection, line: Line | None, before: Tensor, after: Tensor) -> Line | None:

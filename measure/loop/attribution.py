@@ -63,6 +63,7 @@ RESPONSE = 0.25
 NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
 NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
 """Why an effect named is withdrawn."""
+FLUCTUATING = "with it too, the wind's course swings most of all, and not as that of turbulence does"
 SWINGING = "with it too, the errors swing most of all, at a frequency that goes with the wind"
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
@@ -80,6 +81,7 @@ class Weighed:
         gains: (segment,) held-out gain.
         recording: (segment,) of each.
         admissible: whether the fitted strength makes physical sense: see `_plausible`.
+        unlike: how the wind's course differs from that of turbulence, for gusts; empty where it does not.
     """
 
     column: int
@@ -88,6 +90,7 @@ class Weighed:
     gains: Floats
     recording: NDArray[np.int64]
     admissible: bool
+    unlike: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,6 +159,10 @@ def judge(
     if swings and line is not None and line.far >= statistic:
         reasons[best.column] = SWINGING
         return judgement(Conclusion.OUTSIDE, (), reasons)
+    course = reference.swing(evidence if rerun is None else rerun.evidence)
+    if course is not None and _gusts_are_none(ranking) and _dominates(reference, evidence, course, statistic, level):
+        reasons[best.column] = FLUCTUATING
+        return judgement(Conclusion.OUTSIDE, (), reasons)
     if _field_leads(evidence, best, corrective, statistics, beyond_linear=rerun is not None):
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
@@ -172,6 +179,17 @@ def judge(
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
     return judgement(Conclusion.PARTLY, (best,), reasons)
+
+
+def _gusts_are_none(ranking: Sequence[Weighed]) -> bool:
+    """Whether the wind's course is not that of turbulence."""
+    return any(w.column == GUST_COLUMN and bool(w.unlike) for w in ranking)
+
+
+def _dominates(reference: Reference, evidence: Evidence, left: float, statistic: float, level: float) -> bool:
+    """Whether the wind's course swings farther than all else is off, and by what is left would reject a model alone."""
+    whole = reference.swing(evidence)
+    return whole is not None and whole >= statistic and reference.rarity.p(left) <= level
 
 
 def unsteady(candidate: Candidate) -> bool:
@@ -353,13 +371,15 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
     place = names().index(GUSTS)
     found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
     described = EFFECTS["gusts"].parameters()["intensity"]
+    variation = None if evidence.course is None else evidence.course.variation(evidence.recording)
+    unlike = "" if variation is None or variation.turbulent else variation.words
     by_recording = []
     for index in np.unique(evidence.recording):
         own = fluctuation(evidence.select(evidence.recording == index), place)
         by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
     return Weighed(
         column=GUST_COLUMN, gains=gained, recording=evidence.recording, error=found.error / 2,
-        admissible=bool(found.deviation > _REACH * found.error),
+        admissible=bool(found.deviation > _REACH * found.error) and not unlike, unlike=unlike,
         candidate=Candidate(
             effect="gusts", parameter="intensity", null=described.null,
             strength=strength(described.null, found.deviation / 2, found.error / 2, described.unit),
@@ -409,6 +429,8 @@ def _behind(best: Weighed, other: Weighed) -> float:
 
 
 def _reason(best: Weighed, other: Weighed) -> str:
+    if not other.admissible and other.unlike:
+        return other.unlike
     if not other.admissible and other.column == GUST_COLUMN:
         return "their intensity cannot be told from none"
     if not other.admissible:

@@ -20,6 +20,7 @@ from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
 from measure.loop.columns import THETA, Calibration, Column, library, motions
+from measure.loop.course import Course
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Nulls
 from measure.loop.nulls import NullBatch
@@ -33,7 +34,7 @@ BATCH = 8
 WINDS = 4
 """Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
 by the cloth, so that few cloths of many numerics say more than many of few."""
-_KEPT = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment"}
+_KEPT = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"}
 """What batches of older versions lack, some of it or all."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
@@ -153,7 +154,7 @@ def _keep(folder: Path, batch: NullBatch, index: int) -> None:
         marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_told), turned=_moments(own).r, turning=_moments(own).response,
-        moment=_moments(own).error,
+        moment=_moments(own).error, course=_course(own).score, course_curvature=_course(own).curvature,
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -162,6 +163,12 @@ def _moments(own: Statistics) -> Statistics:
     if own.turning is None:
         raise UsageError("no moments", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
     return own.turning
+
+
+def _course(own: Statistics) -> Course:
+    if own.course is None:
+        raise UsageError("no courses", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
+    return own.course
 
 
 def _file(folder: Path, index: int) -> Path:
@@ -200,6 +207,7 @@ def load(folder: Path, *, words: str) -> NullBank:
                 recording=content["recording"] + count, r=content["turned"], response=content["turning"],
                 error=content["moment"], marker_error=content["moment"][:, None],
             ),
+            course=Course(score=content["course"], curvature=content["course_curvature"]),
         )  # fmt: skip
         numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
         parts.append(

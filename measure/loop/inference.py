@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from measure.loop.columns import PRIOR, THETA
+from measure.loop.course import Course
 from measure.loop.statistics import Statistics
 
 Floats = NDArray[np.float64]
@@ -231,6 +232,7 @@ class Evidence:
         columns: how many are the statistics' and those given beside; the null model's shifts follow.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of moments about the pole; None where they are not looked at.
+        course: of the wind, as the errors tell it; None where not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -240,6 +242,7 @@ class Evidence:
     columns: int
     lines: Floats | None = None
     turning: Evidence | None = None
+    course: Course | None = None
 
     @classmethod
     def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
@@ -282,7 +285,7 @@ class Evidence:
             recording=statistics.recording, curvature=weighted @ response,
             score=np.einsum("saj,sj->sa", weighted, left),
             energy=np.einsum("si,ij,sj->s", left, precision, left), columns=statistics.response.shape[2],
-            lines=statistics.lines,
+            lines=statistics.lines, course=statistics.course,
         )  # fmt: skip
 
     @property
@@ -296,7 +299,13 @@ class Evidence:
             recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
             energy=self.energy[chosen], columns=self.columns, lines=None if self.lines is None else self.lines[chosen],
             turning=None if self.turning is None else self.turning.select(chosen),
+            course=None if self.course is None else self.course.select(chosen),
         )  # fmt: skip
+
+    @property
+    def swing(self) -> Floats | None:
+        """(part,) of the wind's course; None where it is not looked at."""
+        return None if self.course is None else self.course.swing(self.recording)
 
     def _total(self) -> tuple[Floats, Floats, float]:
         """Sums over the segments, with the priors of the nuisance columns."""
@@ -323,7 +332,8 @@ class Evidence:
     def freed(self, column: int) -> Evidence:
         """With a coefficient of a column that is free in every segment: what is left across it.
 
-        Moments about the pole are not looked at: what fluctuates within a segment moves them all the same.
+        Moments about the pole and the wind's course are not looked at: what fluctuates within a segment moves them all
+        the same.
         """
         own = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
         along, slope = self.curvature[:, column], self.score[:, column]

@@ -137,6 +137,7 @@ class _Groups:
 
     shares: list[Floats] = field(default_factory=list)
     left: list[float] = field(default_factory=list)
+    swings: list[Floats] = field(default_factory=list)
     lines: list[Floats] = field(default_factory=list)
     noises: list[float] = field(default_factory=list)
     kinds: list[int] = field(default_factory=list)
@@ -144,6 +145,8 @@ class _Groups:
     def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int) -> None:
         self.shares.append(unscaled(evidence, columns))
         self.left.append(evidence.fit(()).left)
+        if evidence.swing is not None:
+            self.swings.append(evidence.swing)
         if evidence.lines is not None:
             self.lines.append(strongest(evidence.lines))
         self.noises.append(noise)
@@ -152,20 +155,23 @@ class _Groups:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Found:
-    """Statistics of null groups: (group, column) shares, (group,) what is left, (group, shape · axis) lines."""
+    """Statistics of null groups: (group, column) shares, (group,) what is left, (group, part) swings of the wind's
+    course, of no part where it is not looked at, (group, shape · axis) lines."""
 
     shares: Floats
     left: Floats
+    swings: Floats
     lines: Floats | None
 
     @classmethod
     def of(cls, groups: _Groups) -> _Found:
         lines = np.array(groups.lines) if groups.lines else None
-        return cls(shares=np.array(groups.shares), left=np.array(groups.left), lines=lines)
+        swings = np.array(groups.swings).reshape(len(groups.left), -1)
+        return cls(shares=np.array(groups.shares), left=np.array(groups.left), swings=swings, lines=lines)
 
     def select(self, chosen: NDArray[np.bool_]) -> _Found:
         lines = None if self.lines is None else self.lines[chosen]
-        return _Found(shares=self.shares[chosen], left=self.left[chosen], lines=lines)
+        return _Found(shares=self.shares[chosen], left=self.left[chosen], swings=self.swings[chosen], lines=lines)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -187,12 +193,15 @@ class _Usual:
         )  # fmt: skip
 
     def far(self, found: _Found) -> Floats:
-        """(group, column + 1 or 2) how far groups are from their mean, in their standard deviations."""
-        return (_roots(found, self.lines) - self.centre) / self.width
+        """(group, column + 1 to 5) how far groups are from their mean, in their standard deviations."""
+        far = (_roots(found, self.lines) - self.centre) / self.width
+        swings = slice(found.shares.shape[1] + 1, found.shares.shape[1] + 1 + found.swings.shape[1])
+        far[:, swings] = np.abs(far[:, swings])
+        return far
 
 
 def _roots(found: _Found, lines: Lines | None) -> Floats:
-    roots = np.cbrt(np.c_[found.shares, found.left])
+    roots = np.c_[np.cbrt(np.c_[found.shares, found.left]), found.swings]
     return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
 
 
@@ -209,7 +218,8 @@ class Reference:
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
     nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
-    Evidence whose moments are not to count goes without them.
+    So they do how the wind's course swings, as it is: a covariance, of which nulls have what chance and their numerics
+    leave, on either side of nothing, and both sides are far. Evidence whose moments or course are not to count goes without them.
 
     What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
     had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).
@@ -217,10 +227,11 @@ class Reference:
     Attributes:
         scaled: (group, column) of `unscaled`: columns, gusts, then moments.
         spread: (column,) mean share of nulls as noisy as the data.
-        far: (group, column + 1 or 2) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
-            standard deviations; after the columns that of what the base model leaves, and the line as it is.
+        far: (group, column + 1 to 5) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
+            standard deviations; after the columns that of what the base model leaves, then swings and the line as they
+            are.
         kinds: (group,) of numerics.
-        centre, width: (column + 1 or 2,) mean and standard deviation of the same, of nulls as noisy as the data.
+        centre, width: (column + 1 to 5,) mean and standard deviation of the same, of nulls as noisy as the data.
         lines: of the nulls; None where spectra are not looked at.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
     """
@@ -306,8 +317,22 @@ class Reference:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
         shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
         far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
-        line = self.line(evidence) if swinging else None
-        return far if line is None else max(far, line.far)
+        swing, line = self.swing(evidence), self.line(evidence) if swinging else None
+        return max([far, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
+
+    def swing(self, evidence: Evidence) -> float | None:
+        """How far the wind's course of data swings, by the part that does most; None where it is not looked at.
+
+        Raises:
+            UsageError: it is of the data, and was not of the nulls.
+        """
+        found = evidence.swing
+        if found is None:
+            return None
+        own = slice(len(self.spread) + 1, len(self.centre) - (self.lines is not None))
+        if len(self.centre[own]) != len(found):
+            raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
+        return float(np.abs((found - self.centre[own]) / self.width[own]).max())
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.

@@ -21,6 +21,7 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column
+from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.lever import Lever
 from measure.loop.lines import Spectrum
@@ -51,6 +52,7 @@ class Statistics:
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of the errors' moment about the pole, see `lever`, its `error` in m⁸/s⁴; None where not
             looked at.
+        course: of the wind, as the errors tell it; None where not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -60,6 +62,7 @@ class Statistics:
     marker_error: Floats
     lines: Floats | None = None
     turning: Statistics | None = None
+    course: Course | None = None
 
     @property
     def spectra(self) -> Floats:
@@ -79,6 +82,7 @@ class Statistics:
             error=self.error[chosen], marker_error=self.marker_error[chosen],
             lines=None if self.lines is None else self.lines[chosen],
             turning=None if self.turning is None else self.turning.select(chosen),
+            course=None if self.course is None else self.course.select(chosen),
         )  # fmt: skip
 
     @classmethod
@@ -86,18 +90,21 @@ class Statistics:
         """One after another.
 
         Raises:
-            UsageError: none, or lines of some alone.
+            UsageError: none, or lines, moments or courses of some alone.
         """
         if not parts:
             raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
         turning = [p.turning for p in parts if p.turning is not None]
         if turning and len(turning) < len(parts):
             raise UsageError("moments of some parts alone", where="statistics", fix="look at them in all or in none")
+        courses = [p.course for p in parts if p.course is not None]
+        if courses and len(courses) < len(parts):
+            raise UsageError("courses of some parts alone", where="statistics", fix="look at them in all or in none")
         return cls(
             recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
             response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
             marker_error=np.concatenate([p.marker_error for p in parts]), lines=_joined([p.lines for p in parts]),
-            turning=cls.joined(turning) if turning else None,
+            turning=cls.joined(turning) if turning else None, course=Course.joined(courses) if courses else None,
         )  # fmt: skip
 
 
@@ -118,6 +125,7 @@ class Projection:
         spectrum: what their periodograms are taken along; None where lines are not looked at.
         lever: what their moments are taken by; None where they are not looked at.
         turning: (segment, column, frame) the sensitivities' moments, of length 1.
+        gauge: what the wind's course is told by; None where not looked at.
     """
 
     directions: Tensor
@@ -125,6 +133,7 @@ class Projection:
     spectrum: Spectrum | None = None
     lever: Lever | None = None
     turning: Tensor | None = None
+    gauge: Gauge | None = None
 
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
@@ -149,6 +158,10 @@ class Projection:
             return None
         moment = self.lever.moment(errors[None])[0].to(self.turning)
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
+
+    def course(self, errors: Tensor) -> Course | None:
+        """Of the wind, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
+        return None if self.gauge is None else self.gauge.course(_over_scale(errors, self.scale))
 
     def lines(self, errors: Tensor) -> Floats | None:
         """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
@@ -186,23 +199,25 @@ def projected(
     pieces: list[Projection] = []
     levers: list[Lever] = []
     turning: list[Tensor] = []
-    for found, changes, scale, lever in _pieces(forecaster, segments, calibrations, columns):
+    gauges: list[Gauge] = []
+    for found, changes, scale, lever, gauge in _pieces(forecaster, segments, calibrations, columns):
         parts.append(found)
         pieces.append(Projection.along(changes, scale))
         levers.append(lever)
         turning.append(_moments(lever, changes)[1])
+        gauges.append(gauge)
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
-        lever=Lever.joined(levers), turning=torch.cat(turning),
+        lever=Lever.joined(levers), turning=torch.cat(turning), gauge=Gauge.joined(gauges),
     )  # fmt: skip
     return Statistics.joined(parts), whole
 
 
 def _pieces(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
-) -> Iterator[tuple[Statistics, list[Tensor], Tensor, Lever]]:
-    """Statistics of some segments at a time, with the sensitivities, the scale of their errors and their lever."""
+) -> Iterator[tuple[Statistics, list[Tensor], Tensor, Lever, Gauge]]:
+    """Statistics of some segments at a time, with the sensitivities, the scale of the errors, lever and gauge."""
     recording = segments.recording
     # Segments of one recording share weights, and so stay in one chunk.
     for chosen in _chunks(recording):
@@ -211,12 +226,13 @@ def _pieces(
         noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities(columns, own, starts, base)
-        lever = Lever.of(base, own, forecaster.specimen)
+        lever, scale = Lever.of(base, own, forecaster.specimen), error_scale(base, recording[chosen], noise)
+        gauge = Gauge.of(forecaster, own, starts, base, scale)
         found = replace(
             reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base),
-            turning=_turned(lever, base, changes, recording[chosen]),
+            turning=_turned(lever, base, changes, recording[chosen]), course=gauge.course(_over_scale(base, scale)),
         )  # fmt: skip
-        yield found, changes, error_scale(base, recording[chosen], noise), lever
+        yield found, changes, scale, lever, gauge
 
 
 def _turned(lever: Lever, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]) -> Statistics:
@@ -261,6 +277,12 @@ def error_scale(base: Tensor, recording: NDArray[np.int64], noise: Floats) -> Te
         noisy = _NOISE * float(noise[recording == index][0]) ** 2
         scale[:, own] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
     return scale
+
+
+def _over_scale(errors: Tensor, scale: Tensor) -> Tensor:
+    """(segment, frame, marker · 3) of errors (frame, marker, 3, segment) over (marker, segment), long ones clipped."""
+    parts = [_weighed(errors[..., place], scale[:, place]) for place in range(errors.shape[-1])]
+    return torch.stack(parts).unflatten(1, (errors.shape[0], -1))
 
 
 def _weighed(error: Tensor, scale: Tensor) -> Tensor:

@@ -36,7 +36,14 @@ class Yardstick:
         lines, turned = self.projection.lines(errors), self.projection.turned(errors)
         known = self.found.turning
         turning = None if known is None or turned is None else replace(known, r=turned)
-        return self.evidence(replace(self.found, r=self.projection.of(errors), lines=lines, turning=turning))
+        found = replace(
+            self.found,
+            r=self.projection.of(errors),
+            lines=lines,
+            turning=turning,
+            course=self.projection.course(errors),
+        )
+        return self.evidence(found)
 
     def evidence(self, statistics: Statistics) -> Evidence:
         """Of all segments."""

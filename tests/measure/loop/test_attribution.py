@@ -10,8 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.loop.again import Rerun, less_moments
+from flagdata.rng import stream
+from measure.loop.again import Rerun, less_moments, less_swing
 from measure.loop.attribution import (
+    FLUCTUATING,
     GUST_COLUMN,
     NOT_APART,
     SWINGING,
@@ -24,6 +26,7 @@ from measure.loop.attribution import (
 )
 from measure.loop.bank import columns, names
 from measure.loop.columns import PRIOR, THETA, EffectColumn
+from measure.loop.course import Course
 from measure.loop.inference import Evidence, NullModel, Nulls
 from measure.loop.lines import REDUCED
 from measure.loop.reference import GUSTS, NullBank, Reference
@@ -69,8 +72,26 @@ def bank() -> NullBank:
     return made(seed=1)
 
 
-def made(seed: int, *, moments: bool = False) -> NullBank:
-    """A bank of nulls, with moments about the pole or without."""
+def blown(rng: np.random.Generator, segments: int, parts: Floats | float = 0.0) -> Course:
+    """What noise makes of the wind's course, and a wind of parts (segment, window, part)."""
+    size = 100.0
+    score = size * np.broadcast_to(parts, (segments, 10, 3)) + size**0.5 * rng.normal(size=(segments, 10, 3))
+    return Course(score=score, curvature=np.broadcast_to(size * np.eye(3), (*score.shape, 3)))
+
+
+def pulses(strength: float, *, turned: float = 0.0) -> Floats:
+    """(segment, window, part) of three recordings: a wind that is weaker for one window of every nine."""
+    weaker = np.where(np.arange(3 * SEGMENTS * 10) % 9 < 3, -strength, 0.0).reshape(-1, 10, 1)
+    return weaker * np.array([1.0, turned, 0.0])
+
+
+def slow(strength: float) -> Floats:
+    """The same of a wind that changes from one segment to another, and turns as well."""
+    return strength * stream(5, "slow").normal(size=(3 * SEGMENTS, 1, 3)) * np.ones((1, 10, 1))
+
+
+def made(seed: int, *, moments: bool = False, courses: bool = False) -> NullBank:
+    """A bank of nulls, with moments about the pole or without, with courses of the wind or without."""
     rng = np.random.default_rng(seed)
     recordings = KINDS * CLOTHS * WINDS
     offsets = np.repeat(rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS * SEGMENTS, axis=0)
@@ -80,6 +101,8 @@ def made(seed: int, *, moments: bool = False) -> NullBank:
     own = drawn(rng, delta, shifts, speeds)
     if moments:
         own = replace(own, turning=replace(drawn(rng, delta, shifts[::-1], speeds), lines=None))
+    if courses:
+        own = replace(own, course=blown(rng, len(own.r)))
     nulls = Nulls(
         statistics=own, speeds=speeds[own.recording], offsets=offsets, noise=np.zeros(len(offsets)),
         period=np.full(len(offsets), 0.04), cloth=np.full(len(offsets), "made"),
@@ -118,9 +141,11 @@ def seen(
     line: float = 0.0,
     seed: int = 2,
     moments: Acting | None = None,
+    course: Floats | None = None,
 ) -> Evidence:
     """Of three recordings with strengths in units of what is expected, a pressure that fluctuates by `gusts`, and
-    `line` of power more at `SHED`, across the wind; beside them moments of other strengths."""
+    `line` of power more at `SHED`, across the wind; beside them moments of other strengths, and a course of the
+    wind."""
     rng = np.random.default_rng(seed)
     delta = strengths(acting)
     delta[:, names().index(GUSTS)] += gusts * rng.normal(size=len(delta))
@@ -131,6 +156,8 @@ def seen(
     if moments is not None:
         turned = drawn(rng, strengths(moments), np.tile(rng.normal(size=COUNT), (3, 1)), speeds)
         own = replace(own, turning=replace(turned, lines=None))
+    if course is not None:
+        own = replace(own, course=blown(rng, len(own.r), course))
     return Evidence.of(own, speeds[own.recording], null)
 
 
@@ -309,6 +336,56 @@ def test_spectra_of_the_data_alone_are_refused(bank: NullBank, null: NullModel) 
     blind = replace(bank.nulls, statistics=replace(bank.nulls.statistics, lines=None))
     with pytest.raises(UsageError, match="spectra"):
         judged(null, replace(bank, nulls=blind).reference(12, noise=0.0, seed=1), {})
+
+
+@pytest.fixture(scope="module")
+def blowing() -> tuple[NullModel, Reference]:
+    """Of nulls whose wind's course is looked at."""
+    bank = made(seed=1, courses=True)
+    return bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+
+
+def test_a_course_alone_rejects_the_base_model(blowing: tuple[NullModel, Reference]) -> None:
+    null, reference = blowing
+    calm, windy = (
+        judge(seen(null, {}, course=c), reference, level=0.02) for c in (np.zeros((3 * SEGMENTS, 10, 3)), pulses(0.3))
+    )
+    assert calm.conclusion is Conclusion.SUFFICIENT
+    assert windy.conclusion is not Conclusion.SUFFICIENT
+    assert windy.statistic > calm.statistic
+
+
+def test_gusts_are_named_where_the_course_is_turbulences(blowing: tuple[NullModel, Reference]) -> None:
+    null, reference = blowing
+    gusty = judge(seen(null, {}, gusts=1.0, course=slow(0.2)), reference, level=0.02)
+    assert named(gusty) == ["gusts"]
+    # The same pressure, in a wind that comes in pulses from one direction.
+    passing = judge(seen(null, {}, gusts=1.0, course=pulses(0.3)), reference, level=0.02)
+    assert "gusts" not in named(passing)
+    assert "turns by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
+
+
+@pytest.mark.parametrize(("left", "conclusion"), [(0.38, Conclusion.OUTSIDE), (0.0, Conclusion.EFFECT)])
+def test_a_course_is_the_effects_own_if_its_model_has_it(
+    blowing: tuple[NullModel, Reference], left: float, conclusion: Conclusion
+) -> None:
+    null, reference = blowing
+    lift = names().index("lift.coefficient")
+    before = seen(null, {"lift.coefficient": 1.0}, course=pulses(0.4))
+    after = less_swing(seen(null, {}, course=pulses(left), seed=3), before)
+    assert (after.course is None) == (left == 0)
+    rerun = Rerun(
+        coefficient=float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 5.0), leftover=0.5 if left == 0 else 0.01,
+        evidence=after,
+    )  # fmt: skip
+    found = judge(before, reference, level=0.02, again={lift: rerun})
+    assert found.conclusion is conclusion
+    assert (found.ranking[0].candidate.why_not == FLUCTUATING) == (left > 0)
+
+
+def test_courses_of_the_data_alone_are_refused(null: NullModel, reference: Reference) -> None:
+    with pytest.raises(UsageError, match="courses"):
+        judge(seen(null, {}, course=pulses(0.1)), reference, level=0.02)
 
 
 def test_a_strength_beyond_all_expectation_is_not_named(null: NullModel, reference: Reference) -> None:
