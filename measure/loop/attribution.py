@@ -18,6 +18,7 @@ from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn
 from measure.loop.comparison import total_error
+from measure.loop.course import Variation
 from measure.loop.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.inference import Evidence, Fit, gains
 from measure.loop.lines import Line
@@ -103,6 +104,7 @@ class Judgement:
         ranking: candidates, best first, each with the reason why it was not named.
         statistic, p_value: of the global test.
         line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
+        course: how the wind would vary that leaves such errors, where that is farthest and not turbulence.
     """
 
     conclusion: Conclusion
@@ -111,6 +113,7 @@ class Judgement:
     statistic: float
     p_value: float
     line: Line | None = None
+    course: Variation | None = None
 
 
 def judge(
@@ -159,10 +162,12 @@ def judge(
     if swings and line is not None and line.far >= statistic:
         reasons[best.column] = SWINGING
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    course = reference.swing(evidence if rerun is None else rerun.evidence)
-    if course is not None and _gusts_are_none(ranking) and _dominates(reference, evidence, course, statistic, level):
-        reasons[best.column] = FLUCTUATING
-        return judgement(Conclusion.OUTSIDE, (), reasons)
+    swing = reference.swing(evidence if rerun is None else rerun.evidence)
+    if swing is not None and reference.swing(evidence) == statistic and reference.rarity.p(swing) <= level:
+        variation = varying(evidence)
+        if variation is not None and not variation.turbulent:
+            reasons[best.column] = FLUCTUATING
+            return replace(judgement(Conclusion.OUTSIDE, (), reasons), course=variation)
     if _field_leads(evidence, best, corrective, statistics, beyond_linear=rerun is not None):
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
@@ -181,15 +186,9 @@ def judge(
     return judgement(Conclusion.PARTLY, (best,), reasons)
 
 
-def _gusts_are_none(ranking: Sequence[Weighed]) -> bool:
-    """Whether the wind's course is not that of turbulence."""
-    return any(w.column == GUST_COLUMN and bool(w.unlike) for w in ranking)
-
-
-def _dominates(reference: Reference, evidence: Evidence, left: float, statistic: float, level: float) -> bool:
-    """Whether the wind's course swings farther than all else is off, and by what is left would reject a model alone."""
-    whole = reference.swing(evidence)
-    return whole is not None and whole >= statistic and reference.rarity.p(left) <= level
+def varying(evidence: Evidence) -> Variation | None:
+    """How the wind varies, as the errors tell it; None where its course is not looked at."""
+    return None if evidence.course is None else evidence.course.variation(evidence.recording)
 
 
 def unsteady(candidate: Candidate) -> bool:
@@ -371,7 +370,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
     place = names().index(GUSTS)
     found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
     described = EFFECTS["gusts"].parameters()["intensity"]
-    variation = None if evidence.course is None else evidence.course.variation(evidence.recording)
+    variation = varying(evidence)
     unlike = "" if variation is None or variation.turbulent else variation.words
     by_recording = []
     for index in np.unique(evidence.recording):

@@ -39,6 +39,7 @@ from measure.loop.attribution import (
 )
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration
 from measure.loop.comparison import Fold, LeftOut, Predictions, Trial, compare, folds, predict
+from measure.loop.course import ALONG
 from measure.loop.field import corrective_field
 from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
@@ -48,7 +49,7 @@ from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
-from measure.loop.words import assumptions, proposal, sentence, separating, shedding
+from measure.loop.words import assumptions, blowing, proposal, sentence, separating, shedding
 from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment
 
@@ -301,7 +302,10 @@ def _proposal(solved: Solved, judgement: Judgement) -> str:
         solved.setting, solved.fits.yardstick, left=left, beside=() if larger is None else larger.chosen
     )
     field = proposal(modes, whole=larger is None)
-    return field if judgement.line is None else f"{shedding(judgement.line)} {field}"
+    told = [] if judgement.line is None else [shedding(judgement.line)]
+    if judgement.course is not None and judgement.course.whole[ALONG] > 0:
+        told.append(blowing(judgement.course))
+    return " ".join([*told, field])
 
 
 def _unseen(setting: Setting, refined: Refined) -> Predictions:

@@ -106,9 +106,10 @@ class NullBank:
         """Learnt from all, for data of a design."""
         return NullModel.fit(self.nulls, design)
 
-    def without_moments(self) -> NullBank:
-        """For those who look at the errors alone."""
-        return replace(self, nulls=replace(self.nulls, statistics=replace(self.nulls.statistics, turning=None)))
+    def plain(self) -> NullBank:
+        """For those who look at the errors alone: without moments about the pole and the wind's course."""
+        own = replace(self.nulls.statistics, turning=None, course=None)
+        return replace(self, nulls=replace(self.nulls, statistics=own))
 
     def reference(self, segments: int, *, noise: float, seed: int) -> Reference:
         """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
@@ -219,7 +220,8 @@ class Reference:
     nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
     So they do how the wind's course swings, as it is: a covariance, of which nulls have what chance and their numerics
-    leave, on either side of nothing, and both sides are far. Evidence whose moments or course are not to count goes without them.
+    leave, on either side of nothing, and both sides are far. Evidence whose moments or course are not to count goes
+    without them.
 
     What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
     had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).

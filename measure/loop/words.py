@@ -9,6 +9,7 @@ import numpy as np
 
 from measure.loop.attribution import RESPONSE, unsteady
 from measure.loop.columns import FieldColumn
+from measure.loop.course import ALONG, LEFT, Variation
 from measure.loop.field import Mode
 from measure.loop.lines import STROUHAL, Line
 from measure.loop.quantity import number, probability, with_error, with_level
@@ -94,6 +95,16 @@ def shedding(line: Line) -> str:
     return (
         f"The errors swing {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind: vortices of a cylinder of "
         f"{number(STROUHAL / line.reduced, digits=2)} m do so."
+    )
+
+
+def blowing(variation: Variation) -> str:
+    """What a course of the wind looks like that is none of turbulence."""
+    along, turned = (math.sqrt(max(variation.whole[part], 0.0)) for part in (ALONG, LEFT))
+    fast = math.sqrt(max(variation.fast[ALONG], 0.0))
+    return (
+        f"The errors are as of a wind that varies by {number(100 * along, digits=2)} % of its mean along itself, "
+        f"{number(100 * fast, digits=2)} % within two seconds, and by {number(100 * turned, digits=2)} % across."
     )
 
 

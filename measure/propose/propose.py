@@ -151,7 +151,7 @@ def weigh(
         InputError: nulls of segments of another length; too few segments.
     """
     supply.check(bank, setting)
-    bank = bank.without_moments()
+    bank = bank.plain()
     parts = split(setting.segments, setting.speeds)
     null = bank.model(setting.design)
     stage("terms", 0, 1)

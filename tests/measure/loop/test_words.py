@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from measure.loop.columns import FieldColumn
+from measure.loop.course import Variation
 from measure.loop.field import Mode
 from measure.loop.lines import Line
 from measure.loop.verdict import Conclusion
-from measure.loop.words import proposal, sentence, shedding
+from measure.loop.words import blowing, proposal, sentence, shedding
 from tests.measure.report.verdicts import verdict
 
 
@@ -44,3 +47,8 @@ def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
     said = shedding(Line(far=9.0, reduced=0.2 / 0.15, direction=1))
     assert "across the wind at 1.3 Hz for each m/s" in said
     assert "0.15 m" in said
+
+
+def test_a_course_that_is_not_turbulence_is_said_in_shares_of_the_wind() -> None:
+    said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
+    assert "varies by 13 % of its mean along itself, 12 % within two seconds, and by 0 % across" in said
