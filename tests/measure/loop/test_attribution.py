@@ -17,6 +17,7 @@ from measure.loop.attribution import (
     GUST_COLUMN,
     NOT_APART,
     SWINGING,
+    USUAL,
     Judgement,
     alone,
     finalists,
@@ -209,15 +210,42 @@ def test_two_effects_are_both_named(null: NullModel, reference: Reference) -> No
     assert set(named(found)) == {"lift.coefficient", "hem-mass.line_density"}
 
 
-def test_what_gusts_leave_is_judged_at_the_tests_own_level(null: NullModel, reference: Reference) -> None:
-    """What an effect leaves is judged at 0.02, if the test's level is not lower."""
-    for gusts, acting in ((0.5, {}), (0.0, {"vertical-wind.inclination": 1.0})):
-        evidence = seen(null, acting, gusts=gusts, line=0.0, seed=2)
-        left = judge(evidence, reference, level=0.02).ranking[0].candidate.leftover
-        assert left > 0.02
-        assert judge(evidence, reference, level=0.9 * left).conclusion is Conclusion.EFFECT
-        above = judge(evidence, reference, level=1.1 * left)
-        assert (above.conclusion is Conclusion.EFFECT and len(above.named) == 1) == (gusts == 0.0)
+def test_what_an_effect_leaves_is_judged_at_two_percent(null: NullModel, reference: Reference) -> None:
+    """Whatever the level of the test, if it is not lower."""
+    evidence = seen(null, {"vertical-wind.inclination": 1.0})
+    left = judge(evidence, reference, level=0.02).ranking[0].candidate.leftover
+    assert left > 0.02
+    for level in (0.9 * left, 1.1 * left):
+        assert named(judge(evidence, reference, level=level)) == ["vertical-wind.inclination"]
+
+
+def test_what_gusts_leave_is_judged_more_mildly(null: NullModel, reference: Reference) -> None:
+    """Their other parts, which are not fitted, leave more than nulls do."""
+    leftovers: list[float] = []
+    for share in np.linspace(0.35, 0.45, 9):
+        evidence = seen(null, {"vertical-wind.inclination": float(share)}, gusts=2.0)
+        found = judge(evidence, reference, level=0.03)
+        left = found.ranking[0].candidate.leftover
+        assert found.ranking[0].column == GUST_COLUMN
+        assert (named(found) == ["gusts"] and found.conclusion is Conclusion.EFFECT) == (left > 0.005)
+        leftovers.append(left)
+    assert any(0.005 < left < 0.02 for left in leftovers)
+    assert min(leftovers) < 0.005
+
+
+def test_an_effect_that_nulls_often_show_is_not_named(null: NullModel, reference: Reference) -> None:
+    """However it predicts: what rejects the base model is something else."""
+    lift = names().index("lift.coefficient")
+    evidence = seen(null, {"lift.coefficient": 0.03}, line=20.0)
+    rerun = Rerun(
+        coefficient=0.03 * float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 50.0), leftover=0.5,
+        evidence=seen(null, {}, seed=3),
+    )  # fmt: skip
+    found = judge(evidence, reference, level=0.02, again={lift: rerun})
+    leader = found.ranking[0].candidate
+    assert (leader.effect, leader.p_family > 0.25) == ("lift", True)
+    assert (found.conclusion, found.named) == (Conclusion.OUTSIDE, ())
+    assert leader.why_not == USUAL
 
 
 def test_a_pressure_that_fluctuates_is_called_gusts(null: NullModel, reference: Reference) -> None:
