@@ -149,6 +149,7 @@ def judge(
     rerun = (again or {}).get(ranking[0].column)
     left = line if rerun is None else rerun.line
     swings = left is not None and reference.rarity.p(left.far) <= level
+    blown = _blown(evidence, reference, statistic, level, left=evidence if rerun is None else rerun.evidence)
 
     def judgement(conclusion: Conclusion, named: Sequence[Weighed], reasons: dict[int, str]) -> Judgement:
         taken = {w.column for w in named}
@@ -158,7 +159,7 @@ def judge(
         ]
         return Judgement(
             conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told), statistic=statistic,
-            p_value=p_value, line=left if swings else None,
+            p_value=p_value, line=left if swings else None, course=blown,
         )  # fmt: skip
 
     if p_value > level:
@@ -168,18 +169,15 @@ def judge(
     if not best.admissible or best.gains.sum() <= 0:
         reasons[best.column] = "no effect of the library predicts unseen recordings better than the base model"
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    if best.candidate.p_family > _USUAL:
-        reasons[best.column] = USUAL
-        return judgement(Conclusion.OUTSIDE, (), reasons)
     if swings and line is not None and line.far >= statistic:
         reasons[best.column] = SWINGING
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    swing = reference.swing(evidence if rerun is None else rerun.evidence)
-    if swing is not None and reference.swing(evidence) == statistic and reference.rarity.p(swing) <= level:
-        variation = varying(evidence)
-        if variation is not None and not variation.turbulent:
-            reasons[best.column] = FLUCTUATING
-            return replace(judgement(Conclusion.OUTSIDE, (), reasons), course=variation)
+    if blown is not None:
+        reasons[best.column] = FLUCTUATING
+        return judgement(Conclusion.OUTSIDE, (), reasons)
+    if best.candidate.p_family > _USUAL:
+        reasons[best.column] = USUAL
+        return judgement(Conclusion.OUTSIDE, (), reasons)
     if _field_leads(evidence, best, corrective, statistics, beyond_linear=rerun is not None):
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
@@ -198,9 +196,20 @@ def judge(
     return judgement(Conclusion.PARTLY, (best,), reasons)
 
 
-def varying(evidence: Evidence) -> Variation | None:
+def _varying(evidence: Evidence) -> Variation | None:
     """How the wind varies, as the errors tell it; None where its course is not looked at."""
     return None if evidence.course is None else evidence.course.variation(evidence.recording)
+
+
+def _blown(
+    evidence: Evidence, reference: Reference, statistic: float, level: float, *, left: Evidence
+) -> Variation | None:
+    """How the wind varies, where that is farthest of all, not as turbulence does, and left by the first candidate."""
+    swing, variation = reference.swing(left), _varying(evidence)
+    if swing is None or variation is None or variation.turbulent:
+        return None
+    farthest = reference.swing(evidence) == statistic
+    return variation if farthest and reference.rarity.p(swing) <= level else None
 
 
 def unsteady(candidate: Candidate) -> bool:
@@ -382,7 +391,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
     place = names().index(GUSTS)
     found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
     described = EFFECTS["gusts"].parameters()["intensity"]
-    variation = varying(evidence)
+    variation = _varying(evidence)
     unlike = "" if variation is None or variation.turbulent else variation.words
     by_recording = []
     for index in np.unique(evidence.recording):

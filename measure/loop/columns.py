@@ -1,8 +1,8 @@
 """What is varied about the model, one column each: calibrated parameters, effects of the library, forces.
 
 A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
-of parameters, of effects and of the corrective field are found by simulation: `StepColumn.system` gives the batch with
-a small step taken. Forces along the motion and across it, which are only looked along, are written down.
+of parameters, of effects, of the corrective field and of the wind are found by simulation: `StepColumn.system` gives
+the batch with a small step taken. Forces along the motion and across it, which are only looked along, are written down.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, apply
 from sim.effects.effect import ForceEffect
 from sim.effects.geometry import left_of
+from sim.effects.gusts import Gusts
 from sim.effects.parameter import Parameter
 from sim.material import Material
 from sim.state import State
@@ -79,7 +80,7 @@ class Column(ABC):
     """One direction.
 
     Attributes:
-        name: "lift.coefficient", "field.x.10", "motion.1.20", "across.00".
+        name: "lift.coefficient", "field.x.10", "wind.left", "motion.1.20", "across.00".
         unit: of the coefficient.
     """
 
@@ -181,6 +182,40 @@ class FieldColumn(StepColumn):
 
     def system(self, system: System, state: State) -> tuple[System, State]:
         return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindColumn(StepColumn):
+    """A wind that is a share of its mean stronger, turned to its left, or rising.
+
+    Attributes:
+        part: 0, 1 or 2.
+    """
+
+    part: int
+    step: float = 0.05
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"wind.{('along', 'left', 'up')[self.part]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return "1"
+
+    @property
+    def share(self) -> Tensor:
+        """(part,) of a step."""
+        return self.step * torch.eye(3, dtype=torch.float64)[self.part]
+
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        return blown(self.share[:, None], system, state)
+
+
+def blown(shares: Tensor, system: System, state: State) -> tuple[System, State]:
+    """The batch in a wind that is stronger, turned and rising by (part, batch) or (part, 1) shares of its mean."""
+    samples = shares[:, None].expand(-1, 2, -1)
+    return apply([Gusts(intensity=1.0, lateral=1.0, vertical=1.0, samples=samples)], system, state)
 
 
 class WrittenColumn(Column):
@@ -312,6 +347,11 @@ def library() -> tuple[EffectColumn, ...]:
 def fields() -> tuple[FieldColumn, ...]:
     """The corrective field's modes: steady forces."""
     return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
+
+
+def winds() -> tuple[WindColumn, ...]:
+    """The parts of the wind, by which its course is told."""
+    return tuple(WindColumn(part=part) for part in range(3))
 
 
 def motions() -> tuple[WrittenColumn, ...]:

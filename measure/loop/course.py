@@ -24,18 +24,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.loop.columns import Calibration
-from measure.loop.forecast import Forecaster, Segments
-from sim.effects import apply
-from sim.effects.gusts import Gusts
-
 Floats = NDArray[np.float64]
 
 ALONG, LEFT = 0, 1
 _WINDOW = 0.2
 """s: most of what a whipping edge does is slower, most of what noise does faster."""
-_STEP = 0.05
-"""Share of the mean wind."""
 _LEAST_TURNED = 0.3
 _MOST_WITHIN = 2.0
 """Beyond these, a course is not turbulence's: see above."""
@@ -153,31 +146,17 @@ class Gauge:
     window: int
 
     @classmethod
-    def of(
-        cls,
-        forecaster: Forecaster,
-        segments: Segments,
-        calibrations: Sequence[Calibration],
-        base: Tensor,
-        scale: Tensor,
-    ) -> Gauge:
-        """Run the base model in a wind that is somewhat stronger, one that is turned, and one that rises, side by side.
+    def of(cls, changes: Sequence[Tensor], scale: Tensor, *, period: float) -> Gauge:
+        """Along the sensitivities of `winds`.
 
         Args:
-            base: the base model's errors (frame, marker, 3, segment) [m].
+            changes: (frame, marker, 3, segment) each [m per unit].
             scale: (marker, segment) of the errors [m].
+            period: between the frames [s].
         """
-        count, parts = len(segments), 3
-        copies = segments.select(list(range(count)) * parts)
-        system, state = forecaster.system(copies, list(calibrations) * parts)
-        samples = torch.eye(parts, dtype=torch.float64).repeat_interleave(count, dim=1)[:, None].expand(-1, 2, -1)
-        steady = Gusts(intensity=_STEP, lateral=1.0, vertical=1.0, samples=samples)
-        errors = forecaster.errors(*apply([steady], system, state), copies)
-        moved = (base[..., None, :] - errors.unflatten(3, (parts, count))) / _STEP / scale[None, :, None, None]
-        return cls(
-            moved=moved.permute(4, 3, 0, 1, 2).flatten(3),
-            window=max(1, min(round(_WINDOW / segments.period), len(base) // 2)),
-        )
+        moved = torch.stack([change / scale[None, :, None] for change in changes])
+        window = max(1, min(round(_WINDOW / period), moved.shape[1] // 2))
+        return cls(moved=moved.permute(4, 0, 1, 2, 3).flatten(3), window=window)
 
     def course(self, errors: Tensor) -> Course:
         """Of errors (segment, frame, marker · 3) over their scale."""

@@ -23,7 +23,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
-from measure.loop.columns import THETA, Calibration, Column, FieldColumn, SteadyField, StepColumn, WrittenColumn
+from measure.loop.columns import (
+    THETA,
+    Calibration,
+    Column,
+    FieldColumn,
+    SteadyField,
+    StepColumn,
+    WindColumn,
+    WrittenColumn,
+    blown,
+)
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.handles import Handles
@@ -331,29 +341,36 @@ class Forecaster:
     ) -> list[Tensor]:
         """The same of each parameter of `THETA`, then of each column.
 
-        Parameters and steady fields run side by side, each on a copy of the segments: small batches cost nearly as
-        much as larger ones.
+        Parameters, steady fields and winds run side by side, each on a copy of the segments: small batches cost nearly
+        as much as larger ones.
         """
         still = torch.zeros((self.specimen.mesh.vertex_count, 3, 1), dtype=torch.float64)
+        calm = torch.zeros(3, dtype=torch.float64)
         rest = self.specimen.mesh.rest
         taken = [
-            _Step(size=size, calibrations=_moved(calibrations, place, size), acceleration=still)
+            _Step(size=size, calibrations=_moved(calibrations, place, size), acceleration=still, wind=calm)
             for place, (_, _, size) in enumerate(THETA)
         ]
-        fields = [column for column in columns if isinstance(column, FieldColumn)]
+        beside = [column for column in columns if isinstance(column, FieldColumn | WindColumn)]
         taken += [
-            _Step(size=column.step, calibrations=calibrations, acceleration=column.acceleration(rest))
-            for column in fields
-        ]
+            _Step(
+                size=column.step, calibrations=calibrations,
+                acceleration=column.acceleration(rest) if isinstance(column, FieldColumn) else still,
+                wind=column.share if isinstance(column, WindColumn) else calm,
+            )
+            for column in beside
+        ]  # fmt: skip
         each = max(1, WIDEST // len(segments))
         changes: list[Tensor] = []
         for first in range(0, len(taken), each):
             changes += self._side_by_side(taken[first : first + each], segments, base)
-        along = dict(zip(fields, changes[len(THETA) :], strict=True))
+        along = dict(zip(beside, changes[len(THETA) :], strict=True))
         return [
             *changes[: len(THETA)],
             *(
-                along[c] if isinstance(c, FieldColumn) else self.sensitivity(c, segments, calibrations, base)
+                along[c]
+                if isinstance(c, FieldColumn | WindColumn)
+                else self.sensitivity(c, segments, calibrations, base)
                 for c in columns
             ),
         ]
@@ -363,6 +380,7 @@ class Forecaster:
         copies = segments.select(list(range(count)) * len(steps))
         field = SteadyField(acceleration=torch.cat([s.acceleration.expand(-1, -1, count) for s in steps], dim=2))
         system, state = field.apply(*self.system(copies, [c for s in steps for c in s.calibrations]))
+        system, state = blown(torch.stack([s.wind for s in steps], dim=1).repeat_interleave(count, 1), system, state)
         errors = self.errors(system, state, copies)
         return [
             (base - errors[..., place * count : (place + 1) * count]) / step.size for place, step in enumerate(steps)
@@ -377,11 +395,13 @@ def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Step:
-    """Of a parameter or a steady field: its size, the calibration of each segment, the force per mass [m/s²]."""
+    """Of a parameter, a steady field or a wind: its size, the calibration of each segment, the force per mass [m/s²],
+    shares of the wind."""
 
     size: float
     calibrations: Sequence[Calibration]
     acceleration: Tensor
+    wind: Tensor
 
 
 def _moved(calibrations: Sequence[Calibration], place: int, size: float) -> list[Calibration]:

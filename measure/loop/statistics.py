@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from measure.loop.columns import Calibration, Column
+from measure.loop.columns import Calibration, Column, winds
 from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.lever import Lever
@@ -225,9 +225,10 @@ def _pieces(
         starts = [calibrations[i] for i in chosen]
         noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
-        changes = forecaster.sensitivities(columns, own, starts, base)
+        changes = forecaster.sensitivities((*columns, *winds()), own, starts, base)
+        changes, blown = changes[: -len(winds())], changes[-len(winds()) :]
         lever, scale = Lever.of(base, own, forecaster.specimen), error_scale(base, recording[chosen], noise)
-        gauge = Gauge.of(forecaster, own, starts, base, scale)
+        gauge = Gauge.of(blown, scale, period=own.period)
         found = replace(
             reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base),
             turning=_turned(lever, base, changes, recording[chosen]), course=gauge.course(_over_scale(base, scale)),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
-from measure.loop.columns import Calibration, EffectColumn
+from measure.loop.columns import Calibration, EffectColumn, winds
 from measure.loop.course import ALONG, LEFT, Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.statistics import Statistics, error_scale, projected, statistics
@@ -125,7 +125,8 @@ def test_a_gauge_tells_the_course_of_a_wind_that_was_not_logged(forecaster: Fore
     nominal = [Calibration()] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     scale = torch.ones(base.shape[1], base.shape[3], dtype=base.dtype)
-    gauge = Gauge.of(forecaster, segments, nominal, base, scale)
+    changes = [forecaster.sensitivity(wind, segments, nominal, base) for wind in winds()]
+    gauge = Gauge.of(changes, scale, period=segments.period)
     told = gauge.course(base.permute(3, 0, 1, 2).flatten(2))
     value = np.linalg.solve(told.curvature, told.score[..., None])[..., 0]
     starts = np.array([item.start for item in segments.items]) + segments.first * segments.period
@@ -155,7 +156,9 @@ def test_kept_directions_say_of_the_base_model_what_the_statistics_say(
     assert alone is not None
     np.testing.assert_array_equal(alone.curvature, own.curvature)
     # By twice the scale, half the score.
-    twice = Gauge.of(forecaster, segments, nominal, errors, 2 * error_scale(errors, segments.recording, segments.noise))
+    changes = [forecaster.sensitivity(wind, segments, nominal, errors) for wind in winds()]
+    scale = error_scale(errors, segments.recording, segments.noise)
+    twice = Gauge.of(changes, 2 * scale, period=segments.period)
     assert projection.gauge is not None
     torch.testing.assert_close(twice.moved, projection.gauge.moved / 2)
 

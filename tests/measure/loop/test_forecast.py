@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from measure.loop.columns import THETA, AcrossColumn, Calibration, EffectColumn, FieldColumn, MotionColumn
+from measure.loop.columns import THETA, AcrossColumn, Calibration, EffectColumn, FieldColumn, MotionColumn, winds
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
@@ -125,7 +125,7 @@ def test_steps_side_by_side_are_those_taken_alone(forecaster: Forecaster, own_re
     nominal = [Calibration(density=1.1)] * len(segments)
     columns = (
         FieldColumn(axis=2, mode=(1, 0)), EffectColumn(effect="lift", parameter="coefficient", step=0.3),
-        MotionColumn(derivative=1, mode=(0, 0)), FieldColumn(axis=0, mode=(0, 1)),
+        MotionColumn(derivative=1, mode=(0, 0)), FieldColumn(axis=0, mode=(0, 1)), *winds(),
     )  # fmt: skip
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     together = forecaster.sensitivities(columns, segments, nominal, base)
