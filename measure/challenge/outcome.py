@@ -128,8 +128,10 @@ class Outcome:
     @property
     def separated(self) -> bool | None:
         """Whether the wrong-effect control is worse than what was named on what was left out, by an interval that does
-        not reach zero, and not one of several was named; None where none was, or no control was run."""
-        if not self.named or self.apart is None:
+        not reach zero, and not one of several was named; None where none was, or no control was run, or one that acts:
+        of two effects the control may be the other, which is none that is wrong."""
+        acting = {effect.effect for effect in self.key.effects}
+        if not self.named or self.apart is None or any(entry["control_name"] in acting for entry in self.comparisons):
             return None
         return self.conclusion is not Conclusion.ONE_OF and self.apart["low"] > 0
 

@@ -197,6 +197,18 @@ def test_without_a_control_nothing_is_said_of_it() -> None:
     assert none.separated is None
 
 
+@pytest.mark.parametrize("conclusion", [Conclusion.EFFECT, Conclusion.ONE_OF])
+def test_a_control_that_acts_is_none_that_is_wrong(conclusion: Conclusion) -> None:
+    """Of two effects, the control beside the one that is named may be the other, which has to help."""
+    beside = comparison(after=1e-3, control=2e-3)
+    said = verdict(conclusion, "lift", apart=estimate(1.0, 0.5), comparisons=(beside,))
+    wrong = acting("lift"), acting("full-hoist")
+    right = acting("lift"), acting(beside.control_name)
+    apart = conclusion is Conclusion.EFFECT
+    assert Outcome.of(key("a", Kind.PAIR, *wrong), filing("a", said)).separated is apart
+    assert Outcome.of(key("a", Kind.PAIR, *right), filing("a", said)).separated is None
+
+
 def test_by_a_single_recording_the_control_is_separated_beyond_half_the_width() -> None:
     """The interval of the reduction is ± 1 mm: a control worse by 3 mm is separated, by 0.5 mm is not."""
 
