@@ -14,8 +14,8 @@ Definitions, in the words of the sheet:
 - *Control separated*: the same freedom spent on the best wrong effect leaves a larger misfit on the recordings left out
   in turn, by an interval of the paired difference that does not reach zero. Of all sets with an effect of the library
   where effects were named and a control was run, that does not act itself (of two effects it may be the other); "one
-  of" counts as not separated. *By a single recording*: the mean
-  difference is larger than the mean half-width of the single comparisons' intervals.
+  of" counts as not separated. *By a single recording*: the mean difference is larger than the mean half-width of the
+  single comparisons' intervals.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -27,6 +28,7 @@ from measure.loop.lever import Lever
 from measure.loop.lines import Spectrum
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 _CHUNK = 64
 """Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
@@ -94,25 +96,23 @@ class Statistics:
         """
         if not parts:
             raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
-        turning = [p.turning for p in parts if p.turning is not None]
-        if turning and len(turning) < len(parts):
-            raise UsageError("moments of some parts alone", where="statistics", fix="look at them in all or in none")
-        courses = [p.course for p in parts if p.course is not None]
-        if courses and len(courses) < len(parts):
-            raise UsageError("courses of some parts alone", where="statistics", fix="look at them in all or in none")
+        lines = _all_or_none([p.lines for p in parts], "spectra")
+        turning = _all_or_none([p.turning for p in parts], "moments")
+        courses = _all_or_none([p.course for p in parts], "courses")
         return cls(
             recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
             response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
-            marker_error=np.concatenate([p.marker_error for p in parts]), lines=_joined([p.lines for p in parts]),
+            marker_error=np.concatenate([p.marker_error for p in parts]),
+            lines=np.concatenate(lines) if lines else None,
             turning=cls.joined(turning) if turning else None, course=Course.joined(courses) if courses else None,
         )  # fmt: skip
 
 
-def _joined(parts: Sequence[Floats | None]) -> Floats | None:
+def _all_or_none(parts: Sequence[T | None], what: str) -> list[T]:
     known = [part for part in parts if part is not None]
     if known and len(known) < len(parts):
-        raise UsageError("spectra of some parts alone", where="statistics", fix="look at lines in all or in none")
-    return np.concatenate(known) if known else None
+        raise UsageError(f"{what} of some parts alone", where="statistics", fix="look at them in all or in none")
+    return known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
