@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,12 +11,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UsageError
 from sim.material import Material
 from sim.mesh import Mesh
 from sim.tables import GRIDS, Evaluation, StrainGrid, bending_segments, direction_rows, sample_stretching
 
 _COLUMN = 0.2  # 1 / tables.CURVATURE_SPACING
+_OF_MEMBERS = ("mass", "table_of", "segments", "damping")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,6 +115,31 @@ class Cloth:
             face_slots=index(incidence(mesh.faces, mesh.vertex_count)),
             hinge_slots=index(incidence(mesh.hinges, mesh.vertex_count)),
         )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Cloth]) -> Cloth:
+        """The members of batches on one mesh, in order.
+
+        Raises:
+            UsageError: batches that differ in more than mass, bending and damping.
+        """
+        first = parts[0]
+        own = {f.name for f in fields(cls)} - {"mesh", "evaluation", "grid", "materials", "stiffening", *_OF_MEMBERS}
+        for part in parts:
+            if part.mesh is not first.mesh or any(not torch.equal(getattr(part, f), getattr(first, f)) for f in own):
+                raise UsageError(
+                    "batches that differ in mesh or stretching", where="cloth", fix="simulate them one by one"
+                )
+        stiffening = None
+        if any(part.stiffening is not None for part in parts):
+            bare = [part.mass.new_zeros(len(part.hinges), part.batch) for part in parts]
+            stiffening = torch.cat(
+                [z if p.stiffening is None else p.stiffening for p, z in zip(parts, bare, strict=True)], -1
+            )
+        return replace(
+            first, materials=tuple(m for part in parts for m in part.materials), stiffening=stiffening,
+            **{name: torch.cat([getattr(part, name) for part in parts], dim=-1) for name in _OF_MEMBERS},
+        )  # fmt: skip
 
     def at_corners(self, field: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """A vertex field (vertex, …) at the three corners of the faces: (face, …) each."""

@@ -20,6 +20,10 @@ class State:
     time: float = 0.0
     memory: tuple[Tensor, ...] = ()
 
+    def select(self, members: slice) -> State:
+        """Where some members are and how fast, without what is remembered."""
+        return State(position=self.position[..., members], velocity=self.velocity[..., members], time=self.time)
+
     def healthy(self, *, speed_limit: float = 300.0) -> Tensor:
         """(batch,) bool: finite, and no vertex faster than the limit [m/s], which only divergence reaches."""
         finite = torch.isfinite(self.position).all(0).all(0) & torch.isfinite(self.velocity).all(0).all(0)

@@ -128,6 +128,14 @@ class Drive:
 
         return replace(self, wind=both(self.wind), targets=both(self.targets), offset=both(self.offset))
 
+    def select(self, members: slice) -> Drive:
+        """Of some members."""
+
+        def own(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+            return pair[0][..., members], pair[1][..., members]
+
+        return replace(self, wind=own(self.wind), targets=own(self.targets), rate=self.rate[..., members])
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class System:

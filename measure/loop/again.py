@@ -57,12 +57,15 @@ class Fits:
                 self._made[key] = None
         return self._made[key]
 
-    def left_out(self, fitted: Refined, outside: NDArray[np.bool_]) -> LeftOut:
-        """Of one of these models, fitted to the other segments alone."""
-        key = (fitted.chosen, outside.tobytes())
-        if key not in self._left:
-            self._left[key] = left_out(self.forecaster, self.segments, fitted, self.yardstick, outside)
-        return self._left[key]
+    def left_out(self, fitted: Refined, outsides: Sequence[NDArray[np.bool_]]) -> list[LeftOut]:
+        """Of one of these models, each time fitted to the other segments alone."""
+        keys = [(fitted.chosen, outside.tobytes()) for outside in outsides]
+        new = [place for place, key in enumerate(keys) if key not in self._left]
+        if new:
+            own = [outsides[place] for place in new]
+            made = left_out(self.forecaster, self.segments, fitted, self.yardstick, own)
+            self._left.update(zip([keys[place] for place in new], made, strict=True))
+        return [self._left[key] for key in keys]
 
     def errors(self, fitted: Refined) -> Tensor:
         """(frame, marker, 3, segment) that one of these models leaves [m]."""
@@ -115,7 +118,7 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
     parts = [together == index for index in np.unique(together)]
 
     def left(fitted: Refined) -> list[Floats]:
-        return [fits.left_out(fitted, outside).misfit for outside in parts]
+        return [left.misfit for left in fits.left_out(fitted, parts)]
 
     def rerun(column: int) -> Rerun | None:
         fitted = fits.of((column,))

@@ -125,13 +125,15 @@ def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
-    """Evaluate the batches that the folder lacks, each into a file of its own.
+    """Evaluate the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
+    left alone with one.
 
     Args:
         progress: called with the number of batches done.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [index for index in range(len(batches)) if not _file(folder, index).exists()]
+    missing.sort(key=lambda index: -batches[index].effort)
     if progress is not None:
         progress(len(batches) - len(missing))
     context = get_context("spawn")

@@ -38,7 +38,7 @@ from measure.loop.attribution import (
     withdrawn,
 )
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration
-from measure.loop.comparison import Fold, LeftOut, Predictions, Trial, compare, folds, predict
+from measure.loop.comparison import LeftOut, Predictions, Trial, compare, folds, predict
 from measure.loop.course import ALONG
 from measure.loop.field import corrective_field
 from measure.loop.floor import numerical_floor
@@ -227,22 +227,22 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
     fitted = [solved.base, larger, *([] if control is None else [control[1]])]
     every = folds(setting.segments, [float(u) for u in setting.speeds])
 
-    def left(fold: Fold) -> list[LeftOut]:
-        return [solved.fits.left_out(model, fold.outside) for model in fitted]
+    def left(model: Refined) -> list[LeftOut]:
+        return solved.fits.left_out(model, [fold.outside for fold in every])
 
     with ThreadPoolExecutor(max_workers=options.workers) as pool:
         simulated = pool.submit(
             numerical_floor, setting, np.arange(len(setting.speeds)), larger.model, copies=_FLOOR_COPIES,
             seed=options.seed,
         )  # fmt: skip
-        tried = list(pool.map(left, every))
+        tried = list(pool.map(left, fitted))
         of_recording, floor = simulated.result()
     made: list[Comparison] = []
     helped: list[Floats] = []
     apart: list[Floats] = []
     places: list[NDArray[np.int64]] = []
     frames = len(setting.segments.items[0].positions) - setting.segments.first
-    for place, (fold, (before, after, *wrong)) in enumerate(zip(every, tried, strict=True)):
+    for place, (fold, (before, after, *wrong)) in enumerate(zip(every, zip(*tried, strict=True), strict=True)):
         near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
         made.append(
             compare(

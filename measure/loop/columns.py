@@ -134,8 +134,8 @@ class EffectColumn(StepColumn):
         """The batch with the effect at a strength `coefficient` beyond its null value."""
         return apply([self.at(coefficient)], system, state)
 
-    def at(self, coefficient: float) -> Effect:
-        """The effect at that strength."""
+    def at(self, coefficient: float | Tensor) -> Effect:
+        """The effect at a strength `coefficient` beyond its null value, or one for each member (batch,)."""
         return EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.model import Model
+from measure.loop.model import Model, errors_of
 from measure.loop.refine import Refined, finished
 from measure.loop.verdict import Comparison, Estimate
 from measure.loop.yardstick import Yardstick
@@ -146,26 +146,29 @@ def left_out(
     segments: Segments,
     fitted: Refined,
     yardstick: Yardstick,
-    outside: NDArray[np.bool_],
-) -> LeftOut:
-    """Of a model, fitted to the other segments alone."""
-    model = finished(forecaster, segments, yardstick, fitted.without(outside), fitted.chosen, ~outside)
-    return measured(forecaster, segments, model, yardstick, outside, fitted.chosen)
+    outsides: Sequence[NDArray[np.bool_]],
+) -> list[LeftOut]:
+    """Of a model, each time fitted to the other segments alone."""
+    begun = [fitted.without(outside) for outside in outsides]
+    models = finished(forecaster, segments, yardstick, begun, fitted.chosen, [~outside for outside in outsides])
+    return measured(forecaster, segments, models, yardstick, outsides, fitted.chosen)
 
 
 def measured(
     forecaster: Forecaster,
     segments: Segments,
-    model: Model,
+    models: Sequence[Model],
     yardstick: Yardstick,
-    outside: NDArray[np.bool_],
+    outsides: Sequence[NDArray[np.bool_]],
     chosen: Sequence[int] = (),
-) -> LeftOut:
-    """Of a model as it is; what it leaves along the nuisances and chosen columns is fitted to the other segments."""
-    errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
-    return LeftOut(
-        squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, chosen)
-    )
+) -> list[LeftOut]:
+    """Of models as they are; what each leaves along the nuisances and chosen columns is fitted to the other
+    segments."""
+    every = errors_of(models, forecaster, segments)
+    return [
+        LeftOut(squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, chosen))
+        for errors, outside in zip(every, outsides, strict=True)
+    ]
 
 
 def _squared(errors: Floats) -> Floats:

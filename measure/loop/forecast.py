@@ -13,9 +13,9 @@ that its state has forgotten how it was started.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import torch
@@ -27,16 +27,13 @@ from measure.loop.columns import (
     THETA,
     Calibration,
     Column,
-    FieldColumn,
-    SteadyField,
     StepColumn,
-    WindColumn,
     WrittenColumn,
-    blown,
 )
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.handles import Handles
+from sim.integrate.abreast import Abreast
 from sim.integrate.split import SplitEuler
 from sim.scene import Scene, assemble
 from sim.state import State
@@ -304,6 +301,10 @@ class Forecaster:
 
     def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
         """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
+        return self._run(partial(self.integrator.advance, system, duration=segments.period), state, segments)
+
+    def _run(self, advance: Callable[[State], State], state: State, segments: Segments) -> tuple[Tensor, Tensor]:
+        """The same of what advances a state by a period."""
         period = segments.period
         seen = self._real(segments.positions)
         x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
@@ -312,7 +313,7 @@ class Forecaster:
         errors, predictions = [], []
         with torch.no_grad():
             for k in range(2, len(seen)):
-                state = self.integrator.advance(system, state, period)
+                state = advance(state)
                 predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
                 error = seen[k] - predicted
                 if k >= segments.first:
@@ -341,67 +342,47 @@ class Forecaster:
     ) -> list[Tensor]:
         """The same of each parameter of `THETA`, then of each column.
 
-        Parameters, steady fields and winds run side by side, each on a copy of the segments: small batches cost nearly
-        as much as larger ones.
+        All that are steps run abreast.
         """
-        still = torch.zeros((self.specimen.mesh.vertex_count, 3, 1), dtype=torch.float64)
-        calm = torch.zeros(3, dtype=torch.float64)
-        rest = self.specimen.mesh.rest
-        taken = [
-            _Step(size=size, calibrations=_moved(calibrations, place, size), acceleration=still, wind=calm)
-            for place, (_, _, size) in enumerate(THETA)
+        nominal = self.system(segments, calibrations)
+        steps = [
+            (size, self.system(segments, _moved(calibrations, place, size))) for place, (_, _, size) in enumerate(THETA)
         ]
-        beside = [column for column in columns if isinstance(column, FieldColumn | WindColumn)]
-        taken += [
-            _Step(
-                size=column.step, calibrations=calibrations,
-                acceleration=column.acceleration(rest) if isinstance(column, FieldColumn) else still,
-                wind=column.share if isinstance(column, WindColumn) else calm,
-            )
-            for column in beside
-        ]  # fmt: skip
-        each = max(1, WIDEST // len(segments))
-        changes: list[Tensor] = []
-        for first in range(0, len(taken), each):
-            changes += self._side_by_side(taken[first : first + each], segments, base)
-        along = dict(zip(beside, changes[len(THETA) :], strict=True))
+        steps += [(column.step, column.system(*nominal)) for column in columns if isinstance(column, StepColumn)]
+        errors = self.errors_abreast([moved for _, moved in steps], segments)
+        changes = [(base - own) / size for own, (size, _) in zip(errors, steps, strict=True)]
+        found = iter(changes[len(THETA) :])
         return [
             *changes[: len(THETA)],
             *(
-                along[c]
-                if isinstance(c, FieldColumn | WindColumn)
-                else self.sensitivity(c, segments, calibrations, base)
-                for c in columns
+                next(found)
+                if isinstance(column, StepColumn)
+                else self.sensitivity(column, segments, calibrations, base)
+                for column in columns
             ),
         ]
 
-    def _side_by_side(self, steps: Sequence[_Step], segments: Segments, base: Tensor) -> list[Tensor]:
-        count = len(segments)
-        copies = segments.select(list(range(count)) * len(steps))
-        field = SteadyField(acceleration=torch.cat([s.acceleration.expand(-1, -1, count) for s in steps], dim=2))
-        system, state = field.apply(*self.system(copies, [c for s in steps for c in s.calibrations]))
-        system, state = blown(torch.stack([s.wind for s in steps], dim=1).repeat_interleave(count, 1), system, state)
-        errors = self.errors(system, state, copies)
-        return [
-            (base - errors[..., place * count : (place + 1) * count]) / step.size for place, step in enumerate(steps)
-        ]
+    def errors_abreast(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
+        """`errors` of each of some batches of the same segments.
+
+        They run abreast: small batches cost nearly as much as larger ones.
+        """
+        together = math.ceil(len(batches) * len(segments) / WIDEST)
+        found: list[Tensor] = []
+        for chosen in np.array_split(np.arange(len(batches)), together):
+            copies = segments.select(list(range(len(segments))) * len(chosen))
+            abreast, start = Abreast.of([batches[place] for place in chosen])
+            errors, _ = self._run(
+                partial(self.integrator.advance_abreast, abreast, duration=segments.period), start, copies
+            )
+            found += errors.split(len(segments), dim=-1)
+        return found
 
 
 def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
     position = start.copy()
     position[list(vertices)] = anchors
     return position
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Step:
-    """Of a parameter, a steady field or a wind: its size, the calibration of each segment, the force per mass [m/s²],
-    shares of the wind."""
-
-    size: float
-    calibrations: Sequence[Calibration]
-    acceleration: Tensor
-    wind: Tensor
 
 
 def _moved(calibrations: Sequence[Calibration], place: int, size: float) -> list[Calibration]:

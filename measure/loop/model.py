@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
+from torch import Tensor
 
 from measure.loop.columns import Calibration, EffectColumn
-from measure.loop.forecast import Forecaster, Segments
+from measure.loop.forecast import WIDEST, Forecaster, Segments
 from sim.effects import Effect, apply
 from sim.state import State
 from sim.system import System
@@ -56,6 +60,24 @@ class Model:
             calibration=nominal.moved((density, bending, damping)),
             effects=tuple((column, coefficient / 2) for column, coefficient in self.effects),
         )
+
+
+def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segments) -> list[Tensor]:
+    """What each model of the same effects leaves of segments: (frame, marker, 3, segment) errors [m].
+
+    They are members of one batch: small batches cost nearly as much as larger ones.
+    """
+    count, found = len(segments), []
+    for chosen in np.array_split(np.arange(len(models)), math.ceil(len(models) * count / WIDEST)):
+        own = [models[place] for place in chosen]
+        copies = segments.select(list(range(count)) * len(own))
+        batch = forecaster.system(copies, [model.calibration for model in own for _ in range(count)])
+        strengths = torch.tensor([[value for _, value in model.effects] for model in own], dtype=torch.float64)
+        acting = [
+            column.at(strengths[:, place].repeat_interleave(count)) for place, (column, _) in enumerate(own[0].effects)
+        ]
+        found += forecaster.errors(*apply(acting, *batch), copies).split(count, dim=-1)
+    return found
 
 
 def _kept(column: EffectColumn, coefficient: float) -> float:

@@ -72,6 +72,12 @@ class NullBatch:
             for place, speed in enumerate(self.speeds)
         ]  # fmt: skip
 
+    @property
+    def effort(self) -> float:
+        """About how much work it is, in vertices: explicit steps take twice as long."""
+        integrator, _ = self._method()
+        return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
+
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
         """A finer grid in the fit's frame, and its vertices nearest to the attachments."""
         rng = stream(self.seed, "null", "mesh")

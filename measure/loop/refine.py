@@ -12,7 +12,7 @@ from flagdata.errors import FlagdataError
 from measure.loop.columns import PRIOR, THETA, Calibration, Column, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
-from measure.loop.model import Model
+from measure.loop.model import Model, errors_of
 from measure.loop.statistics import Statistics, reduced
 from measure.loop.yardstick import Yardstick
 
@@ -94,27 +94,31 @@ def refine(
             break
         reached = _round(forecaster, segments, reached.model, part, yardstick.speeds, tuple(chosen))
     every = np.ones(len(segments), dtype=bool)
-    return replace(reached, model=finished(forecaster, segments, yardstick, reached.model, chosen, every))
+    (model,) = finished(forecaster, segments, yardstick, [reached.model], chosen, [every])
+    return replace(reached, model=model)
 
 
 def finished(
     forecaster: Forecaster,
     segments: Segments,
     yardstick: Yardstick,
-    model: Model,
+    models: Sequence[Model],
     chosen: Sequence[int],
-    inside: NDArray[np.bool_],
-) -> Model:
-    """A model after one linear step by the yardstick's directions, which are all, fitted to some segments.
+    insides: Sequence[NDArray[np.bool_]],
+) -> list[Model]:
+    """Models of the same columns after one linear step by the yardstick's directions, which are all, each fitted to
+    some segments.
 
     By its own few directions a fit follows effects far from where they are linear, but cannot tell some of them from
     what numerics leave; by all, it can.
     """
-    errors, _ = forecaster.run(*model.system(forecaster, segments), segments)
-    evidence = yardstick.of(errors).select(inside)
-    fit = evidence.fit(chosen, centre=Calibration().steps_from(model.calibration))
-    step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
-    return model.moved(cut(step)) if np.isfinite(step).all() else model
+    every = errors_of(models, forecaster, segments)
+    made: list[Model] = []
+    for model, errors, inside in zip(models, every, insides, strict=True):
+        fit = yardstick.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
+        step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
+        made.append(model.moved(cut(step)) if np.isfinite(step).all() else model)
+    return made
 
 
 def _round(
@@ -156,12 +160,10 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
 
 
 def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
-    base = forecaster.errors(*model.system(forecaster, segments), segments)
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
-    changes = []
-    for place, size in enumerate(sizes):
-        moved, taken = _stepped(model, place, size)
-        changes.append((base - forecaster.errors(*moved.system(forecaster, segments), segments)) / taken)
+    steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
+    base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
+    changes = [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
     return reduced(base, changes, segments.recording, segments.noise)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from torch import Tensor
+
 from flagdata.errors import UnknownNameError
 from measure.loop.columns import EffectColumn, library
 from sim.effects import Effect
@@ -26,7 +28,7 @@ class FileColumn(EffectColumn):
     def described(self) -> Parameter:
         return load(self.spec).parameters()[self.parameter]
 
-    def at(self, coefficient: float) -> Effect:
+    def at(self, coefficient: float | Tensor) -> Effect:
         return load(self.spec)(**{self.parameter: self.described.null + coefficient})
 
 

@@ -20,7 +20,7 @@ from torch import Tensor
 from measure.loop.columns import THETA, Calibration, Column
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
-from measure.loop.model import Model
+from measure.loop.model import Model, errors_of
 from measure.loop.statistics import Projection, Statistics, error_scale, reduced
 from measure.loop.yardstick import Yardstick
 from measure.propose.sensitivities import of_columns
@@ -89,14 +89,10 @@ class Lens:
         """Of the calibrated parameters and the effects of a model, there."""
         steps = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
 
-        def errors(moved: Model) -> Tensor:
-            return self.forecaster.errors(*moved.system(self.forecaster, self.segments), self.segments)
-
-        base = errors(model)
-        changes = [
-            (base - errors(model.moved(tuple(step if k == place else 0.0 for k in range(len(steps)))))) / step
-            for place, step in enumerate(steps)
-        ]
+        ways = np.eye(len(steps)) * steps
+        models = [model, *(model.moved(tuple(float(v) for v in way)) for way in ways)]
+        base, *errors = errors_of(models, self.forecaster, self.segments)
+        changes = [(base - own) / step for own, step in zip(errors, steps, strict=True)]
         return self.seen(base, changes)
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:

@@ -45,7 +45,7 @@ def retest(
     """
 
     def left(model: Model) -> LeftOut:
-        return measured(setting.forecaster, setting.segments, model, yardstick, ~seen)
+        return measured(setting.forecaster, setting.segments, [model], yardstick, [~seen])[0]
 
     first, second, recording = left(before), left(after), setting.recording[~seen]
     wrong = None if control is None else left(control)

@@ -278,7 +278,7 @@ class TermColumn(EffectColumn):
             admissible=admissible, null=0.0,
         )  # fmt: skip
 
-    def at(self, coefficient: float) -> Effect:
+    def at(self, coefficient: float | Tensor) -> Effect:
         kind = TermMass if self.term.field == MASS else TermEffect
         return kind(coefficient=coefficient, term=self.term)
 

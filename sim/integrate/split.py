@@ -19,9 +19,10 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.inertia import effective, mean_normals
+from sim.integrate.abreast import Abreast
 from sim.integrate.implicit import BackwardEuler
 from sim.state import State
-from sim.system import System
+from sim.system import Drive, System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,30 +44,66 @@ class SplitEuler:
         plain = system.alone
         if not (system.extra or system.loads or system.ties):
             return self.base.advance(plain, state, duration)
-        steps = max(1, math.ceil(duration / self.base.step - 1e-9))
-        h = duration / steps
+        steps, h = self._steps(duration)
         for _ in range(steps):
-            state = self._step(system, plain, state, h)
+            drive = system.drive(state.time, state.time + h)
+            begun = replace(state, velocity=_pushed(system, state, drive, h), memory=())
+            state = _carried(system, state, self.base.stepped(plain, begun, drive, h), h)
         return state
 
-    def _step(self, system: System, plain: System, state: State, h: float) -> State:
-        x, v, time = state.position, state.velocity, state.time
-        mass = system.cloth.mass.unsqueeze(1)
-        drive = system.drive(time, time + h)
-        impulse = h * system.extra_force(drive, 0.0, time, x, v, memory=state.memory)
-        stiffness = system.tied(time, x)
-        resisting = mass if stiffness is None else mass + h * h * _pulling(stiffness)
-        if stiffness is not None:
-            pull = torch.stack([tie.force(system.cloth, time, x) for tie in system.ties]).sum(0)
-            impulse = impulse + h * pull - h * h * stiffness * v
-        begun = v + impulse / resisting
-        after = self.base.stepped(plain, State(position=x, velocity=begun, time=time), drive, h)
-        if system.loads:
-            normals = mean_normals(system.cloth, x)
-            added = system.added_mass
-            change = effective(mass * (after.velocity - v), mass=system.cloth.mass, added=added, normals=normals) / mass
-            after = replace(after, position=x + h * (v + change), velocity=v + change)
-        return replace(after, memory=system.remembered(state.memory, after.position))
+    def advance_abreast(self, batches: Abreast, state: State, duration: float) -> State:
+        """The same of batches abreast: their members move as they do in batches of their own.
+
+        Raises:
+            UsageError: as `advance`, or batches that cannot go abreast.
+        """
+        plain = batches.plain
+        steps, h = self._steps(duration)
+        for _ in range(steps):
+            drive = plain.drive(state.time, state.time + h)
+            parts = list(batches.parts(state))
+            velocity = state.velocity.clone()
+            for system, members, own in parts:
+                if system.extra or system.ties:
+                    velocity[..., members] = _pushed(system, own, drive.select(members), h)
+            after = self.base.stepped(plain, replace(state, velocity=velocity, memory=()), drive, h)
+            memory: list[Tensor] = []
+            for system, members, own in parts:
+                if system.loads or system.frictions:
+                    carried = _carried(system, own, after.select(members), h)
+                    after.position[..., members] = carried.position
+                    after.velocity[..., members] = carried.velocity
+                    memory += carried.memory
+            state = replace(after, memory=tuple(memory))
+        return state
+
+    def _steps(self, duration: float) -> tuple[int, float]:
+        """How many, and how long each is [s]."""
+        steps = max(1, math.ceil(duration / self.base.step - 1e-9))
+        return steps, duration / steps
+
+
+def _pushed(system: System, state: State, drive: Drive, h: float) -> Tensor:
+    """Velocity (vertex, 3, batch) [m/s] that the base model's step begins with."""
+    x, v, time = state.position, state.velocity, state.time
+    mass = system.cloth.mass.unsqueeze(1)
+    impulse = h * system.extra_force(drive, 0.0, time, x, v, memory=state.memory)
+    stiffness = system.tied(time, x)
+    if stiffness is None:
+        return v + impulse / mass
+    pull = torch.stack([tie.force(system.cloth, time, x) for tie in system.ties]).sum(0)
+    return v + (impulse + h * pull - h * h * stiffness * v) / (mass + h * h * _pulling(stiffness))
+
+
+def _carried(system: System, before: State, after: State, h: float) -> State:
+    """The end of a step, after the base model's: with air that moves along, and what frictions remember."""
+    if system.loads:
+        x, v = before.position, before.velocity
+        mass, normals = system.cloth.mass.unsqueeze(1), mean_normals(system.cloth, x)
+        change = mass * (after.velocity - v)
+        change = effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals) / mass
+        after = replace(after, position=x + h * (v + change), velocity=v + change)
+    return replace(after, memory=system.remembered(before.memory, after.position))
 
 
 def _pulling(stiffness: Tensor) -> Tensor:

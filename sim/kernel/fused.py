@@ -29,6 +29,9 @@ _BLOCKED = (
     "tie_stiffness", "tie_slack", "wind", "targets", "rate", "tie_targets", "tie_rate",
 )  # fmt: skip
 
+_FEW = 8
+"""Members that fit a narrow block: half of a wide one, with 0.6 (backward Euler) to 0.9 (leapfrog) of its time."""
+
 _CONTACT_POINTERS = ("face", "vertex_area", "centre", "apart", "group", "group_rest", "block")
 _CONTACT_SCALARS = ("thickness", "stiffness", "friction")
 
@@ -71,8 +74,8 @@ class _Lists:
         place: in memory.
     """
 
-    def __init__(self, code: ctypes.CDLL, dtype: torch.dtype, blocks: int) -> None:
-        make, drop = _function(code, "lists", dtype), _function(code, "drop", dtype)
+    def __init__(self, code: ctypes.CDLL, kind: str, blocks: int) -> None:
+        make, drop = _function(code, "lists", kind), _function(code, "drop", kind)
         make.restype, drop.restype = ctypes.c_void_p, None
         self.place = ctypes.c_void_p(make(ctypes.c_int64(blocks)))
         weakref.finalize(self, drop, self.place)
@@ -84,7 +87,7 @@ class Kernel:
 
     Attributes:
         batch: members.
-        dtype: of all numbers.
+        kind: of the functions: numbers and lanes.
         lanes: members of a block.
         blocks: how many blocks the batch takes; spare lanes of the last repeat its last member.
         tensors: what the kernel reads, kept alive here.
@@ -94,7 +97,7 @@ class Kernel:
 
     code: ctypes.CDLL
     batch: int
-    dtype: torch.dtype
+    kind: str
     lanes: int
     blocks: int
     problem: _Problem
@@ -119,7 +122,8 @@ class Kernel:
     @classmethod
     def _build(cls, system: System, code: ctypes.CDLL) -> Kernel:
         cloth = system.cloth
-        lanes = int(_function(code, "lanes", cloth.dtype)())
+        kind = _kind(system)
+        lanes = int(_function(code, "lanes", kind)())
         blocks = math.ceil(cloth.batch / lanes)
         inverse_mass = 1 / cloth.mass
         if system.clamped:
@@ -178,9 +182,9 @@ class Kernel:
             tensors["sweep_weights"] = torch.tensor(chebyshev_weights(system.limits.sweeps), dtype=cloth.dtype)
             problem.sweep_weights = tensors["sweep_weights"].data_ptr()
         return cls(
-            code=code, batch=cloth.batch, dtype=cloth.dtype, lanes=lanes, blocks=blocks, problem=problem,
+            code=code, batch=cloth.batch, kind=kind, lanes=lanes, blocks=blocks, problem=problem,
             tensors=tensors, tied=torch.cat([t.anchors for t in ties]) if ties else None,
-            lists=_Lists(code, cloth.dtype, blocks),
+            lists=_Lists(code, kind, blocks),
         )  # fmt: skip
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
@@ -246,7 +250,7 @@ class Kernel:
         return self.unpack(xb).masked_fill(lost, torch.nan), self.unpack(vb).masked_fill(lost, torch.nan)
 
     def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes._SimpleCData[Any]) -> None:
-        function = _function(self.code, name, self.dtype)
+        function = _function(self.code, name, self.kind)
         function.restype = None
         passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
         function(ctypes.byref(problem), ctypes.c_int64(self.blocks), *passed)
@@ -291,8 +295,19 @@ def _groups(points: NDArray[np.float64], width: int) -> NDArray[np.int64]:
 _KERNELS: weakref.WeakKeyDictionary[System, Kernel] = weakref.WeakKeyDictionary()
 
 
-def _function(code: ctypes.CDLL, name: str, dtype: torch.dtype) -> Any:
-    return getattr(code, f"{name}_f32" if dtype == torch.float32 else f"{name}_f64")
+def _function(code: ctypes.CDLL, name: str, kind: str) -> Any:
+    return getattr(code, f"{name}_{kind}")
+
+
+def _kind(system: System) -> str:
+    """Of the kernel's functions: by the type of the numbers, and with narrow blocks where members are few.
+
+    Contact adds forces up in groups as wide as a block: with it, blocks are as wide for few members as for many, so
+    that what one gets does not depend on their number.
+    """
+    if system.cloth.dtype == torch.float64:
+        return "f64"
+    return "f32_few" if system.cloth.batch <= _FEW and system.contact is None else "f32"
 
 
 def _to_blocks(tensor: Tensor, lanes: int, blocks: int) -> Tensor:

@@ -8,12 +8,24 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.errors import InputError
-from measure.loop.columns import THETA, AcrossColumn, Calibration, EffectColumn, FieldColumn, MotionColumn, winds
+from flagdata.errors import InputError, UsageError
+from measure.loop import forecast
+from measure.loop import model as model_module
+from measure.loop.columns import (
+    THETA,
+    AcrossColumn,
+    Calibration,
+    EffectColumn,
+    FieldColumn,
+    MotionColumn,
+    library,
+    winds,
+)
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.model import Model
+from measure.loop.model import Model, errors_of
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from measure.propose.terms import Term, columns_of
+from sim.integrate.abreast import Abreast
 
 NOMINAL = Calibration()
 
@@ -120,19 +132,52 @@ def test_calibration_sensitivities_are_those_of_their_parameters(
     assert float((errors - expected).norm() / errors.norm()) < 0.2
 
 
-def test_steps_side_by_side_are_those_taken_alone(forecaster: Forecaster, own_recording: Trajectory) -> None:
+def test_steps_abreast_are_those_taken_alone(
+    monkeypatch: pytest.MonkeyPatch, forecaster: Forecaster, own_recording: Trajectory
+) -> None:
     segments = Segments.of([own_recording])
     nominal = [Calibration(density=1.1)] * len(segments)
     columns = (
-        FieldColumn(axis=2, mode=(1, 0)), EffectColumn(effect="lift", parameter="coefficient", step=0.3),
-        MotionColumn(derivative=1, mode=(0, 0)), FieldColumn(axis=0, mode=(0, 1)), *winds(),
+        FieldColumn(axis=2, mode=(1, 0)), MotionColumn(derivative=1, mode=(0, 0)), FieldColumn(axis=0, mode=(0, 1)),
+        *winds(), *library(),
     )  # fmt: skip
+    # Some runs, not one: columns must not be lost between them.
+    monkeypatch.setattr(forecast, "WIDEST", 10 * len(segments))
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     together = forecaster.sensitivities(columns, segments, nominal, base)
     assert len(together) == len(THETA) + len(columns)
     for column, change in zip(columns, together[len(THETA) :], strict=True):
         alone = forecaster.sensitivity(column, segments, nominal, base)
         torch.testing.assert_close(change, alone, rtol=1e-9, atol=1e-12)
+
+
+def test_batches_that_are_not_of_one_cloth_do_not_go_abreast(forecaster: Forecaster, own_recording: Trajectory) -> None:
+    segments = Segments.of([own_recording])
+    system, state = forecaster.system(segments, [NOMINAL] * len(segments))
+    held = replace(system, handles=replace(system.handles, stiffness=2.0))
+    with pytest.raises(UsageError, match="differ in one of: handles"):
+        _ = Abreast.of([(system, state), (held, state)])[0].plain
+    finer = replace(system.cloth, gradients=2 * system.cloth.gradients)
+    with pytest.raises(UsageError, match="differ in mesh"):
+        _ = Abreast.of([(system, state), (replace(system, cloth=finer), state)])[0].plain
+    with pytest.raises(UsageError, match="different times"):
+        Abreast.of([(system, state), (system, replace(state, time=1.0))])
+
+
+def test_models_in_one_batch_leave_what_they_leave_alone(
+    monkeypatch: pytest.MonkeyPatch, forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    segments = Segments.of([own_recording])
+    lift = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
+    models = [
+        Model(calibration=Calibration(density=density), effects=((lift, strength),))
+        for density, strength in ((1.0, 0.0), (1.2, 0.5), (0.9, 0.8))
+    ]
+    monkeypatch.setattr(model_module, "WIDEST", 2 * len(segments))
+    together = errors_of(models, forecaster, segments)
+    for model, errors in zip(models, together, strict=True):
+        alone = forecaster.errors(*model.system(forecaster, segments), segments)
+        torch.testing.assert_close(errors, alone, rtol=1e-9, atol=1e-12)
 
 
 def test_members_of_a_batch_do_not_touch_one_another(forecaster: Forecaster, own_recording: Trajectory) -> None:

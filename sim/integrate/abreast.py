@@ -1,0 +1,90 @@
+"""Batches of one cloth, each with effects of its own, advanced as one: small batches cost nearly as much as large ones.
+
+What the base model lacks is computed batch by batch, the base model's step for all of them at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import torch
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from sim.cloth import Cloth
+from sim.state import State
+from sim.system import System
+from sim.wind import Wind
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Winds:
+    """The winds of batches, in order."""
+
+    parts: tuple[Wind, ...]
+
+    def velocity(self, time: float) -> Tensor:
+        """(3, batch) [m/s] at a time [s]."""
+        return torch.cat([part.velocity(time) for part in self.parts], dim=-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Abreast:
+    """Batches on one mesh, held alike.
+
+    Attributes:
+        systems: of the batches, in order.
+    """
+
+    systems: tuple[System, ...]
+
+    @classmethod
+    def of(cls, batches: Sequence[tuple[System, State]]) -> tuple[Abreast, State]:
+        """Batches with their starts, and the start of all: members in order, and what frictions remember.
+
+        Raises:
+            UsageError: none, or starts at different times.
+        """
+        if not batches or any(state.time != batches[0][1].time for _, state in batches):
+            raise UsageError("no batches, or of different times", where="abreast", fix="start all of them at once")
+        return cls(systems=tuple(system for system, _ in batches)), _joined([state for _, state in batches])
+
+    @cached_property
+    def plain(self) -> System:
+        """The base model of all, without ties and loads.
+
+        Raises:
+            UsageError: batches that differ in their mesh, handles, air, contact or strain limits.
+        """
+        parts = [system.alone for system in self.systems]
+        first = parts[0]
+        for part in parts:
+            shared = ("handles", "air", "contact", "limits")
+            if not torch.equal(part.held, first.held) or any(getattr(part, s) != getattr(first, s) for s in shared):
+                raise UsageError(
+                    f"batches that differ in one of: {', '.join(shared)}", where="abreast", fix="run them one by one"
+                )
+        return replace(
+            first, cloth=Cloth.joined([part.cloth for part in parts]), wind=_Winds(parts=tuple(p.wind for p in parts)),
+            gravity=torch.cat([part.gravity for part in parts], dim=-1),
+            anchors=torch.cat([part.anchors for part in parts], dim=-1),
+        )  # fmt: skip
+
+    def parts(self, state: State) -> Iterator[tuple[System, slice, State]]:
+        """Of every batch its system, its place among the members, and its state."""
+        memory, start = state.memory, 0
+        for system in self.systems:
+            members = slice(start, start + system.cloth.batch)
+            own, memory = memory[: len(system.frictions)], memory[len(system.frictions) :]
+            yield system, members, replace(state.select(members), memory=own)
+            start = members.stop
+
+
+def _joined(states: Sequence[State]) -> State:
+    return State(
+        position=torch.cat([state.position for state in states], dim=-1),
+        velocity=torch.cat([state.velocity for state in states], dim=-1),
+        time=states[0].time, memory=tuple(past for state in states for past in state.memory),
+    )  # fmt: skip
