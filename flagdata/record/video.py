@@ -33,12 +33,16 @@ class VideoEncoder:
 
     Args:
         height, width: of all frames [px]; even, as 4:2:0 asks.
+        rate_factor: x264's constant rate factor; smaller is better and larger in bytes.
+        preset: x264's name of how long it searches, "medium", "veryfast".
 
     Raises:
         InputError: odd sizes.
     """
 
-    def __init__(self, *, height: int, width: int) -> None:
+    def __init__(
+        self, *, height: int, width: int, rate_factor: float = CONSTANT_RATE_FACTOR, preset: str = "medium"
+    ) -> None:
         if height % 2 or width % 2:
             raise InputError(f"H.264 of {width}×{height} pixels", fix="use an even width and height, or JPEG")
         self._shape = (height, width)
@@ -49,8 +53,8 @@ class VideoEncoder:
         codec.gop_size, codec.max_b_frames, codec.thread_count = KEY_INTERVAL, 0, 1
         codec.color_range = ColorRange.JPEG
         codec.options = {
-            "crf": str(CONSTANT_RATE_FACTOR),
-            "preset": "medium",
+            "crf": f"{rate_factor:g}",
+            "preset": preset,
             "tune": "zerolatency",
             "x264-params": "cpu-independent=1:scenecut=0",
         }

@@ -23,7 +23,7 @@ from flagdata.ingest.anemometer.averaging import average
 from flagdata.record import messages
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
 from flagdata.record.output import Output
-from flagdata.record.video import VideoEncoder
+from flagdata.record.video import VideoEncoder, is_key
 from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
@@ -131,8 +131,8 @@ class RecordWriter:
             log_time: instant on the common clock [UTC ns]; greater than the last frame's.
             publish_time: instant on the camera's own clock [UTC ns].
             timestamp: mid-exposure on the common clock [UTC ns].
-            image: (height, width) uint8 gray, encoded here; or, where coding is JPEG, the bytes of a JPEG, kept as
-                they are.
+            image: (height, width) uint8 gray, encoded here; or the bytes of a JPEG or of an H.264 picture (Annex B,
+                the first a key frame), as the coding is, kept as they are.
 
         Raises:
             InputError: an array of another shape or type, bytes that are no JPEG, or time that does not increase.
@@ -230,7 +230,11 @@ class RecordWriter:
 
     def _picture(self, image: NDArray[np.uint8] | bytes) -> bytes:
         if isinstance(image, bytes):
-            raise InputError("an H.264 record takes arrays, not bytes", fix="decode the frame first")
+            if not image.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01")):
+                raise InputError("a frame's bytes are no H.264 picture", fix="give Annex B, or an array")
+            if TOPIC_IMAGE not in self._channels and not is_key(image):
+                raise InputError("the first H.264 picture is no key frame", fix="begin with one")
+            return image
         if self._video is None:
             _check_image(image)
             self._video = VideoEncoder(height=image.shape[0], width=image.shape[1])

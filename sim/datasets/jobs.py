@@ -87,15 +87,14 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
     member = crew.member(job.index)
     reading = anemometer.read(recipe.anemometer, crew, member, instrument=job.look, seed=job.seed, begin=job.begin)
     drawn = picture.settings(recipe.camera, seed=job.look)
-    slot = recipe.camera.frame_slot
     seen = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
-    frames, quality = picture.jpegs(seen, drawn, slot=slot, seed=job.seed)
-    drawn["camera.jpeg_quality"] = float(quality)
+    frames = picture.coded(seen, drawn, recipe.camera, seed=job.seed)
     parameters = parameters_of(member, zeta, {**reading.parameters, **drawn}, recipe.anemometer.truth)
     times = job.begin + sequence.time
     content = Content(
-        film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, slot=slot, frames=frames
-    )
+        film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, camera=recipe.camera,
+        frames=frames,
+    )  # fmt: skip
     return Filmed(
         film=job, data=record_bytes(content), start=int(times[0]), end=int(times[-1]),
         parameters=canonical({**parameters, **texts_of(member, zeta)}),

@@ -1,4 +1,4 @@
-"""From the renderer's colours to the camera's file: gray, noise, JPEG of a size that tells nothing."""
+"""From the renderer's colours to the camera's file: gray, noise, then JPEGs of a size that tells nothing, or H.264."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from flagdata.errors import InputError
-from flagdata.record.writer import encode_jpeg
+from flagdata.record.video import VideoEncoder
+from flagdata.record.writer import Coding, encode_jpeg
 from flagdata.rng import stream
 from sim.datasets.recipe import CameraSpec
 from sim.run.tables import Quantity, Range
 
 _END = b"\xff\xd9"  # the marker that ends a JPEG
+_PRESET = "veryfast"  # a fifth of the time of "medium", 5 % more bytes, 0.1 to 0.3 dB less
 _FILL = b"\xff"  # any marker may be preceded by fill bytes (ITU-T T.81, B.1.1.2)
 
 
@@ -24,11 +26,34 @@ def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
     def drawn(quantity: Quantity, name: str) -> float:
         return quantity.at(stream(seed, "camera", name).random()) if isinstance(quantity, Range) else quantity
 
+    if spec.coding is Coding.JPEG:
+        coding = {"camera.jpeg_quality": float(round(drawn(spec.jpeg_quality, "jpeg-quality")))}
+    else:
+        coding = {"camera.rate_factor": drawn(spec.rate_factor, "rate-factor")}
     return {
-        "camera.jpeg_quality": float(round(drawn(spec.jpeg_quality, "jpeg-quality"))),
+        **coding,
         "camera.read_noise": drawn(spec.read_noise, "read-noise"),
         "camera.shot_noise": drawn(spec.shot_noise, "shot-noise"),
     }
+
+
+def coded(frames: NDArray[np.uint8], drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
+    """Frames (n, height, width, 3) as the camera stores them, one message each.
+
+    Args:
+        drawn: of `settings`; where JPEGs take a lower quality to fit, it is changed to that.
+
+    Raises:
+        InputError: as `jpegs`, or an odd size for H.264.
+    """
+    if spec.coding is Coding.JPEG:
+        found, quality = jpegs(frames, drawn, slot=spec.frame_slot, seed=seed)
+        drawn["camera.jpeg_quality"] = float(quality)
+        return found
+    encoder = VideoEncoder(
+        height=frames.shape[1], width=frames.shape[2], rate_factor=drawn["camera.rate_factor"], preset=_PRESET
+    )
+    return [encoder.encode(gray) for gray in _noisy(frames, drawn, seed=seed)]
 
 
 def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed: int) -> tuple[list[bytes], int]:

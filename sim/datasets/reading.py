@@ -9,7 +9,8 @@ recording draws its own value.
                   prior's own width, height [px], raster-samples, cycles-samples
     [sides.NAME]  sequences, renders; sessions, where sequences are dealt to set-ups
     [sessions]    spread: of the winds of one session about its mean, as a share
-    [camera]      jpeg-quality, read-noise, shot-noise: quantities; frame-slot [B]
+    [camera]      coding = "jpeg" | "h264"; jpeg-quality or rate-factor, read-noise, shot-noise: quantities;
+                  frame-slot [B]
     [anemometer]  truth = "stated" | "measured"; rate [Hz], before [s], noise (a quantity), resolution, accuracy [m/s]
     [anemometer.effects.NAME]  parameters of a sensor effect: quantities; effects follow one another as in the file
 """
@@ -21,6 +22,7 @@ from pathlib import Path
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
+from flagdata.record.writer import Coding
 from flagdata.schema import TRUTH_WINDOW
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
@@ -143,12 +145,17 @@ def _sessions(table: Table) -> SessionSpec:
 
 
 def _camera(table: Table) -> CameraSpec:
+    coding = table.choice("coding", Coding.JPEG)
+    idle = "jpeg-quality" if coding is Coding.H264 else "rate-factor"
+    if idle in table:
+        raise InputError(f"{idle} says nothing of {coding.value}", where=table.where, fix="leave it out")
     spec = CameraSpec(
-        jpeg_quality=table.quantity("jpeg-quality", 90.0, least=1.0, most=100.0),
+        coding=coding, jpeg_quality=table.quantity("jpeg-quality", 90.0, least=1.0, most=100.0),
+        rate_factor=table.quantity("rate-factor", 20.0, least=0.0, most=51.0),
         read_noise=table.quantity("read-noise", 0.0, least=0.0, most=128.0),
         shot_noise=table.quantity("shot-noise", 0.0, least=0.0, most=128.0),
         frame_slot=table.whole("frame-slot", 32768, least=1),
-    )
+    )  # fmt: skip
     table.done()
     return spec
 

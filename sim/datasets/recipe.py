@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.provenance import canonical, digest, file_hash, recipe_hash
+from flagdata.record.writer import Coding
 from sim.assets.photos import Photos
 from sim.render.prior import RenderPrior
 from sim.run.recipe import Recipe as Simulation
@@ -50,13 +51,18 @@ class CameraSpec:
     """The camera behind the picture.
 
     Attributes:
-        jpeg_quality: 1 to 100; less where a frame would not fit into its slot.
+        coding: "jpeg", each frame by itself, or "h264", as field cameras do, in a tenth of the bytes.
+        jpeg_quality: 1 to 100; less where a frame would not fit into its slot. Of "jpeg" alone.
+        rate_factor: x264's constant rate factor, 0 to 51; smaller is better. Of "h264" alone.
         read_noise: standard deviation that does not depend on the light, in 8-bit steps.
         shot_noise: of a full-scale (255) pixel, in 8-bit steps; its square is in proportion to the light.
-        frame_slot: length of every stored frame, so that it tells nothing; see `sim.datasets.picture.jpegs` [B].
+        frame_slot: length of every stored JPEG, so that it tells nothing; see `sim.datasets.picture.jpegs`. Records
+            are a whole multiple of it long, those of H.264 too [B].
     """
 
+    coding: Coding
     jpeg_quality: Quantity
+    rate_factor: Quantity
     read_noise: Quantity
     shot_noise: Quantity
     frame_slot: int
@@ -138,7 +144,7 @@ class DatasetRecipe:
             "prior": self.prior.identity(),
             "photos": None if self.photos is None else _content(self.photos),
             "camera": {
-                "jpeg_quality": plain(camera.jpeg_quality), "read_noise": plain(camera.read_noise),
+                **_coding(camera), "read_noise": plain(camera.read_noise),
                 "shot_noise": plain(camera.shot_noise), "frame_slot": camera.frame_slot,
             },
             "anemometer": {
@@ -170,6 +176,12 @@ class DatasetRecipe:
 def side_filter(recipe: DatasetRecipe, side: str) -> str:
     """SQL over the catalog that takes one side: `ExplicitSplit(where={side: side_filter(recipe, side), …})`."""
     return f"name like '{recipe.name}-{side}-%'"
+
+
+def _coding(camera: CameraSpec) -> dict[str, Any]:
+    if camera.coding is Coding.JPEG:
+        return {"jpeg_quality": plain(camera.jpeg_quality)}
+    return {"coding": camera.coding.value, "rate_factor": plain(camera.rate_factor)}
 
 
 @cache

@@ -13,7 +13,7 @@ from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.signals import CameraInfo, Instants, WindSeries
 from flagdata.timebase import NANOSECONDS
 from sim.datasets.films import Film
-from sim.datasets.recipe import Truth
+from sim.datasets.recipe import CameraSpec, Truth
 from sim.render.parameters import RenderParameters
 from sim.run.members import Member, Parameter
 
@@ -29,11 +29,11 @@ class Content:
     Attributes:
         film: which.
         times: (n,) of the frames [UTC ns].
-        frames: their JPEGs.
+        frames: as the camera codes them.
         wind: the anemometer's samples.
         parameters: numbers by name, SI.
         zeta: what the picture was made with.
-        slot: the record's length is a whole multiple of this [B].
+        camera: its coding; the record's length is a whole multiple of its slot.
     """
 
     film: Film
@@ -42,7 +42,7 @@ class Content:
     wind: WindSeries
     parameters: Mapping[str, float]
     zeta: RenderParameters
-    slot: int
+    camera: CameraSpec
 
 
 def record_bytes(content: Content) -> bytes:
@@ -51,7 +51,7 @@ def record_bytes(content: Content) -> bytes:
         whole = Path(folder) / "whole.mcap"
         _write(Path(folder) / "bare.mcap", content, fill=0)
         size = (Path(folder) / "bare.mcap").stat().st_size
-        _write(whole, content, fill=-size % content.slot)
+        _write(whole, content, fill=-size % content.camera.frame_slot)
         return whole.read_bytes()
 
 
@@ -66,7 +66,8 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
         duration=(end - start) / NANOSECONDS, crop=(0, 0, zeta.width, zeta.height),
     )  # fmt: skip
     provenance = {"meshes": film.sequence, "recipe": canonical(row.recipe), "recipe_hash": recipe_hash(row.recipe)}
-    with RecordWriter(path, metadata={PROVENANCE: provenance, CAMERA: camera_metadata(camera)}) as record:
+    metadata = {PROVENANCE: provenance, CAMERA: camera_metadata(camera)}
+    with RecordWriter(path, metadata=metadata, coding=content.camera.coding) as record:
         for time, frame in zip(times.tolist(), content.frames, strict=True):
             record.frame(log_time=time, publish_time=time, timestamp=time, image=frame)
         record.wind(content.wind)
