@@ -12,9 +12,9 @@ from math import nan
 
 from flagdata.errors import InputError
 from flagdata.recipes import Shelf, parsed
+from flagdata.tables import Table
 from measure.cases.limit_cycle import StripRun
 from measure.cases.sheet import Sheet
-from sim.run.tables import Table
 
 CASES = Shelf(folder="cases", noun="case")
 

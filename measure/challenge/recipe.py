@@ -23,8 +23,8 @@ from typing import Any
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.recipes import Shelf, parsed
 from flagdata.registry import Registry
+from flagdata.tables import Range, Table
 from sim import material
-from sim.run.tables import Range, Table
 
 CHALLENGES = Shelf(folder="challenges", noun="challenge")
 

@@ -32,6 +32,7 @@ from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
 from flagdata.schema import Kind
+from flagdata.tables import Table
 from measure.observe import markers, meshes, wind
 from measure.observe.cloth import VERTICES, outline
 from measure.observe.experiment import Observed, observe
@@ -42,7 +43,6 @@ from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
 from sim.arcsim import read_material
 from sim.material import MATERIALS, Material, named
-from sim.run.tables import Table
 
 
 @dataclass(frozen=True, kw_only=True)

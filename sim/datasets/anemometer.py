@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
+from flagdata.tables import Quantity, Range
 from flagdata.timebase import NANOSECONDS
 from sim.datasets.reading import changing
 from sim.datasets.recipe import AnemometerSpec
 from sim.effects import SENSOR_EFFECTS
 from sim.effects.sensor import AnemometerEffect
 from sim.run.members import Crew, Member
-from sim.run.tables import Quantity, Range
 
 _FINE = 10.0  # Hz, at which the air is sampled and the instrument's response computed
 _NAME = "simulated"

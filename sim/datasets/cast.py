@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 
 from flagdata.errors import RefusedError
 from flagdata.rng import child_seed
+from flagdata.tables import Range
 from sim.datasets.recipe import DatasetRecipe, SessionSpec, Side
 from sim.run.members import Crew
 from sim.run.publish import member_artifact
 from sim.run.recipe import MaterialSpec
 from sim.run.recipe import Recipe as Simulation
-from sim.run.tables import Range
 
 
 @dataclass(frozen=True, kw_only=True)

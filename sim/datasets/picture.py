@@ -12,8 +12,8 @@ from flagdata.errors import InputError
 from flagdata.record.video import VideoEncoder
 from flagdata.record.writer import Coding, encode_jpeg
 from flagdata.rng import stream
+from flagdata.tables import Quantity, Range
 from sim.datasets.recipe import CameraSpec
-from sim.run.tables import Quantity, Range
 
 _END = b"\xff\xd9"  # the marker that ends a JPEG
 _PRESET = "veryfast"  # a fifth of the time of "medium", 5 % more bytes, 0.1 to 0.3 dB less

@@ -24,6 +24,7 @@ from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
 from flagdata.record.writer import Coding
 from flagdata.schema import TRUTH_WINDOW
+from flagdata.tables import Quantity, Table
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from sim.effects.effect import FlowEffect, WindEffect
@@ -33,7 +34,6 @@ from sim.render import prior as priors
 from sim.render.prior import RenderPrior
 from sim.run import Recipe as Simulation
 from sim.run import load as load_simulation
-from sim.run.tables import Quantity, Table
 
 DATASETS = Shelf(folder="datasets", noun="data set")
 SIDES = ("train", "validation", "test")

@@ -11,10 +11,10 @@ from typing import Any
 
 from flagdata.provenance import canonical, digest, file_hash, recipe_hash
 from flagdata.record.writer import Coding
+from flagdata.tables import Quantity, plain
 from sim.assets.photos import Photos
 from sim.render.prior import RenderPrior
 from sim.run.recipe import Recipe as Simulation
-from sim.run.tables import Quantity, plain
 
 RECIPE_VERSION = 2
 """Raised whenever the same recipe makes other bytes."""

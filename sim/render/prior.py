@@ -10,9 +10,9 @@ from typing import Any
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.recipes import Shelf, parsed
 from flagdata.rng import stream
+from flagdata.tables import Quantity, Range, Table, ends, plain
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
-from sim.run.tables import Quantity, Range, Table, ends, plain
 
 PRIORS = Shelf(folder="renders", noun="render prior")
 _DEGREES = "-deg"  # suffix of a key whose values are in degrees

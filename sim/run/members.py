@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream
+from flagdata.tables import Quantity, Range, ends
 from sim import handles as held
 from sim.effects import EFFECTS, Effect, apply
 from sim.effects.gusts import Gusts
@@ -20,7 +21,6 @@ from sim.handles import Handles
 from sim.material import BENDING_SHAPE, Material
 from sim.mesh import Mesh, grid
 from sim.run.recipe import Attachment, EffectSpec, MaterialSpec, Recipe, SceneSpec, Shape
-from sim.run.tables import Quantity, Range, ends
 from sim.scene import Scene, assemble, upright
 from sim.state import State
 from sim.system import System

@@ -33,6 +33,7 @@ from typing import Any
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed
+from flagdata.tables import Quantity, Range, Table
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
@@ -56,7 +57,6 @@ from sim.run.recipe import (
     TimeSpec,
     WindSpec,
 )  # fmt: skip
-from sim.run.tables import Quantity, Range, Table
 from sim.scene import GRAVITY
 from sim.tables import Evaluation
 

@@ -14,6 +14,7 @@ from typing import Any
 import torch
 
 from flagdata.provenance import canonical, digest
+from flagdata.tables import Quantity, plain
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import ArcsimScene
 from sim.contact import Contact
@@ -21,7 +22,6 @@ from sim.handles import ARCSIM_STIFFNESS
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
-from sim.run.tables import Quantity, plain
 from sim.tables import Evaluation
 
 DTYPES: Mapping[str, torch.dtype] = {"float32": torch.float32, "float64": torch.float64}

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import pytest
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.tables import Range, ends
 from sim.datasets.cast import casts
 from sim.datasets.reading import DATASETS, load, parse, with_renderer
 from sim.datasets.recipe import DatasetRecipe, Truth
-from sim.run.tables import Range, ends
 
 Make = Callable[..., DatasetRecipe]
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.tables import Range
 from sim.assets import BACKGROUNDS, TEXTURES, Assets
 from sim.render import prior as priors
 from sim.render.parameters import RenderParameters
-from sim.run.tables import Range
 
 DRAWS = 150
 

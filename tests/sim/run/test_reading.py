@@ -11,6 +11,7 @@ import pytest
 
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical
+from flagdata.tables import Range, Scale
 from sim.air import QuadraticNormal, Stokes
 from sim.arcsim import STAGES
 from sim.contact import Contact
@@ -19,7 +20,6 @@ from sim.limits import StrainLimits
 from sim.run.members import Crew
 from sim.run.reading import SCENES, load, parse
 from sim.run.recipe import Shape
-from sim.run.tables import Range, Scale
 
 MINIMAL = '[material]\nname = "camel-ponte-roma"\n[wind]\nspeed = 4.0\n'
 

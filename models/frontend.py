@@ -1,0 +1,224 @@
+"""From a clip's pixels to maps of what moves: Gaussian in time, derivatives in space, half the size, a spectrum a pixel.
+
+Runia et al. 2020, section 4.3: a Gaussian of σ = 1 frame, first Gaussian derivatives of σ = 2 px along x and y, maximum
+pooling by two, the spectral decomposition layer. All but the pooling is linear, so that the filters are products with
+banded matrices (`models.filters`) and the spectrum is one product with a matrix of (mean removal, Hann window, discrete
+Fourier transform). `models.spectral.periodogram` is the definition that tests hold this to.
+
+From the same spectra come two kinds of maps:
+
+- *spectral maps* (4, H/2, W/2), what the paper's network takes: the largest power of each derivative, then its frequency;
+- *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.wave` takes: two peaks, power by band, the spectrum's centre and
+  width, the gradient of the phase at the strongest frequency with its coherence (a travelling wave's wave number), and
+  what the clip looks like at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from flagdata.errors import InputError
+from flagdata.provenance import canonical, digest
+from models.filters import derivatives, smoothing_matrix
+
+Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps"]
+"""What a front end gives: standardised frames, or one of the two kinds of maps."""
+
+BANDS = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.32), (0.32, 0.52), (0.52, 1.0))
+"""Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins in (low, high]."""
+_OF_EACH = (
+    "peak 1 log power", "peak 2 log power", "peak 1 frequency", "peak 2 frequency", "log power", "centre", "width",
+    *(f"band {low:g}-{high:g} log power" for low, high in BANDS),
+    "phase gradient x", "phase gradient y", "coherence x", "coherence y",
+)  # fmt: skip
+WAVE_CHANNELS = (
+    *(f"d/d{axis}: {name}" for axis in "xy" for name in _OF_EACH),
+    "mean picture", "log of its slope", "log standard deviation in time",
+)  # fmt: skip
+"""Names of the wave maps, in order. Frequencies are shares of the Nyquist frequency, phase gradients shares of π a
+pixel of the pooled picture; powers are log(1 + I), I as in `periodogram` of standardised frames."""
+_TINY = 1e-12
+_VERSION = 1
+"""Raised whenever the same clip gives other maps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontEnd:
+    """The filters and what is taken from the spectra.
+
+    Attributes:
+        maps: what it gives.
+        size: height and width of the clips it takes [px]; a whole multiple of 4.
+        frames: their length.
+        rate: their frames a second [Hz].
+        temporal_sigma: of the Gaussian in time [frames].
+        spatial_sigma: of the derivatives [px].
+
+    Raises:
+        InputError: fewer than four frames, a size that is no multiple of 4, or a rate or width that is not above 0.
+    """
+
+    maps: Maps
+    size: int = 224
+    frames: int = 30
+    rate: float = 25.0
+    temporal_sigma: float = 1.0
+    spatial_sigma: float = 2.0
+
+    def __post_init__(self) -> None:
+        if self.frames < 4 or self.size < 4 or self.size % 4:
+            raise InputError(
+                f"{self.frames} frames of {self.size} px", fix="give 4 frames or more, and a multiple of 4 px"
+            )
+        if not min(self.rate, self.temporal_sigma, self.spatial_sigma) > 0:
+            raise InputError(
+                f"rate {self.rate:g} Hz, σ of {self.temporal_sigma:g} frames and {self.spatial_sigma:g} px",
+                fix="give values above 0",
+            )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of what is given for one clip."""
+        if self.maps == "frames":
+            return (1, self.frames, self.size, self.size)
+        if self.maps == "spectral-maps":
+            return (4, self.size // 2, self.size // 2)
+        return (len(WAVE_CHANNELS), self.size // 4, self.size // 4)
+
+    @property
+    def hash(self) -> str:
+        """Names the front end; two with the same hash give the same maps."""
+        return digest(canonical({"version": _VERSION, **asdict(self)}))[:16]
+
+    def __call__(self, clips: Tensor) -> Tensor:
+        """Maps of clips, float32: (batch, *shape).
+
+        Each clip is standardised first: less its mean, over its standard deviation.
+
+        Args:
+            clips: (batch, 1, time, height, width), uint8 or floating.
+
+        Raises:
+            InputError: clips of another shape.
+        """
+        expected = (1, self.frames, self.size, self.size)
+        if clips.ndim != 5 or tuple(clips.shape[1:]) != expected:
+            raise InputError(
+                f"clips of shape {tuple(clips.shape[1:])}", fix=f"give (channel, time, height, width) = {expected}"
+            )
+        return torch.stack([self._one(clip[0]) for clip in clips])
+
+    def _one(self, clip: Tensor) -> Tensor:
+        frames = standardised(clip)
+        if self.maps == "frames":
+            return frames.unsqueeze(0)
+        smooth = self._temporal.to(frames)
+        slopes = derivatives((smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma)
+        pooled = torch.stack([_half(slope) for slope in slopes])  # (2, time, H/2, W/2)
+        real, imaginary = self._fourier.to(frames)
+        flat, picture = pooled.flatten(2), pooled.shape[2:]
+        spectra = (real @ flat).unflatten(2, picture), (imaginary @ flat).unflatten(2, picture)
+        if self.maps == "spectral-maps":
+            return self._peaks(spectra)
+        return torch.cat([self._waves(spectra), _at_rest(frames)])
+
+    @cached_property
+    def _temporal(self) -> Tensor:
+        """(time, time)."""
+        return smoothing_matrix(self.frames, self.temporal_sigma).float()
+
+    @cached_property
+    def _fourier(self) -> Tensor:
+        """(2, time // 2, time): real and imaginary part of the windowed transform over √N_t, the bin at zero left out."""
+        count = self.frames
+        window = torch.hann_window(count, periodic=True, dtype=torch.float64)
+        window = window * (count / window.square().sum()).sqrt() / math.sqrt(count)
+        turn = 2 * math.pi * torch.arange(1, count // 2 + 1, dtype=torch.float64)[:, None] / count
+        phase = turn * torch.arange(count)
+        rows = torch.stack([phase.cos(), -phase.sin()]) * window
+        return (rows - rows.mean(dim=2, keepdim=True)).float()
+
+    def _peaks(self, spectra: tuple[Tensor, Tensor]) -> Tensor:
+        real, imaginary = spectra
+        power, index = (real.square() + imaginary.square()).max(dim=1)
+        frequency = (index + 1).to(power.dtype) * (self.rate / self.frames)
+        return torch.cat([power, frequency])
+
+    def _waves(self, spectra: tuple[Tensor, Tensor]) -> Tensor:
+        real, imaginary = spectra  # (2, bin, h, w)
+        power = _sum_of_four(real.square() + imaginary.square()) / 4
+        bins = power.shape[1]
+        share = torch.arange(1, bins + 1, device=power.device, dtype=power.dtype) / (self.frames / 2)
+        total = power.sum(dim=1)
+        weight = share[:, None, None]
+        centre = (power * weight).sum(dim=1) / (total + _TINY)
+        width = ((power * weight.square()).sum(dim=1) / (total + _TINY) - centre.square()).clamp(min=0).sqrt()
+        peaks, places = power.topk(min(2, bins), dim=1)
+        banded = [power[:, (share > low) & (share <= high)].sum(dim=1).log1p() for low, high in BANDS]
+        found = [peaks.log1p(), share[places], torch.stack([total.log1p(), centre, width], dim=1)]
+        found += [torch.stack(banded, dim=1), _phases(real, imaginary, places[:, :1])]
+        return torch.cat(found, dim=1).flatten(0, 1)
+
+
+def standardised(clip: Tensor) -> Tensor:
+    """A clip less its mean, over its standard deviation, float32; one without contrast is 0 everywhere."""
+    frames = clip.float()
+    frames = frames - frames.mean()
+    flat = frames.flatten()
+    return frames / (flat.dot(flat) / len(flat)).sqrt().clamp(min=1e-6)  # a fifth of the time of torch.std_mean
+
+
+def _half(slope: Tensor) -> Tensor:
+    """Maximum pooling by two along the last two axes."""
+    rows = torch.maximum(slope[..., 0::2, :], slope[..., 1::2, :])
+    return torch.maximum(rows[..., 0::2], rows[..., 1::2])
+
+
+def _sum_of_four(values: Tensor) -> Tensor:
+    rows = values[..., 0::2, :] + values[..., 1::2, :]
+    return rows[..., 0::2] + rows[..., 1::2]
+
+
+def _phases(real: Tensor, imaginary: Tensor, place: Tensor) -> Tensor:
+    """(2, 4, h/2, w/2): phase gradient along x and y [π a pixel] at bin `place` (2, 1, h/2, w/2), and their coherence.
+
+    Along x it is the angle of C = Σ F(x + 1, y) F*(x, y) over the two pairs of neighbours in each two by two pixels, and
+    the coherence is |C|/√(Σ|F(x + 1)|² Σ|F(x)|²), 1 for a plane wave.
+    """
+    corners = [
+        (part[..., row::2, column::2].gather(1, place).squeeze(1))
+        for part in (real, imaginary)
+        for row in (0, 1)
+        for column in (0, 1)
+    ]  # real at (0,0), (0,1), (1,0), (1,1), imaginary likewise
+    (a, b, c, d), (e, f, g, h) = corners[:4], corners[4:]
+    power = [re.square() + im.square() for re, im in ((a, e), (b, f), (c, g), (d, h))]
+
+    def crossed(one: tuple[Tensor, Tensor], other: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        return one[0] * other[0] + one[1] * other[1], one[1] * other[0] - one[0] * other[1]
+
+    def along(pairs: list[tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]], norm: Tensor) -> tuple[Tensor, Tensor]:
+        crosses = [crossed(later, earlier) for later, earlier in pairs]
+        re, im = crosses[0][0] + crosses[1][0], crosses[0][1] + crosses[1][1]
+        return torch.atan2(im, re) / math.pi, (re.square() + im.square()).sqrt() / (norm.sqrt() + _TINY)
+
+    x = along([((b, f), (a, e)), ((d, h), (c, g))], (power[1] + power[3]) * (power[0] + power[2]))
+    y = along([((c, g), (a, e)), ((d, h), (b, f))], (power[2] + power[3]) * (power[0] + power[1]))
+    return torch.stack([x[0], y[0], x[1], y[1]], dim=1)
+
+
+def _at_rest(frames: Tensor) -> Tensor:
+    """(3, H/4, W/4) of the frames at a quarter of their size: the mean, the log of its slope, and of the standard
+    deviation in time."""
+    spread, mean = torch.std_mean(functional.avg_pool2d(frames, 4), dim=0, correction=0)
+    slope = torch.zeros_like(mean)
+    slope[:, 1:-1] = (mean[:, 2:] - mean[:, :-2]).square()
+    slope[1:-1] += (mean[2:] - mean[:-2]).square()
+    return torch.stack([mean, (slope.sqrt() * 10).log1p(), (spread * 10).log1p()])
