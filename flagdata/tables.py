@@ -112,6 +112,10 @@ class Table:
             raise self._wrong(key, value, f"a whole number of at least {least}")
         return value
 
+    def value(self, key: str) -> Any:
+        """Whatever stands there, for who checks it by rules of its own; None if it is not there."""
+        return self._take(key, None)
+
     def text(self, key: str, default: str | None) -> str | None:
         value = self._take(key, default)
         if value is not None and not isinstance(value, str):

@@ -7,7 +7,9 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
 from flagdata.dataset.cache import DecodedCache
@@ -89,6 +91,18 @@ class Pairs(Dataset[Sample]):
             start=int(table.start[index]),
             end=int(table.end[index]),
         )
+
+    def film(self, index: int) -> NDArray[np.uint8]:
+        """All frames of the recording that the pair at `index` is of: (frames, height, width) gray.
+
+        Raises:
+            IndexError: beyond the last pair.
+            CorruptError: its frames cannot be read.
+        """
+        if not 0 <= index < len(self.table):
+            raise IndexError(f"pair {index} of {len(self.table)}")
+        record = self._record(int(self.table.object[index]))
+        return record.frames(0, record.frame_count)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_open"}

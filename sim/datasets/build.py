@@ -142,13 +142,14 @@ class Build:
     # Films
 
     def films(self, rolls: Iterable[Roll]) -> list[Film]:
-        """All films of the data set, in the order they are made in."""
+        """All films of the data set, in the order they are made in: the small sides first, so that what a training is
+        judged by is there while its own side still grows."""
         members: dict[str, list[tuple[Cast, int, str]]] = {side.name: [] for side in self.recipe.sides}
         for roll in rolls:
             members[roll.cast.side.name] += [(roll.cast, index, roll.id(index)) for index in roll.chosen]
         return [
             film
-            for side, own in members.items()
+            for side, own in sorted(members.items(), key=lambda item: self.recipe.side(item[0]).renders)
             for film in Sequences(recipe=self.recipe, side=side, members=tuple(own)).films()
         ]
 

@@ -1,0 +1,124 @@
+"""A network with its head: what is trained, stored and loaded as one."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import torch
+from torch import Tensor, nn
+
+from flagdata.errors import InputError
+from models.losses import contrastive_loss
+from models.mixture import Mixture, MixtureHead
+from models.targets import Scaling
+
+
+class Loss(StrEnum):
+    """What is made small."""
+
+    REGRESSION = "regression"
+    """The squared error of standardised targets, as the paper's tables of wind speed."""
+    POSTERIOR = "posterior"
+    """The negative log-likelihood of a mixture of Gaussians over the targets' logits."""
+    CONTRASTIVE = "contrastive"
+    """The paper's contrastive loss over all pairs of a batch."""
+
+
+class Learner(nn.Module):
+    """Inputs to a loss, and to what is said of clips.
+
+    Args:
+        network: of `models.registry.NETWORKS`.
+        loss: what is made small; it decides the head: none, a linear layer, a mixture.
+        targets: names of `models.targets.TARGETS`; none for the contrastive loss.
+        components: of the mixture.
+        margin: of the contrastive loss.
+    """
+
+    centre: Tensor
+    spread: Tensor
+
+    def __init__(
+        self, network: nn.Module, *, loss: Loss, targets: tuple[str, ...], components: int = 6, margin: float = 1.0
+    ) -> None:
+        super().__init__()
+        if (loss is Loss.CONTRASTIVE) == bool(targets):
+            raise InputError(
+                f"the {loss.value} loss with {len(targets)} targets",
+                fix="give targets to all losses but the contrastive",
+            )
+        self.network = network
+        self.objective = loss
+        self.scaling = Scaling(names=targets)
+        self.margin = margin
+        dimension = int(network.dimension)  # pyright: ignore[reportArgumentType]
+        self.head: nn.Module = nn.Identity()
+        if loss is Loss.REGRESSION:
+            self.head = nn.Linear(dimension, len(targets))
+        elif loss is Loss.POSTERIOR:
+            self.head = MixtureHead(dimension=dimension, targets=len(targets), components=components)
+        self.register_buffer("centre", torch.zeros(len(targets)))
+        self.register_buffer("spread", torch.ones(len(targets)))
+
+    def fit_scale(self, values: Tensor) -> None:
+        """Take mean and deviation of what is learned from the training set's targets (n, target).
+
+        Raises:
+            InputError: a target that is the same in all of it.
+        """
+        learned = self._learned(values)
+        spread, centre = torch.std_mean(learned, dim=0, correction=0)
+        if not bool((spread > 0).all()):
+            raise InputError(
+                "a target has one value in the whole training set", where=", ".join(self.scaling.names),
+                fix="leave it out, or widen its range in the data set",
+            )  # fmt: skip
+        self.centre.copy_(centre)
+        self.spread.copy_(spread)
+
+    def loss(self, inputs: Tensor, values: Tensor, sequence: Tensor) -> Tensor:
+        """The mean loss of a batch: a scalar.
+
+        Args:
+            inputs: as the network takes them.
+            values: (n, target) in the targets' units.
+            sequence: (n,) seeds of the simulations.
+
+        Raises:
+            InputError: a contrastive batch without two clips of one simulation.
+        """
+        embedding = self.network(inputs).float()
+        if self.objective is Loss.CONTRASTIVE:
+            return contrastive_loss(embedding, sequence, margin=self.margin, positive_share=0.5)
+        wanted = (self._learned(values) - self.centre) / self.spread
+        if self.objective is Loss.REGRESSION:
+            return (self.head(embedding) - wanted).square().mean()
+        return -self.head(embedding).log_prob(wanted).mean()
+
+    def told(self, embedding: Tensor) -> Tensor:
+        """(n, target) values of a regression's embeddings, or the means of a posterior's components."""
+        found = self.head(embedding)
+        if isinstance(found, Mixture):
+            found = found.mean()
+        return self._values(found * self.spread + self.centre)
+
+    def mixture(self, embedding: Tensor) -> Mixture:
+        """The distributions over standardised logits.
+
+        Raises:
+            InputError: a learner of another loss.
+        """
+        if self.objective is not Loss.POSTERIOR:
+            raise InputError(f"a {self.objective.value} gives no distribution", fix="take a model of a posterior loss")
+        return self.head(embedding)
+
+    def draws(self, embedding: Tensor, count: int, generator: torch.Generator) -> Tensor:
+        """(n, count, target) draws of the distributions, in the targets' units."""
+        drawn = self.mixture(embedding).sample(count, generator)
+        return self._values(drawn * self.spread + self.centre)
+
+    def _learned(self, values: Tensor) -> Tensor:
+        return self.scaling.learned(values) if self.objective is Loss.POSTERIOR else values.float()
+
+    def _values(self, learned: Tensor) -> Tensor:
+        return self.scaling.values(learned) if self.objective is Loss.POSTERIOR else learned

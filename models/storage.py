@@ -1,0 +1,71 @@
+"""Models as folders: weights in safetensors, a card in JSON. Nothing in them is executed when they are read.
+
+card.json            what it is: recipe, data, seeds, scores, limits; "format" is `FORMAT`
+weights.safetensors  the learner's parameters and buffers
+…                    more tensors or pictures, by whoever writes it
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from flagdata.errors import CorruptError, NotFoundError
+
+FORMAT = "flagdata.network/1"
+CARD = "card.json"
+WEIGHTS = "weights.safetensors"
+
+
+def write_card(folder: Path, card: Mapping[str, Any]) -> None:
+    """Write the card of a model."""
+    text = json.dumps({"format": FORMAT, **card}, indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / CARD).write_text(text + "\n")
+
+
+def read_card(folder: Path) -> dict[str, Any]:
+    """The card of the model in a folder.
+
+    Raises:
+        NotFoundError: there is none.
+        CorruptError: it is damaged, or of another format.
+    """
+    path = folder / CARD
+    try:
+        card = json.loads(path.read_text())
+    except FileNotFoundError:
+        raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model") from None
+    except (ValueError, OSError) as error:
+        raise CorruptError(f"the model's card cannot be read: {error}", where=str(path), fix=_AGAIN) from None
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise CorruptError("the card is of another format", where=str(path), fix=_AGAIN)
+    return card
+
+
+def write_tensors(path: Path, tensors: Mapping[str, Tensor]) -> None:
+    """Write tensors by name; each is copied, so that views are stored whole."""
+    save_file({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}, path)
+
+
+def read_tensors(path: Path) -> dict[str, Tensor]:
+    """Tensors by name.
+
+    Raises:
+        NotFoundError: no such file.
+        CorruptError: it is cut off or damaged.
+    """
+    if not path.is_file():
+        raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
+    try:
+        return load_file(path)
+    except (SafetensorError, OSError, ValueError) as error:
+        raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None
+
+
+_AGAIN = "restore it from a copy, or train again"

@@ -1,0 +1,128 @@
+"""Where a training stands: all that the steps still to come depend on, in one folder that is replaced as a whole.
+
+A checkpoint holds the learner, Adam's moments, the best learner so far, the course of the losses, and the cursor of the
+batches. It is written beside the last one and renamed, so that a kill or a full disk leaves the last good one.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from flagdata.errors import CorruptError, FlagdataError, RefusedError
+from models.learner import Learner
+from models.storage import WEIGHTS, read_card, read_tensors, write_card, write_tensors
+from models.training.progress import Course
+
+_LAST = "last"
+_NEXT = "next"
+_BEFORE = "before"
+_BEST = "best.safetensors"
+_MOMENTS = "moments.safetensors"
+_KINDS = ("exp_avg", "exp_avg_sq", "step")
+
+
+@dataclass(kw_only=True)
+class Standing:
+    """Attributes:
+    learner: as it is now.
+    best: its state at the best validation loss; None before the first epoch's end.
+    optimiser: Adam.
+    course: of the losses.
+    batches: state of the batches still to come.
+    running: sum of the losses of the epoch that is under way, and how many steps it has had.
+    """
+
+    learner: Learner
+    best: dict[str, Tensor] | None
+    optimiser: torch.optim.Optimizer
+    course: Course
+    batches: dict[str, Any]
+    running: tuple[float, int] = (0.0, 0)
+
+
+def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
+    """Replace the checkpoint in `folder`.
+
+    Raises:
+        FlagdataError: the disk refuses it; the last checkpoint is as it was.
+    """
+    fresh, last, before = folder / _NEXT, folder / _LAST, folder / _BEFORE
+    try:
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        write_tensors(fresh / WEIGHTS, standing.learner.state_dict())
+        if standing.best is not None:
+            write_tensors(fresh / _BEST, standing.best)
+        write_tensors(fresh / _MOMENTS, _moments(standing))
+        card = {
+            "identity": identity, "course": standing.course.as_list(), "batches": standing.batches,
+            "running": list(standing.running),
+        }  # fmt: skip
+        write_card(fresh, card)
+        shutil.rmtree(before, ignore_errors=True)
+        if last.exists():
+            last.rename(before)
+        fresh.rename(last)
+        shutil.rmtree(before, ignore_errors=True)
+    except (OSError, RuntimeError) as error:  # safetensors reports a full disk as its own RuntimeError or OSError
+        raise FlagdataError(
+            f"writing the checkpoint failed: {error}", where=str(folder),
+            fix="free some space and give the command again: it goes on from the last checkpoint",
+        ) from error  # fmt: skip
+
+
+def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bool:
+    """Bring `standing` to where the checkpoint in `folder` was taken; False where there is none.
+
+    Raises:
+        RefusedError: it is of another recipe or of other data.
+        CorruptError: it is damaged.
+    """
+    last = folder / _LAST
+    if not last.exists() and (folder / _BEFORE).exists():  # killed between the two renames
+        last = folder / _BEFORE
+    if not last.exists():
+        return False
+    card = read_card(last)
+    stored = json.loads(json.dumps(identity))
+    different = [name for name in stored if card.get("identity", {}).get(name) != stored[name]]
+    if different:
+        raise RefusedError(
+            f"the checkpoint is of another training: {', '.join(different)} differ", where=str(last),
+            fix="name another folder by --run, or delete this one",
+        )  # fmt: skip
+    try:
+        standing.learner.load_state_dict(read_tensors(last / WEIGHTS))
+        _take_moments(standing, read_tensors(last / _MOMENTS))
+        standing.best = read_tensors(last / _BEST) if (last / _BEST).exists() else None
+        standing.course = Course.of(card["course"])
+        standing.batches = card["batches"]
+        standing.running = (float(card["running"][0]), int(card["running"][1]))
+    except (KeyError, TypeError, RuntimeError, IndexError) as error:
+        raise CorruptError(
+            f"the checkpoint does not fit its recipe: {error}", where=str(last), fix="delete it and train again"
+        ) from None
+    return True
+
+
+def _moments(standing: Standing) -> dict[str, Tensor]:
+    """Adam's state by parameter, "0.exp_avg" …"""
+    state = standing.optimiser.state_dict()["state"]
+    return {f"{index}.{kind}": values[kind] for index, values in state.items() for kind in _KINDS if kind in values}
+
+
+def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
+    state = standing.optimiser.state_dict()
+    found: dict[int, dict[str, Tensor]] = {}
+    for name, tensor in tensors.items():
+        index, _, kind = name.partition(".")
+        found.setdefault(int(index), {})[kind] = tensor
+    state["state"] = found
+    standing.optimiser.load_state_dict(state)

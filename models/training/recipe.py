@@ -1,0 +1,275 @@
+"""What is trained on what, as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+
+title, seed
+[data]       dataset: a data set's name, whose sides are told by names; sequences: of the training side, all by default
+[input]      maps: "frames", "spectral-maps" or "wave-maps"; size [px], frames; scales, mirror: of crops;
+             variants: crops of each film that are prepared
+[network]    name: of `models.registry.NETWORKS`; its other keys are the network's own
+[loss]       name: "regression", "posterior" or "contrastive"; targets: of `models.targets`; components, margin
+[optimiser]  rate, decay, batch, epochs; schedule: "steps" or "cosine"; drop-after: epochs; clip-norm; precision:
+             "float32" or "bfloat16"; patience: epochs without a better validation loss, after which it ends
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.provenance import recipe_hash
+from flagdata.recipes import Shelf, parsed
+from flagdata.tables import Table
+from models.crops import Cropping
+from models.frontend import FrontEnd, Maps
+from models.learner import Learner, Loss
+from models.registry import NETWORKS
+from models.targets import TARGETS
+
+TRAININGS = Shelf(folder="training", noun="training recipe")
+RECIPE_VERSION = 1
+"""Raised whenever the same recipe and data give other weights."""
+_MAPS: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps")
+
+
+class Schedule(StrEnum):
+    """How the learning rate falls."""
+
+    STEPS = "steps"
+    """To a tenth after so many epochs, as the paper's."""
+    COSINE = "cosine"
+    """From a twentieth up to the full rate within the first twentieth of the steps, then down as a cosine."""
+
+
+class Precision(StrEnum):
+    """What networks compute in."""
+
+    FLOAT32 = "float32"
+    BFLOAT16 = "bfloat16"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataSpec:
+    """Attributes:
+    dataset: name of the data set; its sides are told by names.
+    sequences: of the training side that are used; None for all.
+    """
+
+    dataset: str
+    sequences: int | None = None
+
+    def where(self, side: str) -> str:
+        """SQL over the catalog that takes a side."""
+        return f"name like '{self.dataset}-{side}-%'"
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkSpec:
+    """Attributes:
+    name: of `NETWORKS`.
+    options: what its constructor takes.
+    """
+
+    name: str
+    options: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossSpec:
+    """Attributes:
+    name: see `models.learner.Loss`.
+    targets: what is told; none for the contrastive loss.
+    components: of the mixture.
+    margin: of the contrastive loss.
+    """
+
+    name: Loss
+    targets: tuple[str, ...] = ()
+    components: int = 6
+    margin: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimiserSpec:
+    """Adam's settings.
+
+    Attributes:
+        rate: learning rate.
+        decay: weight decay, added to the gradient as the paper's Adam does.
+        batch: clips a step, all ranks together.
+        epochs: at most.
+        schedule, drop_after: see `Schedule`; the latter of "steps" alone.
+        clip_norm: largest norm of the gradient; None for no limit.
+        precision: see `Precision`.
+        patience: epochs.
+    """
+
+    rate: float = 1e-2
+    decay: float = 2e-3
+    batch: int = 32
+    epochs: int = 40
+    schedule: Schedule = Schedule.STEPS
+    drop_after: int = 20
+    clip_norm: float | None = None
+    precision: Precision = Precision.FLOAT32
+    patience: int = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingRecipe:
+    """A training.
+
+    Attributes:
+        name: what its model is called.
+        title: one line for people.
+        seed: of initial weights, crops and orders.
+        data, input, network, loss, optimiser: the tables above.
+        variants: crops of each film that are prepared; an epoch takes one of them, the next the next.
+    """
+
+    name: str
+    title: str
+    seed: int
+    data: DataSpec
+    front_end: FrontEnd
+    cropping: Cropping
+    variants: int
+    network: NetworkSpec
+    loss: LossSpec
+    optimiser: OptimiserSpec
+
+    def identity(self) -> dict[str, Any]:
+        """All that shapes the weights beside the data themselves, as JSON."""
+        return {
+            "training": RECIPE_VERSION, "seed": self.seed, "data": asdict(self.data),
+            "front_end": asdict(self.front_end), "cropping": asdict(self.cropping), "variants": self.variants,
+            "network": {"name": self.network.name, "options": dict(self.network.options)},
+            "loss": asdict(self.loss), "optimiser": asdict(self.optimiser),
+        }  # fmt: skip
+
+    def learner(self) -> Learner:
+        """The network with its head, its weights drawn by torch's generator as it stands.
+
+        Raises:
+            InputError: options that the network does not take.
+        """
+        try:
+            network = NETWORKS[self.network.name](**self.network.options)
+        except TypeError as error:
+            raise InputError(
+                f"the network {self.network.name} does not take that: {error}", where="[network]",
+                fix="see its docstring for what it takes",
+            ) from None  # fmt: skip
+        loss = self.loss
+        return Learner(network, loss=loss.name, targets=loss.targets, components=loss.components, margin=loss.margin)
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the identity."""
+        return recipe_hash(self.identity())
+
+
+def load(source: str) -> TrainingRecipe:
+    """The training recipe of that name in the catalog, or of a `.toml` file.
+
+    Raises:
+        NotFoundError: no such file.
+        UnknownNameError: no such recipe; a key, name or option that is not known.
+        InputError, UsageError: a value that does not fit.
+    """
+    found = TRAININGS.find(source)
+    return parse(found.text, name=found.name, where=found.where, folder=found.folder)
+
+
+def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> TrainingRecipe:
+    """A recipe from its text; raises as `load`."""
+    top = Table(parsed(text, where=where), where=where)
+    front_end, cropping, variants = _input(top.table("input"))
+    recipe = TrainingRecipe(
+        name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0),
+        data=_data(top.table("data")), front_end=front_end, cropping=cropping, variants=variants,
+        network=_network(top.table("network"), front_end), loss=_loss(top.table("loss")),
+        optimiser=_optimiser(top.table("optimiser")),
+    )  # fmt: skip
+    top.done()
+    return recipe
+
+
+def _data(table: Table) -> DataSpec:
+    dataset = table.text("dataset", None)
+    if not dataset or not all(part.isalnum() for part in dataset.split("-")):
+        raise InputError(f"the data set is {dataset!r}", where=table.where, fix='name one: dataset = "flagsim-wide"')
+    spec = DataSpec(dataset=dataset, sequences=table.whole("sequences", 1, least=1) if "sequences" in table else None)
+    table.done()
+    return spec
+
+
+def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:
+    maps = table.text("maps", "spectral-maps")
+    if maps not in _MAPS:
+        raise UnknownNameError.of("kind of maps", str(maps), _MAPS, where=table.where)
+    size, frames = table.whole("size", 224, least=4), table.whole("frames", 30, least=4)
+    front_end = FrontEnd(maps=maps, size=size, frames=frames, rate=table.number("rate", 25.0, above=0.0))
+    scales = table.numbers("scales") or Cropping.scales
+    mirror = table.flag("mirror") if "mirror" in table else True
+    variants = table.whole("variants", 4, least=1)
+    table.done()
+    return front_end, Cropping(frames=frames, size=size, scales=scales, mirror=mirror), variants
+
+
+def _network(table: Table, front_end: FrontEnd) -> NetworkSpec:
+    name = table.text("name", None)
+    if name is None:
+        raise InputError("no network is named", where=table.where, fix=f"add name, one of {', '.join(NETWORKS)}")
+    takes = NETWORKS[name].takes
+    if takes != front_end.maps:
+        raise UsageError(
+            f"the network {name} takes {takes}, not {front_end.maps}", where=table.where,
+            fix=f'write maps = "{takes}" in [input]',
+        )  # fmt: skip
+    options = {
+        key.replace("-", "_"): tuple(value) if isinstance(value, list) else value
+        for key, value in ((key, table.value(key)) for key in table.names() if key != "name")
+    }
+    return NetworkSpec(name=name, options=options)
+
+
+def _loss(table: Table) -> LossSpec:
+    name = table.choice("name", Loss.REGRESSION)
+    targets = table.texts("targets")
+    for target in targets:
+        if target not in TARGETS:
+            raise UnknownNameError.of("target", target, TARGETS, where=table.where)
+    if (name is Loss.CONTRASTIVE) == bool(targets):
+        raise UsageError(
+            "the contrastive loss has no targets, the others have at least one", where=table.where,
+            fix='write targets = ["wind_speed"], or leave them out',
+        )  # fmt: skip
+    if name is not Loss.POSTERIOR and "components" in table:
+        raise UsageError(f"components say nothing of {name.value}", where=table.where, fix="leave them out")
+    if name is not Loss.CONTRASTIVE and "margin" in table:
+        raise UsageError(f"a margin says nothing of {name.value}", where=table.where, fix="leave it out")
+    spec = LossSpec(
+        name=name, targets=targets, components=table.whole("components", 6, least=1),
+        margin=table.number("margin", 1.0, above=0.0),
+    )  # fmt: skip
+    table.done()
+    return spec
+
+
+def _optimiser(table: Table) -> OptimiserSpec:
+    schedule = table.choice("schedule", Schedule.STEPS)
+    if schedule is not Schedule.STEPS and "drop-after" in table:
+        raise UsageError(f"drop-after says nothing of {schedule.value}", where=table.where, fix="leave it out")
+    spec = OptimiserSpec(
+        rate=table.number("rate", 1e-2, above=0.0), decay=table.number("decay", 2e-3, least=0.0),
+        batch=table.whole("batch", 32, least=2), epochs=table.whole("epochs", 40, least=1), schedule=schedule,
+        drop_after=table.whole("drop-after", 20, least=1),
+        clip_norm=table.number("clip-norm", 10.0, above=0.0) if "clip-norm" in table else None,
+        precision=table.choice("precision", Precision.FLOAT32), patience=table.whole("patience", 10, least=1),
+    )  # fmt: skip
+    table.done()
+    return spec

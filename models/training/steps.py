@@ -1,0 +1,240 @@
+"""The steps of a training: forward, backward, Adam, one batch after another, until the validation loss has settled.
+
+What a step does depends on the recipe, the data and the step's number alone, so that a training that was killed and
+taken up from its checkpoint reaches the same weights as one that ran through (on one kind of machine, with as many
+threads). With several processes (`torchrun`) each takes its part of every batch, and gradients are averaged by
+`DistributedDataParallel`; the mean over all parts is that of the whole batch.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch import distributed as ranks
+from torch.nn.parallel import DistributedDataParallel
+
+from flagdata.errors import FlagdataError
+from flagdata.rng import child_seed
+from models.learner import Learner
+from models.training import checkpoint
+from models.training.batches import Batch, Batches
+from models.training.checkpoint import Standing
+from models.training.inputs import Prepared
+from models.training.progress import Course, Epoch
+from models.training.recipe import Loss, OptimiserSpec, Precision, Schedule, TrainingRecipe
+
+CHECKPOINT_SECONDS = 60.0
+"""A checkpoint is written after this time, and at the end of each epoch."""
+_WARM_UP = 0.05  # of all steps, of the cosine schedule
+_LEAST = 0.05  # of the rate, where it begins
+_FINAL = 0.002  # of the rate, where it ends
+_EVALUATED = 64  # clips at a time
+
+Bars: TypeAlias = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
+
+
+class DivergedError(FlagdataError):
+    """The loss is no longer a number."""
+
+    kind = "diverged"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trained:
+    """Attributes:
+    learner: with the weights of the best validation loss.
+    course: of the losses.
+    seconds: of all epochs.
+    """
+
+    learner: Learner
+    course: Course
+    seconds: float
+
+
+@dataclass(kw_only=True)
+class Training:
+    """One training.
+
+    Attributes:
+        recipe: what is trained.
+        train, validation: inputs, prepared.
+        run: folder of its checkpoint.
+        identity: of recipe and data; a checkpoint of another one is refused.
+        device: where it computes.
+        bars: makes progress bars.
+        checkpoint_seconds: from one checkpoint to the next.
+    """
+
+    recipe: TrainingRecipe
+    train: Prepared
+    validation: Prepared
+    run: Path
+    identity: dict[str, object]
+    device: torch.device
+    bars: Bars
+    checkpoint_seconds: float = CHECKPOINT_SECONDS
+
+    def complete(self) -> Trained:
+        """Train from the beginning, or from the checkpoint, to the end.
+
+        Raises:
+            DivergedError: the loss is not finite.
+            RefusedError, CorruptError: a checkpoint that does not fit.
+            FlagdataError: the disk is full.
+        """
+        spec, share = self.recipe.optimiser, _share()
+        learner = self._fresh()
+        optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
+        together = self.recipe.loss.name is Loss.CONTRASTIVE
+        batches = Batches(prepared=self.train, size=spec.batch, seed=self.recipe.seed, together=together, share=share)
+        standing = Standing(learner=learner, best=None, optimiser=optimiser, course=Course(), batches=batches.state())
+        if checkpoint.restore(self.run, standing, identity=self.identity):
+            batches.take_up(standing.batches)
+        module = _Loss(learner)
+        stepped: nn.Module = module if share[1] == 1 else DistributedDataParallel(module)
+        course = standing.course
+        values = self._values(self.train, learner)
+        while len(course.epochs) < spec.epochs and not course.stalled(spec.patience):
+            self._epoch(standing, batches, stepped, values)
+        if standing.best is not None:
+            learner.load_state_dict(standing.best)
+        return Trained(learner=learner.eval(), course=course, seconds=sum(epoch.seconds for epoch in course.epochs))
+
+    def _fresh(self) -> Learner:
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(child_seed(self.recipe.seed, "weights"))
+            learner = self.recipe.learner()
+        if self.recipe.loss.targets:
+            learner.fit_scale(torch.from_numpy(self.train.truth(self.recipe.loss.targets)))
+        return learner.to(self.device)
+
+    def _values(self, prepared: Prepared, learner: Learner) -> Tensor:
+        """(n, target) of the entries."""
+        names = learner.scaling.names
+        found = prepared.truth(names) if names else np.empty((len(prepared), 0))
+        return torch.from_numpy(found).to(self.device)
+
+    def _epoch(self, standing: Standing, batches: Batches, stepped: nn.Module, values: Tensor) -> None:
+        spec, number = self.recipe.optimiser, batches.epoch
+        begun = written = time.monotonic()
+        total, steps = standing.running
+        clips = len(batches) * spec.batch
+        standing.learner.train()
+        with self.bars(clips, f"{self.recipe.name}: epoch {number + 1} of {spec.epochs}", "clip") as advance:
+            advance(steps * spec.batch)
+            for batch in batches:
+                rate = learning_rate(spec, number * len(batches) + steps, len(batches))
+                total += self._step(standing, stepped, batch, values, rate)
+                steps += 1
+                advance(spec.batch)
+                if batches.epoch == number and time.monotonic() - written > self.checkpoint_seconds:
+                    standing.running, standing.batches = (total, steps), batches.state()
+                    self._save(standing)
+                    written = time.monotonic()
+        validation = self._validate(standing.learner)
+        epoch = Epoch(
+            number=number, train=total / steps, validation=validation,
+            rate=learning_rate(spec, (number + 1) * len(batches) - 1, len(batches)),
+            seconds=time.monotonic() - begun, clips=clips,
+        )  # fmt: skip
+        best = standing.course.best
+        if best is None or validation < best.validation:
+            standing.best = {name: value.detach().clone() for name, value in standing.learner.state_dict().items()}
+        standing.course.epochs.append(epoch)
+        standing.running, standing.batches = (0.0, 0), batches.state()
+        self._save(standing)
+
+    def _step(self, standing: Standing, stepped: nn.Module, batch: Batch, values: Tensor, rate: float) -> float:
+        """One batch; returns its loss."""
+        optimiser, spec = standing.optimiser, self.recipe.optimiser
+        for group in optimiser.param_groups:
+            group["lr"] = rate
+        inputs = batch.inputs.to(self.device)
+        wanted = values[torch.from_numpy(batch.entries).to(self.device)]
+        with _computing(spec.precision, self.device):
+            loss = stepped(inputs, wanted, batch.sequence.to(self.device))
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        limit = spec.clip_norm if spec.clip_norm is not None else math.inf
+        norm = nn.utils.clip_grad_norm_(standing.learner.parameters(), limit)
+        if not math.isfinite(float(loss.detach())) or not math.isfinite(float(norm)):
+            raise DivergedError(
+                f"the loss is {float(loss.detach())} in epoch {len(standing.course.epochs) + 1}, "
+                f"its gradient's norm {float(norm)}",
+                where=str(self.run),
+                fix="lower the rate or set clip-norm; the last good checkpoint is kept",
+            )
+        optimiser.step()
+        return float(loss.detach())
+
+    @torch.no_grad()
+    def _validate(self, learner: Learner) -> float:
+        """The mean loss over the validation side; a contrastive one over batches of whole sequences."""
+        learner.eval()
+        values, sequence = self._values(self.validation, learner), torch.from_numpy(self.validation.sequence)
+        order = np.argsort(self.validation.sequence, kind="stable")
+        total, count = 0.0, 0
+        for first in range(0, len(order), _EVALUATED):
+            entries = order[first : first + _EVALUATED]
+            if len(entries) < 2:
+                continue
+            inputs = self.validation.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(self.device)
+            loss = learner.loss(inputs, values[entries.tolist()], sequence[entries].to(self.device))
+            total, count = total + float(loss) * len(entries), count + len(entries)
+        return total / count
+
+    def _save(self, standing: Standing) -> None:
+        if _share()[0] == 0:
+            checkpoint.save(self.run, standing, identity=self.identity)
+
+
+class _Loss(nn.Module):
+    """The learner's loss as a forward pass, which is what `DistributedDataParallel` follows."""
+
+    def __init__(self, learner: Learner) -> None:
+        super().__init__()
+        self.learner = learner
+
+    def forward(self, inputs: Tensor, values: Tensor, sequence: Tensor) -> Tensor:
+        return self.learner.loss(inputs, values, sequence)
+
+
+def learning_rate(spec: OptimiserSpec, step: int, of_epoch: int) -> float:
+    """The rate of a step.
+
+    Args:
+        step: its number from the first of all.
+        of_epoch: steps of an epoch.
+    """
+    if spec.schedule is Schedule.STEPS:
+        return spec.rate * 0.1 ** (step // of_epoch // spec.drop_after)
+    total = spec.epochs * of_epoch
+    warm = max(1, round(_WARM_UP * total))
+    if step < warm:
+        return spec.rate * (_LEAST + (1 - _LEAST) * step / warm)
+    share = (step - warm) / max(1, total - warm)
+    return spec.rate * (_FINAL + (1 - _FINAL) * 0.5 * (1 + math.cos(math.pi * share)))
+
+
+@contextmanager
+def _computing(precision: Precision, device: torch.device) -> Iterator[None]:
+    enabled = precision is Precision.BFLOAT16
+    with torch.autocast(device.type, dtype=torch.bfloat16, enabled=enabled):
+        yield
+
+
+def _share() -> tuple[int, int]:
+    """(rank, ranks) of this process."""
+    if ranks.is_available() and ranks.is_initialized():
+        return ranks.get_rank(), ranks.get_world_size()
+    return 0, 1
