@@ -1,0 +1,15 @@
+"""The networks by name. A name in a recipe or a checkpoint is looked up here; the module is imported only then."""
+
+from __future__ import annotations
+
+from flagdata.registry import Registry
+
+NETWORKS = Registry(
+    "network",
+    {
+        "sdn": "models.sdn:SpectralNetwork",
+        "resnet18": "models.baselines:ResNetOfFrames",
+        "cardona": "models.baselines:Cardona",
+        "yang": "models.baselines:Yang",
+    },
+)
