@@ -12,7 +12,7 @@ from enum import IntFlag, StrEnum
 
 import pyarrow as pa
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,6 +129,9 @@ class Kind(StrEnum):
     MARKERS = "markers"
     """Tracked points of a cloth; a Zarr object."""
     MODEL = "model"
+    """A recipe of a simulation that a closed loop left."""
+    NETWORK = "network"
+    """A trained network: weights and card; a folder of the store of models. Since format 2."""
     MEASUREMENT = "measurement"
 
 

@@ -9,6 +9,7 @@ NETWORKS = Registry(
     {
         "sdn": "models.sdn:SpectralNetwork",
         "resnet18": "models.baselines:ResNetOfFrames",
+        "wave": "models.wave:WaveNetwork",
         "cardona": "models.baselines:Cardona",
         "yang": "models.baselines:Yang",
     },

@@ -50,7 +50,7 @@ class WaveNetwork(nn.Module):
         self.blocks = nn.Sequential(
             *(BasicBlock(inputs=inputs, width=width, stride=2) for inputs, width in zip(ins, widths, strict=True))
         )
-        initialise(self)
+        initialise(self.blocks)
         self.summary = nn.Sequential(nn.Linear(2 * widths[-1], 128), nn.ReLU(), nn.Linear(128, dimension))
 
     def forward(self, maps: Tensor) -> Tensor:

@@ -6,6 +6,7 @@ A lake is a folder of a local disk, or of a network file system that carries har
     catalog/             the Delta table; one row an artifact (schema.CATALOG)
     mcap/<sha256>.mcap   records
     zarr/<treehash>.zarr mesh sequences
+    model/<treehash>.model trained networks
     refs/tags/           tags, put once, never changed
     refs/branches/       branches: where each forked from its parent
     refs/newest/         the number of the newest acknowledged commit, as a file name

@@ -19,7 +19,7 @@ from flagdata import provenance
 from flagdata.errors import CorruptError, InputError
 from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
 
-OBJECT_NAME = re.compile(r"(mcap|zarr)/[0-9a-f]{64}")
+OBJECT_NAME = re.compile(r"(mcap|zarr|model)/[0-9a-f]{64}")
 _IDENTITY = re.compile(r"[0-9a-f]{32}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _DERIVED = ("artifact", "recipe", "recipe_hash", "format_version")

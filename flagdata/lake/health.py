@@ -171,7 +171,7 @@ def _later(grace: timedelta) -> str:
 
 def _strays(lake: Lake) -> list[Finding]:
     known = {stored.path for stored in lake.objects}
-    strays = [p for store in STORES for p in sorted((lake.path / store).iterdir()) if p not in known]
+    strays = [p for store in STORES for p in sorted((lake.path / store).glob("*")) if p not in known]
     return [
         Finding(
             kind="stray-file",

@@ -1,4 +1,4 @@
-"""Immutable objects under the hash of their content: single MCAP files, and Zarr folders."""
+"""Immutable objects under the hash of their content: single MCAP files, Zarr folders, and folders of trained models."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.durable import flush_file, flush_folder
 from flagdata.provenance import file_hash
 
-STORES = {"mcap": ".mcap", "zarr": ".zarr"}
+STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 _READ_ONLY = 0o444
 
 
@@ -62,7 +62,7 @@ def content_hash(path: Path) -> str:
 
 
 class Objects:
-    """The stores `mcap/` and `zarr/` of a lake at `root`."""
+    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; one made before format 2 gets its last when needed."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -71,11 +71,12 @@ class Objects:
         """Where the object called `name` is, whether or not it is there.
 
         Raises:
-            InputError: not an object name; nothing outside the two stores can be named.
+            InputError: not an object name; nothing outside the stores can be named.
         """
         if not OBJECT_NAME.fullmatch(name):
             raise InputError(
-                f"{name!r} is not an object name", where=str(self.root), fix="give mcap/<sha256> or zarr/<treehash>"
+                f"{name!r} is not an object name", where=str(self.root),
+                fix="give mcap/<sha256>, zarr/<treehash> or model/<treehash>",
             )
         store, _, digest = name.partition("/")
         return self.root / store / f"{digest}{STORES[store]}"
@@ -103,14 +104,15 @@ class Objects:
         """The name the content at `staged` will have.
 
         Raises:
-            InputError: neither an .mcap file nor a folder, or empty.
+            InputError: neither an .mcap file nor a folder of a known kind, or empty.
         """
         files = files_of(staged)
         if staged.is_file() and staged.suffix != ".mcap":
             raise InputError("not an .mcap file", where=str(staged), fix="objects are .mcap files and Zarr folders")
         if sum(f.stat().st_size for f in files) == 0:
             raise InputError("the object is empty", where=str(staged), fix="write it before putting it")
-        return f"{'mcap' if staged.is_file() else 'zarr'}/{content_hash(staged)}"
+        store = "mcap" if staged.is_file() else "model" if staged.suffix == STORES["model"] else "zarr"
+        return f"{store}/{content_hash(staged)}"
 
     def publish(self, staged: Path, name: str) -> None:
         """Move `staged`, whose name was computed by `name_of`, to its place; durable when it returns.
@@ -126,6 +128,7 @@ class Objects:
             for folder in [staged, *(p for p in staged.rglob("*") if p.is_dir())]:
                 flush_folder(folder)
         target = self.path(name)
+        target.parent.mkdir(exist_ok=True)
         if target.exists():
             if self.is_whole(name):
                 os.utime(target)
@@ -163,7 +166,7 @@ class Objects:
     def __iter__(self) -> Iterator[StoredObject]:
         """Everything in the stores that has an object's name."""
         for store, suffix in STORES.items():
-            for path in sorted((self.root / store).iterdir()):
+            for path in sorted((self.root / store).glob("*")):
                 name = f"{store}/{path.name.removesuffix(suffix)}"
                 if path.name.endswith(suffix) and OBJECT_NAME.fullmatch(name):
                     yield StoredObject(name=name, path=path, size=size_of(path), modified=path.stat().st_mtime)

@@ -93,11 +93,11 @@ class Transaction:
             lease.close()
 
     def staging(self, suffix: str) -> Path:
-        """A fresh path with `suffix` (".mcap", ".zarr"), nothing at it yet; removed with the transaction."""
+        """A fresh path with `suffix` (".mcap", ".zarr", ".model"), nothing at it yet; removed with the transaction."""
         return self._lease.folder / f"{uuid.uuid4().hex}{suffix}"
 
     def put(self, path: Path) -> str:
-        """Store a finished .mcap file or Zarr folder for good, and return its object name.
+        """Store a finished .mcap file or a folder (Zarr, model) for good, and return its object name.
 
         What lies in this transaction's staging is moved, anything else copied. Content that is stored already is kept
         once.

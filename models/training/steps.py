@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
@@ -24,13 +25,13 @@ from torch.nn.parallel import DistributedDataParallel
 
 from flagdata.errors import FlagdataError
 from flagdata.rng import child_seed
-from models.learner import Learner
+from models.learner import Learner, Loss
 from models.training import checkpoint
 from models.training.batches import Batch, Batches
 from models.training.checkpoint import Standing
 from models.training.inputs import Prepared
 from models.training.progress import Course, Epoch
-from models.training.recipe import Loss, OptimiserSpec, Precision, Schedule, TrainingRecipe
+from models.training.recipe import OptimiserSpec, Precision, Schedule, TrainingRecipe
 
 CHECKPOINT_SECONDS = 60.0
 """A checkpoint is written after this time, and at the end of each epoch."""
@@ -92,11 +93,9 @@ class Training:
             RefusedError, CorruptError: a checkpoint that does not fit.
             FlagdataError: the disk is full.
         """
-        spec, share = self.recipe.optimiser, _share()
+        spec, share, batches = self.recipe.optimiser, _share(), self.batches
         learner = self._fresh()
         optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
-        together = self.recipe.loss.name is Loss.CONTRASTIVE
-        batches = Batches(prepared=self.train, size=spec.batch, seed=self.recipe.seed, together=together, share=share)
         standing = Standing(learner=learner, best=None, optimiser=optimiser, course=Course(), batches=batches.state())
         if checkpoint.restore(self.run, standing, identity=self.identity):
             batches.take_up(standing.batches)
@@ -109,6 +108,15 @@ class Training:
         if standing.best is not None:
             learner.load_state_dict(standing.best)
         return Trained(learner=learner.eval(), course=course, seconds=sum(epoch.seconds for epoch in course.epochs))
+
+    @cached_property
+    def batches(self) -> Batches:
+        """This process's part of all batches; its state says where the training stands."""
+        together = self.recipe.loss.name is Loss.CONTRASTIVE
+        return Batches(
+            prepared=self.train, size=self.recipe.optimiser.batch, seed=self.recipe.seed, together=together,
+            share=_share(),
+        )  # fmt: skip
 
     def _fresh(self) -> Learner:
         with torch.random.fork_rng(devices=[]):

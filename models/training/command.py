@@ -1,0 +1,169 @@
+"""`flagdata train`: a network from the pairs of a lake."""
+
+from __future__ import annotations
+
+import os
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.console import document, json_option, lake_option, progress, say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from flagdata.dataset import Pairs, Source
+    from models.training.recipe import TrainingRecipe
+
+
+@click.command()
+@click.argument("recipe", metavar="RECIPE")
+@click.option("--at", metavar="REF", help="Tag, branch or version of the lake to learn from; by default its head.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of weights, crops and orders, instead of the recipe's.")
+@click.option("--sequences", type=click.IntRange(min=2), metavar="N", help="Simulations to learn from, instead of all.")
+@click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
+              help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.")  # fmt: skip
+@click.option("--run", type=click.Path(path_type=Path), metavar="DIR",
+              help="Where the checkpoint is kept while it trains; by default in the cache.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
+@click.option("--device", default="cpu", show_default=True, help="Where the network computes: cpu, cuda.")
+@click.option("--branch", default="main", show_default=True, help="The line of work to commit the model on.")
+@json_option
+@lake_option
+def train(
+    recipe: str,
+    at: str | None,
+    seed: int | None,
+    sequences: int | None,
+    cache: Path | None,
+    run: Path | None,
+    workers: int | None,
+    device: str,
+    branch: str,
+    as_json: bool,
+    lake_path: str,
+) -> None:
+    """Train a network on the clips of a lake and commit it as an artifact.
+
+    RECIPE is a TOML file, or a recipe of the catalog: wave, sdn, sdn-contrastive and the networks they are compared
+    with. Each film is decoded and filtered once, into the cache; steps then read from there. A training that was
+    stopped or killed goes on from its last checkpoint when the command is given again.
+
+    \b
+      flagdata train wave --at v1 --lake lake
+      torchrun --nproc-per-node 2 -m flagdata.cli train wave --at v1 --lake lake
+    """
+    from dataclasses import replace
+
+    from models.training.recipe import load
+
+    loaded = load(recipe)
+    if seed is not None:
+        loaded = replace(loaded, seed=seed)
+    if sequences is not None:
+        loaded = replace(loaded, data=replace(loaded.data, sequences=sequences))
+    folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
+    report = trained(
+        loaded, Path(lake_path), at=at, cache=folder, run=run, workers=workers or os.cpu_count() or 1, device=device,
+        branch=branch, bars=_bar,
+    )  # fmt: skip
+    if report is None:  # another rank of a torchrun reports
+        return
+    if as_json:
+        document("train", report)
+        return
+    best = report["best"]
+    say(f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the best was "
+        f"{best['number'] + 1}, validation loss {best['validation']:.4f}")  # fmt: skip
+    click.echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
+
+
+def trained(
+    recipe: TrainingRecipe,
+    lake_path: Path,
+    *,
+    at: str | None,
+    cache: Path,
+    run: Path | None,
+    workers: int,
+    device: str,
+    branch: str,
+    bars: Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]],
+) -> dict[str, Any] | None:
+    """Prepare, train and publish; what the command reports, or None in all ranks but the first.
+
+    Raises:
+        FlagdataError: see `models.training.steps.Training.complete`, `flagdata.dataset.Source.pairs`.
+    """
+    import torch
+    from torch import distributed as ranks
+
+    import flagdata
+    from flagdata.provenance import digest
+    from models.training.inputs import prepare_clips, prepare_films
+    from models.training.publish import data_identity, network_artifact, publish
+    from models.training.steps import Training
+
+    source = flagdata.open(lake_path)
+    train_pairs, validation_pairs = (_pairs(source, recipe, side, at=at) for side in ("train", "validation"))
+    data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
+    wanted = network_artifact(recipe, data).id
+    known = source.lake.rows(f"artifact = '{wanted}'", at=branch, columns=["artifact"]).num_rows
+    if known:
+        say("this model was trained before")
+        return _report(source, wanted, branch)
+    torch.set_num_threads(max(1, workers))
+    several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
+    if several:
+        ranks.init_process_group("gloo" if device == "cpu" else "nccl")
+    try:
+        first = not several or ranks.get_rank() == 0
+        if several and not first:
+            ranks.barrier()  # the first prepares the inputs for all
+        with bars(len(set(train_pairs.table.recording.tolist())), f"{recipe.name}: prepare", "film") as advance:
+            train_inputs = prepare_films(
+                train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, seed=recipe.seed,
+                folder=cache, workers=workers, advance=advance, sequences=recipe.data.sequences,
+            )  # fmt: skip
+        with bars(len(validation_pairs), f"{recipe.name}: prepare what validates", "clip") as advance:
+            validation_inputs = prepare_clips(
+                validation_pairs, recipe.front_end, recipe.cropping, folder=cache, workers=workers, advance=advance
+            )
+        if several and first:
+            ranks.barrier()
+        identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
+        training = Training(
+            recipe=recipe, train=train_inputs, validation=validation_inputs, identity=identity,
+            run=run if run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}",
+            device=torch.device(device), bars=bars,
+        )  # fmt: skip
+        done = training.complete()
+        if not first:
+            return None
+        artifact = publish(source.lake, recipe, data, done, batches=training.batches.state(), branch=branch)
+    finally:
+        if several:
+            ranks.destroy_process_group()
+    return _report(source, artifact.id, branch)
+
+
+def _report(source: Source, artifact: str, branch: str) -> dict[str, Any]:
+    from models.storage import read_card
+
+    row = source.lake.artifact(artifact, at=branch)
+    card = read_card(source.lake.object_path(str(row.object)))
+    kept = ("name", "title", "seed", "parameters", "epochs", "best", "seconds", "data", "recipe_hash", "code_version")
+    return {"artifact": row.id, "object": row.object, **{key: card[key] for key in kept}}
+
+
+def _pairs(source: Source, recipe: TrainingRecipe, side: str, *, at: str | None) -> Pairs:
+    from flagdata.dataset import ExplicitSplit
+
+    split = ExplicitSplit(where={name: recipe.data.where(name) for name in ("train", "validation", "test")})
+    return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)
+
+
+def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
+    return progress(total, label=label, unit=unit)

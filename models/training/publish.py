@@ -1,0 +1,66 @@
+"""A trained model as an artifact of the lake: weights and card in one object, its row in one commit."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Any
+
+from flagdata.dataset import Pairs
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical, code_version
+from flagdata.schema import Kind
+from models.storage import WEIGHTS, write_card, write_tensors
+from models.training.recipe import TrainingRecipe
+from models.training.steps import Trained
+
+CURVES = "curves.png"
+
+
+def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None) -> dict[str, Any]:
+    """What a training learns from: the version of the lake and the pairs' fingerprints."""
+    return {
+        "at": at, "view": [f"{part.branch}@{part.version}" for part in lake.view(at)],
+        "train": train.fingerprint, "validation": validation.fingerprint,
+    }  # fmt: skip
+
+
+def network_artifact(recipe: TrainingRecipe, data: dict[str, Any]) -> Artifact:
+    """The row of a model without its result; its identity, hence, is what goes in: recipe, data and seed."""
+    held = {"recipe": recipe.identity(), "data": {key: data[key] for key in ("train", "validation")}}
+    return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=held, seed=recipe.seed)
+
+
+def card_of(recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any]) -> dict[str, Any]:
+    """All that is known of a model, as JSON."""
+    learner = trained.learner
+    best = trained.course.best
+    return {
+        "name": recipe.name, "title": recipe.title, "recipe": recipe.identity(), "recipe_hash": recipe.hash,
+        "data": data, "code_version": code_version(), "seed": recipe.seed, "batches": batches,
+        "front_end": asdict(recipe.front_end), "cropping": asdict(recipe.cropping),
+        "parameters": sum(weights.numel() for weights in learner.network.parameters()),
+        "epochs": len(trained.course.epochs), "best": None if best is None else asdict(best),
+        "seconds": trained.seconds, "course": trained.course.as_list(),
+    }  # fmt: skip
+
+
+def publish(
+    lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any], branch: str
+) -> Artifact:
+    """Commit a model; one that is there already is kept.
+
+    Raises:
+        FlagdataError: the disk refuses it.
+    """
+    artifact = network_artifact(recipe, data)
+    with lake.transaction(f"train {recipe.name}, seed {recipe.seed}", branch=branch) as transaction:
+        staged = transaction.staging(".model")
+        staged.mkdir()
+        write_tensors(staged / WEIGHTS, trained.learner.state_dict())
+        card = card_of(recipe, data, trained, batches=batches)
+        write_card(staged, card)
+        (staged / CURVES).write_bytes(trained.course.picture())
+        best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
+        artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
+        transaction.add(artifact)
+    return artifact
