@@ -43,8 +43,10 @@ WAVE_CHANNELS = (
     "mean picture", "log of its slope", "log standard deviation in time",
 )  # fmt: skip
 """Names of the wave maps, in order. Frequencies are shares of the Nyquist frequency, phase gradients shares of π a
-pixel of the pooled picture; powers are log(1 + I), I as in `periodogram` of standardised frames."""
+pixel of the pooled picture; powers are log(1 + I/10⁻³), I as in `periodogram`
+of standardised frames: logarithmic where something moves, near 0 where there is but noise."""
 _TINY = 1e-12
+_FLOOR = 1e-3  # power below which the scale is linear; edges that move have 10⁻² to 10, camera noise 10⁻⁴
 _VERSION = 1
 """Raised whenever the same clip gives other maps."""
 
@@ -161,8 +163,8 @@ class FrontEnd:
         centre = (power * weight).sum(dim=1) / (total + _TINY)
         width = ((power * weight.square()).sum(dim=1) / (total + _TINY) - centre.square()).clamp(min=0).sqrt()
         peaks, places = power.topk(min(2, bins), dim=1)
-        banded = [power[:, (share > low) & (share <= high)].sum(dim=1).log1p() for low, high in BANDS]
-        found = [peaks.log1p(), share[places], torch.stack([total.log1p(), centre, width], dim=1)]
+        banded = [_logarithm(power[:, (share > low) & (share <= high)].sum(dim=1)) for low, high in BANDS]
+        found = [_logarithm(peaks), share[places], torch.stack([_logarithm(total), centre, width], dim=1)]
         found += [torch.stack(banded, dim=1), _phases(real, imaginary, places[:, :1])]
         return torch.cat(found, dim=1).flatten(0, 1)
 
@@ -173,6 +175,10 @@ def standardised(clip: Tensor) -> Tensor:
     frames = frames - frames.mean()
     flat = frames.flatten()
     return frames / (flat.dot(flat) / len(flat)).sqrt().clamp(min=1e-6)  # a fifth of the time of torch.std_mean
+
+
+def _logarithm(power: Tensor) -> Tensor:
+    return (power / _FLOOR).log1p()
 
 
 def _half(slope: Tensor) -> Tensor:

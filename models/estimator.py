@@ -1,0 +1,199 @@
+"""A trained model at work: clips in, a distribution of wind and cloth out, and whether the clip is one it can judge.
+
+An estimator has one learner or several of other seeds, whose distributions are mixed with equal weights: they differ
+most where the data told them least. What it says of clips that are unlike all it was trained on means nothing, so each
+estimate carries a p-value of the distance of its summary to the training clips' (`models.outliers`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import CorruptError, InputError
+from flagdata.rng import child_seed
+from models.crops import Cropping
+from models.frontend import FrontEnd
+from models.learner import Learner, Loss
+from models.outliers import Cloud
+from models.registry import NETWORKS
+from models.storage import WEIGHTS, read_card, read_tensors
+from models.targets import TARGETS, Target
+
+SHIPPED = Path(__file__).parent / "shipped"
+"""Models that come with the package, a folder each."""
+DEFAULT = "wave"
+DRAWS = 400
+_CLOUD = "cloud.safetensors"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimates:
+    """What was said of n clips.
+
+    Attributes:
+        targets: what the columns are.
+        draws: (n, draw, target) of the predictive distribution, in the targets' units.
+        summary: (n, dimension) of the first learner.
+        unlike: (n,) p-value of a clip as far from the training clips as this one; None for a model without a cloud.
+    """
+
+    targets: tuple[Target, ...]
+    draws: NDArray[np.float32]
+    summary: NDArray[np.float32]
+    unlike: NDArray[np.float64] | None
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """(n, target)."""
+        return self.draws.mean(axis=1, dtype=np.float64)
+
+    def interval(self, share: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The ends of the central interval that holds this share of each distribution: two of (n, target).
+
+        Raises:
+            InputError: a share that is not between 0 and 1.
+        """
+        if not 0 < share < 1:
+            raise InputError(f"an interval of {share:g}", fix="give a share between 0 and 1")
+        low, high = np.quantile(self.draws, [(1 - share) / 2, (1 + share) / 2], axis=1)
+        return low, high
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimator:
+    """Attributes:
+    name: of the model.
+    learners: of one recipe, other seeds.
+    front_end, cropping: what their inputs are made by.
+    widening: (target,) factors by which each distribution is spread about its mean, on the logits; found on validation
+        clips, 1 where none was needed.
+    cloud: the training clips' summaries; None where the model has none.
+    card: what is known of it.
+    """
+
+    name: str
+    learners: tuple[Learner, ...]
+    front_end: FrontEnd
+    cropping: Cropping
+    widening: Tensor
+    cloud: Cloud | None
+    card: dict[str, object]
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        return tuple(TARGETS[name] for name in self.learners[0].scaling.names)
+
+    @property
+    def device(self) -> torch.device:
+        return next(self.learners[0].parameters()).device
+
+    def to(self, device: torch.device | str) -> Estimator:
+        """The same on another device."""
+        for learner in self.learners:
+            learner.to(device)
+        return self
+
+    def inputs(self, clips: NDArray[np.uint8]) -> Tensor:
+        """What the networks take, of clips (n, frames, height, width) gray: the largest square about the middle.
+
+        Raises:
+            InputError: clips of another length, or that are not uint8.
+        """
+        if clips.ndim != 4 or clips.dtype != np.uint8:
+            raise InputError(
+                f"clips of shape {clips.shape} and type {clips.dtype}",
+                fix="give uint8 of shape (clip, frame, height, width)",
+            )
+        if clips.shape[1] != self.front_end.frames:
+            raise InputError(
+                f"clips of {clips.shape[1]} frames, the model was trained on {self.front_end.frames} at "
+                f"{self.front_end.rate:g} Hz",
+                where=f"model {self.name!r}", fix="cut or resample the clips to that",
+            )  # fmt: skip
+        shape = (clips.shape[1], clips.shape[2], clips.shape[3])
+        cut = [self.cropping.cut(clip, self.cropping.whole(shape)) for clip in clips]
+        return torch.cat([self.front_end(clip[None].to(self.device)) for clip in cut])
+
+    @torch.no_grad()
+    def estimate(self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS) -> Estimates:
+        """What is said of inputs (n, *shape), see `inputs`.
+
+        Args:
+            seed: of the draws; the same inputs and seed give the same draws.
+            draws: of each clip's distribution, shared among the learners.
+        """
+        if self.learners[0].objective is not Loss.POSTERIOR:
+            raise InputError(f"the model {self.name!r} gives no distribution", fix="take one with a posterior loss")
+        share = -(-draws // len(self.learners))
+        found, summary = [], None
+        for place, learner in enumerate(self.learners):
+            embedding = learner.network(inputs)
+            summary = embedding if summary is None else summary
+            generator = torch.Generator(device=inputs.device)
+            generator.manual_seed(child_seed(seed, "draws", place))
+            mixture = learner.mixture(embedding)
+            found.append(mixture.sample(share, generator) * learner.spread + learner.centre)
+        assert_summary = summary if summary is not None else inputs.new_zeros((len(inputs), 0))
+        logits = torch.cat(found, dim=1)
+        centre = logits.mean(dim=1, keepdim=True)
+        spread = self.widening.to(logits)
+        values = self.learners[0].scaling.values(centre + (logits - centre) * spread)
+        told = assert_summary.cpu().numpy().astype(np.float32)
+        return Estimates(
+            targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
+            unlike=None if self.cloud is None else self.cloud.p_value(told),
+        )  # fmt: skip
+
+
+def load(folder: Path) -> Estimator:
+    """The model in a folder.
+
+    Raises:
+        NotFoundError: there is none.
+        CorruptError: it is damaged, or does not fit this code.
+    """
+    card = read_card(folder)
+    tensors = read_tensors(folder / WEIGHTS)
+    try:
+        recipe = card["recipe"]
+        front_end = FrontEnd(**card["front_end"])
+        crops = card["cropping"]
+        cropping = Cropping(**{**crops, "scales": tuple(crops["scales"])})
+        loss, network = recipe["loss"], recipe["network"]
+        learners = []
+        for place in range(int(card.get("members", 1))):
+            prefix = f"{place}." if "members" in card else ""
+            own = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
+            options = {key: tuple(value) if isinstance(value, list) else value for key, value in network["options"].items()}
+            learner = Learner(
+                NETWORKS[network["name"]](**options), loss=Loss(loss["name"]), targets=tuple(loss["targets"]),
+                components=loss["components"], margin=loss["margin"],
+            )  # fmt: skip
+            learner.load_state_dict({name: value.float() if value.is_floating_point() else value for name, value in own.items()})
+            learners.append(learner.eval())
+        widening = torch.tensor(card.get("widening") or [1.0] * len(loss["targets"]))
+    except (KeyError, TypeError, ValueError, RuntimeError, InputError) as error:
+        raise CorruptError(
+            f"the model does not fit this version: {error}", where=str(folder), fix="train it again, or update flagdata"
+        ) from None
+    path = folder / _CLOUD
+    cloud = Cloud.of_tensors(read_tensors(path)) if path.exists() else None
+    return Estimator(
+        name=str(card["name"]), learners=tuple(learners), front_end=front_end, cropping=cropping, widening=widening,
+        cloud=cloud, card=card,
+    )  # fmt: skip
+
+
+def shipped(name: str = DEFAULT) -> Estimator:
+    """A model that comes with the package.
+
+    Raises:
+        NotFoundError: no model of that name comes with it.
+    """
+    return load(SHIPPED / name)

@@ -1,0 +1,117 @@
+"""What a trained model of the lake says of the clips of a side: the `Predictions` that all scores are made of."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from flagdata.dataset.pairs import Pairs
+from flagdata.rng import child_seed
+from models.estimator import Estimator
+from models.evaluation.predictions import Predictions
+from models.learner import Learner, Loss
+from models.training.inputs import Prepared
+
+DRAWS = 200
+_TOGETHER = 64
+_TIMED = 12  # clips
+_RIDGE = 1e-3  # of the mean eigenvalue of the embeddings' covariance
+READ_FROM = ("wind_speed", "density", "bending_scale", "anisotropy")
+"""Targets that a model without a head is read for, by ridge regression of its embeddings of training clips."""
+
+
+def predict(
+    estimator: Estimator, prepared: Prepared, *, label: str, note: str, milliseconds: float, seed: int,
+    fitted_on: Prepared | None = None,
+) -> Predictions:  # fmt: skip
+    """Predictions of a model for prepared clips.
+
+    Args:
+        fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
+            regression.
+    """
+    learner = estimator.learners[0]
+    if learner.objective is Loss.CONTRASTIVE:
+        targets = READ_FROM
+        embedding = embedded(learner, prepared)
+        mean = _read(embedding, prepared, fitted_on if fitted_on is not None else prepared, learner, targets)
+        samples = None
+    else:
+        targets = learner.scaling.names
+        samples, mean, embedding = _told(estimator, prepared, seed=seed)
+    return Predictions(
+        label=label, targets=targets, truth=prepared.truth(targets), mean=mean, samples=samples, embedding=embedding,
+        group=prepared.sequence, parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
+        milliseconds=milliseconds, note=note,
+    )  # fmt: skip
+
+
+def _told(
+    estimator: Estimator, prepared: Prepared, *, seed: int
+) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
+    learner = estimator.learners[0]
+    draws, means, embeddings = [], [], []
+    for first in range(0, len(prepared), _TOGETHER):
+        inputs = _batch(prepared, first).to(estimator.device)
+        if learner.objective is Loss.POSTERIOR:
+            found = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS)
+            draws.append(found.draws)
+            means.append(found.mean)
+            embeddings.append(found.summary)
+            continue
+        with torch.no_grad():
+            embedding = learner.network(inputs)
+            means.append(learner.told(embedding).double().cpu().numpy())
+            embeddings.append(embedding.float().cpu().numpy())
+    return np.concatenate(draws) if draws else None, np.concatenate(means), np.concatenate(embeddings)
+
+
+@torch.no_grad()
+def embedded(learner: Learner, prepared: Prepared) -> np.ndarray:
+    """(n, dimension) float32 embeddings of the first variant of each entry."""
+    device = next(learner.parameters()).device
+    parts = [
+        learner.network(_batch(prepared, first).to(device)).float().cpu().numpy()
+        for first in range(0, len(prepared), _TOGETHER)
+    ]
+    return np.concatenate(parts)
+
+
+def _read(
+    embedding: np.ndarray, prepared: Prepared, fitted_on: Prepared, learner: Learner, targets: tuple[str, ...]
+) -> np.ndarray:
+    """(n, target): ridge regression on the embeddings of `fitted_on`."""
+    known = embedded(learner, fitted_on).astype(np.float64)
+    truth = fitted_on.truth(targets)
+    centre, level = known.mean(axis=0), truth.mean(axis=0)
+    gram = (known - centre).T @ (known - centre)
+    gram += _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
+    weights = np.linalg.solve(gram, (known - centre).T @ (truth - level))
+    return (embedding.astype(np.float64) - centre) @ weights + level
+
+
+def _batch(prepared: Prepared, first: int) -> Tensor:
+    entries = np.arange(first, min(first + _TOGETHER, len(prepared)))
+    return prepared.batch(entries, np.zeros(len(entries), dtype=np.int64))
+
+
+@torch.no_grad()
+def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
+    """Milliseconds a clip takes on one core from its pixels: the median of some clips, one at a time."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    clips = [pairs[index].clip.numpy() for index in range(min(_TIMED, len(pairs)))]
+    found = []
+    try:
+        for clip in clips:
+            begun = time.perf_counter()
+            inputs = estimator.inputs(clip)
+            for learner in estimator.learners:
+                learner.head(learner.network(inputs))
+            found.append(time.perf_counter() - begun)
+    finally:
+        torch.set_num_threads(threads)
+    return 1e3 * float(np.median(found))

@@ -1,0 +1,310 @@
+"""Steps that can be taken up again: the same weights whether a training ran through or was stopped; ranks; errors."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from flagdata.errors import CorruptError, FlagdataError, InputError, RefusedError, UsageError
+from models.crops import Cropping
+from models.frontend import FrontEnd
+from models.learner import Learner, Loss
+from models.training import checkpoint
+from models.training.batches import Batches
+from models.training.inputs import Prepared
+from models.training.recipe import (
+    DataSpec,
+    LossSpec,
+    NetworkSpec,
+    OptimiserSpec,
+    Precision,
+    Schedule,
+    TrainingRecipe,
+)
+from models.training.steps import DivergedError, Training, learning_rate
+
+SIZE = 24
+FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)
+
+
+def prepared(count: int, *, seed: int) -> Prepared:
+    """Maps in which the wind is the mean of the first channel, two entries of each simulation."""
+    rng = np.random.default_rng(seed)
+    wind = np.repeat(rng.uniform(0, 10, count // 2), 2)
+    maps = rng.normal(size=(count, 2, *FRONT_END.shape)) * 0.1
+    maps[:, :, 0] += wind[:, None, None, None] / 10
+    parameters = {"wind_speed": wind, "density": rng.uniform(0.1, 0.17, count)}
+    return Prepared(
+        maps=maps.astype(np.float16), parameters=parameters, sequence=np.repeat(np.arange(count // 2), 2),
+        fingerprint=f"made-{seed}", front_end=FRONT_END,
+    )  # fmt: skip
+
+
+def recipe(loss: Loss = Loss.POSTERIOR, **optimiser: object) -> TrainingRecipe:
+    spec = OptimiserSpec(rate=5e-3, decay=1e-4, batch=8, epochs=4, schedule=Schedule.COSINE, patience=9)
+    targets = () if loss is Loss.CONTRASTIVE else ("wind_speed",)
+    return TrainingRecipe(
+        name="small", title="", seed=3, data=DataSpec(dataset="made"), front_end=FRONT_END,
+        cropping=Cropping(size=SIZE), variants=2,
+        network=NetworkSpec(name="wave", options={"dimension": 4, "widths": (4, 4, 4)}),
+        loss=LossSpec(name=loss, targets=targets, components=2), optimiser=replace(spec, **optimiser),  # pyright: ignore[reportArgumentType]
+    )  # fmt: skip
+
+
+@contextmanager
+def silent(total: int, label: str, unit: str) -> Iterator[Callable[[int], None]]:
+    yield lambda count: None
+
+
+def stopped_after(clips: int) -> Callable[..., object]:
+    """Bars that end the process's work, as Ctrl-C would, once so many clips were trained on."""
+    done = 0
+
+    @contextmanager
+    def bars(total: int, label: str, unit: str) -> Iterator[Callable[[int], None]]:
+        def advance(count: int) -> None:
+            nonlocal done
+            done += count
+            if done > clips:
+                raise KeyboardInterrupt
+
+        yield advance
+
+    return bars
+
+
+def training(run: Path, own: TrainingRecipe, **changes: object) -> Training:
+    given = Training(
+        recipe=own, train=prepared(40, seed=1), validation=prepared(16, seed=2), run=run,
+        identity={"recipe": own.identity()}, device=torch.device("cpu"), bars=silent, checkpoint_seconds=0.0,
+    )  # fmt: skip
+    return replace(given, **changes)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize("loss", list(Loss))
+@pytest.mark.parametrize("clips", [20, 41, 90])
+def test_a_training_that_was_stopped_reaches_the_weights_of_one_that_was_not(
+    tmp_path: Path, loss: Loss, clips: int
+) -> None:
+    whole = training(tmp_path / "whole", recipe(loss)).complete()
+    with pytest.raises(KeyboardInterrupt):
+        training(tmp_path / "broken", recipe(loss), bars=stopped_after(clips)).complete()
+    taken_up = training(tmp_path / "broken", recipe(loss)).complete()
+    for name, value in whole.learner.state_dict().items():
+        assert torch.equal(value, taken_up.learner.state_dict()[name]), name
+    known = [(epoch.train, epoch.validation) for epoch in whole.course.epochs]
+    assert known == [(epoch.train, epoch.validation) for epoch in taken_up.course.epochs]
+
+
+def test_other_seeds_give_other_weights_and_the_same_seed_the_same(tmp_path: Path) -> None:
+    first, second, other = (
+        training(tmp_path / str(place), replace(recipe(), seed=seed)).complete().learner.state_dict()
+        for place, seed in enumerate((3, 3, 4))
+    )
+    assert all(torch.equal(first[name], second[name]) for name in first)
+    assert not torch.equal(first["network.summary.0.weight"], other["network.summary.0.weight"])
+
+
+def test_what_is_in_the_maps_is_learned(tmp_path: Path) -> None:
+    own = recipe(Loss.REGRESSION, epochs=20, rate=1e-2)
+    done = training(tmp_path, own, train=prepared(240, seed=1), checkpoint_seconds=1e9).complete()
+    assert done.course.best is not None
+    assert done.course.best.validation < 0.2  # of 1, what the mean of the training set has
+
+
+def test_a_plateau_ends_the_training_and_the_best_weights_are_given(tmp_path: Path) -> None:
+    done = training(tmp_path, recipe(epochs=40, rate=0.3, patience=3)).complete()
+    best = done.course.best
+    assert best is not None
+    assert len(done.course.epochs) == best.number + 4
+
+
+def test_a_loss_that_is_no_number_is_an_error_and_the_last_checkpoint_stays(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        training(tmp_path, recipe(), bars=stopped_after(30)).complete()
+    before = (tmp_path / "last" / "card.json").read_bytes()
+    bad = prepared(40, seed=1)
+    bad.maps[:] = np.nan
+    with pytest.raises(DivergedError, match="epoch 1"):
+        training(tmp_path, recipe(), train=bad).complete()
+    assert (tmp_path / "last" / "card.json").read_bytes() == before
+
+
+def test_a_full_disk_leaves_the_last_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        training(tmp_path, recipe(), bars=stopped_after(30)).complete()
+    before = (tmp_path / "last" / "card.json").read_bytes()
+
+    def full(path: Path, tensors: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checkpoint, "write_tensors", full)
+    with pytest.raises(FlagdataError, match="No space left"):
+        training(tmp_path, recipe()).complete()
+    assert (tmp_path / "last" / "card.json").read_bytes() == before
+
+
+def test_a_checkpoint_of_another_recipe_is_refused(tmp_path: Path) -> None:
+    training(tmp_path, recipe(epochs=1)).complete()
+    with pytest.raises(RefusedError, match="another training"):
+        training(tmp_path, recipe(epochs=2)).complete()
+
+
+def test_a_checkpoint_of_other_data_is_refused(tmp_path: Path) -> None:
+    training(tmp_path, recipe(epochs=2), bars=silent).complete()
+    with pytest.raises(RefusedError, match="fingerprint"):
+        training(tmp_path, recipe(epochs=2), train=prepared(40, seed=9)).complete()
+
+
+@pytest.mark.parametrize("name", ["weights.safetensors", "moments.safetensors"])
+def test_a_checkpoint_that_was_cut_off_is_an_error_with_its_place(tmp_path: Path, name: str) -> None:
+    training(tmp_path, recipe(epochs=1)).complete()
+    path = tmp_path / "last" / name
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(CorruptError) as caught:
+        training(tmp_path, recipe(epochs=1)).complete()
+    assert name in str(caught.value.where)
+
+
+def test_a_kill_between_the_two_renames_loses_nothing(tmp_path: Path) -> None:
+    whole = training(tmp_path / "whole", recipe()).complete()
+    with pytest.raises(KeyboardInterrupt):
+        training(tmp_path / "broken", recipe(), bars=stopped_after(50)).complete()
+    (tmp_path / "broken" / "last").rename(tmp_path / "broken" / "before")
+    taken_up = training(tmp_path / "broken", recipe()).complete()
+    assert all(torch.equal(v, taken_up.learner.state_dict()[n]) for n, v in whole.learner.state_dict().items())
+
+
+def test_a_target_that_clips_do_not_state_is_an_error(tmp_path: Path) -> None:
+    unknown = prepared(40, seed=1)
+    unknown.parameters["wind_speed"][7] = np.nan
+    with pytest.raises(InputError, match="entry 7 does not state its wind_speed"):
+        training(tmp_path, recipe(), train=unknown).complete()
+
+
+def test_rates_fall_by_a_tenth_after_the_epochs_that_were_named() -> None:
+    spec = OptimiserSpec(rate=1e-2, epochs=40, drop_after=20)
+    assert [learning_rate(spec, step * 10, 10) for step in (0, 19, 20, 39)] == pytest.approx([1e-2, 1e-2, 1e-3, 1e-3])
+
+
+def test_the_cosine_rises_and_falls() -> None:
+    spec = OptimiserSpec(rate=1.0, epochs=10, schedule=Schedule.COSINE)
+    rates = [learning_rate(spec, step, 10) for step in range(100)]
+    top = int(np.argmax(rates))
+    assert rates[top] == 1.0
+    assert rates[:top] == sorted(rates[:top])
+    assert rates[top:] == sorted(rates[top:], reverse=True)
+    assert rates[-1] < 0.01
+
+
+def test_bfloat16_trains_to_nearly_the_same_loss(tmp_path: Path) -> None:
+    plain, rounded = (
+        training(tmp_path / kind.value, recipe(Loss.REGRESSION, precision=kind)).complete().course.epochs[-1].train
+        for kind in (Precision.FLOAT32, Precision.BFLOAT16)
+    )
+    assert rounded == pytest.approx(plain, rel=0.1)
+
+
+class TestBatches:
+    def test_each_entry_is_in_an_epoch_once_and_the_next_epoch_takes_the_next_variant(self) -> None:
+        batches = Batches(prepared=prepared(40, seed=1), size=8, seed=5)
+        first = {int(e): b.inputs[k] for b in batches for k, e in enumerate(b.entries)}
+        second = {int(e): b.inputs[k] for b in batches for k, e in enumerate(b.entries)}
+        assert sorted(first) == sorted(second) == list(range(40))
+        assert list(first) != list(second)
+        assert not any(torch.equal(first[entry], second[entry]) for entry in first)
+
+    def test_films_of_one_simulation_follow_one_another_where_a_loss_needs_pairs(self) -> None:
+        batches = Batches(prepared=prepared(40, seed=1), size=8, seed=5, together=True)
+        for batch in batches:
+            assert batch.sequence.unique(return_counts=True)[1].tolist() == [2] * 4
+
+    def test_ranks_take_apart_what_one_process_takes(self) -> None:
+        data = prepared(40, seed=1)
+        whole = [batch.entries.tolist() for batch in Batches(prepared=data, size=8, seed=5)]
+        parts = [
+            [batch.entries.tolist() for batch in Batches(prepared=data, size=8, seed=5, share=(rank, 2))]
+            for rank in (0, 1)
+        ]
+        assert whole == [one + other for one, other in zip(*parts, strict=True)]
+
+    def test_sizes_that_ranks_cannot_share_are_refused(self) -> None:
+        with pytest.raises(UsageError, match="multiple"):
+            Batches(prepared=prepared(40, seed=1), size=9, seed=5, share=(0, 2))
+
+    def test_fewer_films_than_a_batch_are_refused(self) -> None:
+        with pytest.raises(UsageError, match="do not make a batch"):
+            Batches(prepared=prepared(4, seed=1), size=8, seed=5)
+
+
+_RANK = """
+import json, sys
+from pathlib import Path
+import torch
+from torch import distributed as ranks
+sys.path.insert(0, {here!r})
+from test_steps import Loss, Learner, recipe, training, small_learner
+from models.training.recipe import TrainingRecipe
+torch.set_num_threads(1)
+rank, count = int(sys.argv[1]), int(sys.argv[2])
+if count > 1:
+    ranks.init_process_group("gloo", init_method="file://" + sys.argv[3] + "/meet", rank=rank, world_size=count)
+TrainingRecipe.learner = small_learner
+own = recipe(Loss.REGRESSION, epochs=2)
+done = training(Path(sys.argv[3]) / f"run-{{count}}", own, checkpoint_seconds=1e9).complete()
+if rank == 0:
+    state = {{name: value.double().tolist() for name, value in done.learner.state_dict().items()}}
+    (Path(sys.argv[3]) / f"weights-{{count}}.json").write_text(json.dumps(state))
+if count > 1:
+    ranks.destroy_process_group()
+"""
+
+
+def small_learner(own: TrainingRecipe) -> Learner:
+    """A network without batch statistics, which each rank has of its own part."""
+
+    class Mean(torch.nn.Module):
+        dimension = 6
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.layer = torch.nn.Linear(FRONT_END.shape[0], 6)
+
+        def forward(self, maps: torch.Tensor) -> torch.Tensor:
+            return self.layer(maps.mean(dim=(2, 3))).tanh()
+
+    return Learner(Mean(), loss=own.loss.name, targets=own.loss.targets)
+
+
+def test_two_ranks_take_the_steps_of_one(tmp_path: Path) -> None:
+    """Gradients of two halves, averaged by gloo, are those of the whole batch."""
+    script = tmp_path / "rank.py"
+    script.write_text(_RANK.format(here=str(Path(__file__).parent)))
+    root = str(Path(__file__).resolve().parents[3])
+
+    def started(rank: int, count: int) -> subprocess.Popen[bytes]:
+        command = [sys.executable, str(script), str(rank), str(count), str(tmp_path)]
+        return subprocess.Popen(command, cwd=root, env={"PYTHONPATH": root, "PATH": "/usr/bin:/bin"})
+
+    for count in (1, 2):
+        assert [process.wait(timeout=240) for process in [started(rank, count) for rank in range(count)]] == [0] * count
+    alone, shared = (json.loads((tmp_path / f"weights-{count}.json").read_text()) for count in (1, 2))
+    for name, values in alone.items():
+        np.testing.assert_allclose(shared[name], values, rtol=1e-5, atol=1e-6, err_msg=name)
