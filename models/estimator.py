@@ -20,7 +20,7 @@ from flagdata.rng import child_seed
 from models.crops import Cropping
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
-from models.outliers import Cloud
+from models.outliers import Familiarity
 from models.registry import NETWORKS
 from models.storage import WEIGHTS, read_card, read_tensors
 from models.targets import TARGETS, Target
@@ -82,7 +82,7 @@ class Estimator:
     front_end: FrontEnd
     cropping: Cropping
     widening: Tensor
-    cloud: Cloud | None
+    cloud: Familiarity | None
     card: dict[str, object]
 
     @property
@@ -131,20 +131,19 @@ class Estimator:
         if self.learners[0].objective is not Loss.POSTERIOR:
             raise InputError(f"the model {self.name!r} gives no distribution", fix="take one with a posterior loss")
         share = -(-draws // len(self.learners))
-        found, summary = [], None
+        found, summaries = [], []
         for place, learner in enumerate(self.learners):
             embedding = learner.network(inputs)
-            summary = embedding if summary is None else summary
+            summaries.append(embedding)
             generator = torch.Generator(device=inputs.device)
             generator.manual_seed(child_seed(seed, "draws", place))
             mixture = learner.mixture(embedding)
             found.append(mixture.sample(share, generator) * learner.spread + learner.centre)
-        assert_summary = summary if summary is not None else inputs.new_zeros((len(inputs), 0))
         logits = torch.cat(found, dim=1)
         centre = logits.mean(dim=1, keepdim=True)
         spread = self.widening.to(logits)
         values = self.learners[0].scaling.values(centre + (logits - centre) * spread)
-        told = assert_summary.cpu().numpy().astype(np.float32)
+        told = summaries[0].cpu().numpy().astype(np.float32)
         return Estimates(
             targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
             unlike=None if self.cloud is None else self.cloud.p_value(told),
@@ -170,12 +169,16 @@ def load(folder: Path) -> Estimator:
         for place in range(int(card.get("members", 1))):
             prefix = f"{place}." if "members" in card else ""
             own = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
-            options = {key: tuple(value) if isinstance(value, list) else value for key, value in network["options"].items()}
+            options = {
+                key: tuple(value) if isinstance(value, list) else value for key, value in network["options"].items()
+            }
             learner = Learner(
                 NETWORKS[network["name"]](**options), loss=Loss(loss["name"]), targets=tuple(loss["targets"]),
                 components=loss["components"], margin=loss["margin"],
             )  # fmt: skip
-            learner.load_state_dict({name: value.float() if value.is_floating_point() else value for name, value in own.items()})
+            learner.load_state_dict(
+                {name: value.float() if value.is_floating_point() else value for name, value in own.items()}
+            )
             learners.append(learner.eval())
         widening = torch.tensor(card.get("widening") or [1.0] * len(loss["targets"]))
     except (KeyError, TypeError, ValueError, RuntimeError, InputError) as error:
@@ -183,7 +186,9 @@ def load(folder: Path) -> Estimator:
             f"the model does not fit this version: {error}", where=str(folder), fix="train it again, or update flagdata"
         ) from None
     path = folder / _CLOUD
-    cloud = Cloud.of_tensors(read_tensors(path)) if path.exists() else None
+    cloud = None
+    if path.exists():
+        cloud = Familiarity.of_arrays({name: value.double().numpy() for name, value in read_tensors(path).items()})
     return Estimator(
         name=str(card["name"]), learners=tuple(learners), front_end=front_end, cropping=cropping, widening=widening,
         cloud=cloud, card=card,

@@ -95,7 +95,8 @@ def _band(sigma: float, order: int) -> Tensor:
 
 
 def _along_height(padded: Tensor, band: Tensor, blocks: int) -> Tensor:
-    """(time, blocks · 32, width): the filter along the second axis of contiguous (time, blocks · 32 + taps − 1, width)."""
+    """(time, blocks · 32, width): the filter along the second axis of contiguous (time, blocks · 32 + taps − 1,
+    width)."""
     time, _, width = padded.shape
     step = padded.stride()
     view = padded.as_strided((time, blocks, len(band), width), (step[0], _BLOCK * step[1], step[1], step[2]))
@@ -103,7 +104,8 @@ def _along_height(padded: Tensor, band: Tensor, blocks: int) -> Tensor:
 
 
 def _along_width(padded: Tensor, band: Tensor, blocks: int) -> Tensor:
-    """(time, height, blocks · 32): the filter along the last axis of contiguous (time, height, blocks · 32 + taps − 1)."""
+    """(time, height, blocks · 32): the filter along the last axis of contiguous (time, height, blocks · 32 + taps −
+    1)."""
     time, height, width = padded.shape
     view = padded.as_strided((blocks, time * height, len(band)), (_BLOCK, width, 1))
     return torch.bmm(view, band.expand(blocks, -1, -1)).permute(1, 0, 2).reshape(time, height, blocks * _BLOCK)

@@ -1,4 +1,5 @@
-"""From a clip's pixels to maps of what moves: Gaussian in time, derivatives in space, half the size, a spectrum a pixel.
+"""From a clip's pixels to maps of what moves: Gaussian in time, derivatives in space, half the size, a spectrum a
+pixel.
 
 Runia et al. 2020, section 4.3: a Gaussian of σ = 1 frame, first Gaussian derivatives of σ = 2 px along x and y, maximum
 pooling by two, the spectral decomposition layer. All but the pooling is linear, so that the filters are products with
@@ -7,7 +8,8 @@ Fourier transform). `models.spectral.periodogram` is the definition that tests h
 
 From the same spectra come two kinds of maps:
 
-- *spectral maps* (4, H/2, W/2), what the paper's network takes: the largest power of each derivative, then its frequency;
+- *spectral maps* (4, H/2, W/2), what the paper's network takes: the largest power of each derivative, then its
+  frequency;
 - *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.wave` takes: two peaks, power by band, the spectrum's centre and
   width, the gradient of the phase at the strongest frequency with its coherence (a travelling wave's wave number), and
   what the clip looks like at rest.
@@ -138,7 +140,8 @@ class FrontEnd:
 
     @cached_property
     def _fourier(self) -> Tensor:
-        """(2, time // 2, time): real and imaginary part of the windowed transform over √N_t, the bin at zero left out."""
+        """(2, time // 2, time): real and imaginary part of the windowed transform over √N_t, the bin at zero left
+        out."""
         count = self.frames
         window = torch.hann_window(count, periodic=True, dtype=torch.float64)
         window = window * (count / window.square().sum()).sqrt() / math.sqrt(count)
@@ -195,8 +198,8 @@ def _sum_of_four(values: Tensor) -> Tensor:
 def _phases(real: Tensor, imaginary: Tensor, place: Tensor) -> Tensor:
     """(2, 4, h/2, w/2): phase gradient along x and y [π a pixel] at bin `place` (2, 1, h/2, w/2), and their coherence.
 
-    Along x it is the angle of C = Σ F(x + 1, y) F*(x, y) over the two pairs of neighbours in each two by two pixels, and
-    the coherence is |C|/√(Σ|F(x + 1)|² Σ|F(x)|²), 1 for a plane wave.
+    Along x it is the angle of C = Σ F(x + 1, y) F*(x, y) over the two pairs of neighbours in each two by two pixels,
+    and the coherence is |C|/√(Σ|F(x + 1)|² Σ|F(x)|²), 1 for a plane wave.
     """
     corners = [
         (part[..., row::2, column::2].gather(1, place).squeeze(1))

@@ -1,8 +1,8 @@
 """What networks are to tell of a clip: physical parameters, their ranges, and how they become numbers to learn.
 
-Each target lies in a range, that of the search space of Runia et al. 2020 (table 1). What networks learn is the logit of
-its place in that range, widened by 1 % so that the ends stay finite: a distribution over it has no mass outside of what
-was simulated, and a uniform prior becomes a logistic one.
+Each target lies in a range, that of the search space of Runia et al. 2020 (table 1). What networks learn is the logit
+of its place in that range, widened by 1 % so that the ends stay finite: a distribution over it has no mass outside of
+what was simulated, and a uniform prior becomes a logistic one.
 """
 
 from __future__ import annotations

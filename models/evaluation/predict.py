@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 import torch
+from models.evaluation.predictions import Predictions
 from torch import Tensor
 
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
 from models.estimator import Estimator
-from models.evaluation.predictions import Predictions
 from models.learner import Learner, Loss
 from models.training.inputs import Prepared
 
@@ -49,9 +49,7 @@ def predict(
     )  # fmt: skip
 
 
-def _told(
-    estimator: Estimator, prepared: Prepared, *, seed: int
-) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
+def _told(estimator: Estimator, prepared: Prepared, *, seed: int) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     learner = estimator.learners[0]
     draws, means, embeddings = [], [], []
     for first in range(0, len(prepared), _TOGETHER):

@@ -124,8 +124,8 @@ def trained(
             ranks.barrier()  # the first prepares the inputs for all
         with bars(len(set(train_pairs.table.recording.tolist())), f"{recipe.name}: prepare", "film") as advance:
             train_inputs = prepare_films(
-                train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, seed=recipe.seed,
-                folder=cache, workers=workers, advance=advance, sequences=recipe.data.sequences,
+                train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=cache,
+                workers=workers, advance=advance, sequences=recipe.data.sequences, seed=recipe.seed,
             )  # fmt: skip
         with bars(len(validation_pairs), f"{recipe.name}: prepare what validates", "clip") as advance:
             validation_inputs = prepare_clips(

@@ -6,12 +6,15 @@ variant of each film, the next epoch the next. This is exact for all that the au
 the filters; a mirror image, for one, could not be made of the maps, as a maximum of slopes is not minus that of their
 negatives.
 
-The folder is disposable and outside the lake; a file is named by the hash of all that shapes it (the pairs' fingerprint,
-the front end, the crops, the seed), and a preparation that was stopped goes on.
+The folder is disposable and outside the lake. A film's file is named by the hash of all that shapes it (the object and
+its frames, the front end, the crops and their seed), so that trainings of other seeds, and on parts of the films, share
+them, and a preparation that was stopped goes on.
 """
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -20,12 +23,11 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.dataset.pairs import Pairs
-from flagdata.errors import FlagdataError, InputError
+from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import stream
 from models import targets
@@ -35,19 +37,53 @@ from models.frontend import FrontEnd, standardised
 Advance = Callable[[int], None]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """One array (variants, *shape) a file; indexed by entries and variants as one array (n, variants, *shape) would be.
+
+    Attributes:
+        paths: of n files.
+        shape: (n, variants, *shape).
+    """
+
+    paths: tuple[Path, ...]
+    shape: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __getitem__(self, place: tuple[NDArray[np.int64], NDArray[np.int64]]) -> NDArray[Any]:
+        """(len(entries), *shape).
+
+        Raises:
+            CorruptError: a file that is cut off or gone.
+        """
+        found = []
+        for entry, variant in zip(*place, strict=True):
+            path = self.paths[entry]
+            try:
+                found.append(np.load(path, mmap_mode="r")[variant])
+            except (OSError, ValueError) as error:
+                raise CorruptError(
+                    f"a prepared input cannot be read: {error}", where=str(path),
+                    fix="delete the file and give the command again: it is made anew",
+                ) from None  # fmt: skip
+        return np.stack(found)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
     """Inputs of n entries, `variants` of each, and what is known of them.
 
     Attributes:
-        maps: (n, variants, *shape) float16 or uint8, read from disk as they are needed.
+        maps: (n, variants, *shape) float16 or uint8: an array, or files that are read as they are needed.
         parameters: name → (n,) values.
         sequence: (n,) seed of the simulation, or a number of its own for each recording that has none.
         fingerprint: of the pairs they were made of.
         front_end: they were made by.
     """
 
-    maps: NDArray[Any]
+    maps: NDArray[Any] | Files
     parameters: dict[str, NDArray[np.float64]]
     sequence: NDArray[np.int64]
     fingerprint: str
@@ -73,7 +109,7 @@ class Prepared:
 
     def batch(self, entries: NDArray[np.int64], variant: NDArray[np.int64]) -> Tensor:
         """(len(entries), *shape) float32."""
-        return as_input(torch.from_numpy(np.asarray(self.maps[entries, variant])))
+        return as_input(torch.from_numpy(self.maps[entries, variant]))
 
 
 def as_input(stored: Tensor) -> Tensor:
@@ -89,16 +125,19 @@ def prepare_films(
     cropping: Cropping,
     *,
     variants: int,
-    seed: int,
     folder: Path,
     workers: int,
     advance: Advance,
     sequences: int | None = None,
+    seed: int = 0,
 ) -> Prepared:
     """Random crops of whole films, for training: entries are films.
 
+    The crops depend on the film and the number of the variant alone, not on a training's seed.
+
     Args:
         sequences: how many of the simulations are used, those of a random order's beginning; None for all.
+        seed: of that order.
         advance: told how many entries were done.
 
     Raises:
@@ -107,12 +146,13 @@ def prepare_films(
     """
     rows = np.unique(pairs.table.recording, return_index=True)[1]
     rows = rows[_first_sequences(pairs, rows, count=sequences, seed=seed)]
-    key = {"films": pairs.table.recording[rows].tolist(), "variants": variants, "seed": seed, "crops": asdict(cropping)}
 
-    def made(entry: int) -> list[Tensor]:
-        film = pairs.film(int(rows[entry]))
-        recording = str(pairs.table.recording[rows[entry]])
-        drawn = [cropping.draw(stream(seed, "crop", recording, variant), _shape(film)) for variant in range(variants)]
+    def key(row: int) -> dict[str, Any]:
+        return {"film": pairs.table.recording[row], "variants": variants, "crops": asdict(cropping)}
+
+    def made(row: int) -> list[Tensor]:
+        film, recording = pairs.film(row), str(pairs.table.recording[row])
+        drawn = [cropping.draw(stream(0, "crop", recording, variant), _shape(film)) for variant in range(variants)]
         return [cropping.cut(film, crop) for crop in drawn]
 
     return _prepared(pairs, rows, front_end, key, made, variants, folder, workers, advance)
@@ -127,95 +167,95 @@ def prepare_clips(
         InputError: clips of another length than the front end takes.
         FlagdataError: the disk is full.
     """
-    rows = np.arange(len(pairs))
-    key = {"clips": pairs.table.artifact.tolist(), "crops": {"size": cropping.size, "frames": cropping.frames}}
 
-    def made(entry: int) -> list[Tensor]:
-        clip = pairs[entry].clip[0].numpy()
+    def key(row: int) -> dict[str, Any]:
+        return {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
+
+    def made(row: int) -> list[Tensor]:
+        clip = pairs[row].clip[0].numpy()
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
-    return _prepared(pairs, rows, front_end, key, made, 1, folder, workers, advance)
+    return _prepared(pairs, np.arange(len(pairs)), front_end, key, made, 1, folder, workers, advance)
 
 
 def _prepared(
     pairs: Pairs,
     rows: NDArray[np.int64],
     front_end: FrontEnd,
-    key: dict[str, Any],
+    key: Callable[[int], dict[str, Any]],
     made: Callable[[int], list[Tensor]],
     variants: int,
     folder: Path,
     workers: int,
     advance: Advance,
 ) -> Prepared:
-    frames = front_end.maps == "frames"
-    name = digest(canonical({"front_end": front_end.hash, "pairs": pairs.fingerprint, **key}))[:32]
-    folder.mkdir(parents=True, exist_ok=True)
-    whole, part, done = (folder / f"{name}{suffix}" for suffix in (".npy", ".part.npy", ".done.npy"))
-    shape = (len(rows), variants, *front_end.shape)
+    own = folder / f"{front_end.maps}-{front_end.hash}"
+    named = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
+    paths = tuple(own / name[:2] / f"{name}.npy" for name in named)
+    missing = [(row, path) for row, path in zip(rows.tolist(), paths, strict=True) if not path.exists()]
+    advance(len(rows) - len(missing))
     try:
-        if not whole.exists():
-            _fill(part, done, shape, np.dtype(np.uint8 if frames else np.float16), front_end, made, workers, advance)
-            part.rename(whole)
-            done.unlink()
-        else:
-            advance(len(rows))
-        maps = np.load(whole, mmap_mode="r")
+        for row, path in missing[:1]:  # what is wrong with all of them is said by the first
+            _write(path, made(row), front_end)
+            advance(1)
+        _fill(missing[1:], made, front_end, workers, advance)
     except OSError as error:
         raise FlagdataError(
             f"preparing the inputs failed: {error.strerror or error}", where=str(folder),
             fix="free some space or name another folder by --cache; what was done is kept",
         ) from error  # fmt: skip
     known = pairs.table.parameters[rows]
-    seeded, own = pairs.table.seeded[rows], -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
+    alone = -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
     return Prepared(
-        maps=maps, parameters={str(n): known[:, k] for k, n in enumerate(pairs.table.names)},
-        sequence=np.where(seeded, pairs.table.seed[rows], own), fingerprint=pairs.fingerprint, front_end=front_end,
+        maps=Files(paths=paths, shape=(len(rows), variants, *front_end.shape)),
+        parameters={str(n): known[:, k] for k, n in enumerate(pairs.table.names)},
+        sequence=np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone),
+        fingerprint=digest("\n".join([pairs.fingerprint, *named])), front_end=front_end,
     )  # fmt: skip
 
 
+def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:
+    return digest(canonical({"front_end": front_end.hash, "object": content, **{k: _plain(v) for k, v in key.items()}}))
+
+
+def _plain(value: Any) -> Any:
+    return str(value) if isinstance(value, str) else value
+
+
 def _fill(
-    part: Path,
-    done: Path,
-    shape: tuple[int, ...],
-    dtype: np.dtype[Any],
-    front_end: FrontEnd,
+    missing: Sequence[tuple[int, Path]],
     made: Callable[[int], list[Tensor]],
+    front_end: FrontEnd,
     workers: int,
     advance: Advance,
 ) -> None:
-    """Fill what is missing; `done` says of each entry whether it is there."""
-    if part.exists() and done.exists():
-        maps, there = open_memmap(part, mode="r+"), open_memmap(done, mode="r+")
-    else:
-        maps = open_memmap(part, mode="w+", dtype=dtype, shape=shape)
-        there = open_memmap(done, mode="w+", dtype=np.uint8, shape=shape[:1])
-    missing = np.flatnonzero(there == 0).tolist()
-    advance(shape[0] - len(missing))
-
-    def fill(entry: int) -> int:
-        for variant, clip in enumerate(made(entry)):
-            if dtype == np.uint8:
-                maps[entry, variant] = clip.round().to(torch.uint8).numpy()
-            else:
-                maps[entry, variant] = front_end(clip[None])[0].to(torch.float16).numpy()
-        return entry
-
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     pool = ThreadPoolExecutor(workers, thread_name_prefix="inputs")
     try:
-        for number, finished in enumerate(as_completed([pool.submit(fill, entry) for entry in missing]), start=1):
-            there[finished.result()] = 1
+        todo = [pool.submit(lambda row, path: _write(path, made(row), front_end), row, path) for row, path in missing]
+        for finished in as_completed(todo):
+            finished.result()
             advance(1)
-            if number % 256 == 0:
-                maps.flush()
-                there.flush()
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
         torch.set_num_threads(threads)
-    maps.flush()
-    there.flush()
+
+
+def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
+    """The front end's output of some clips, beside its place and then renamed: a file is whole or not there."""
+    if front_end.maps == "frames":
+        stored = np.stack([clip.round().to(torch.uint8).numpy() for clip in clips])
+    else:
+        stored = np.stack([front_end(clip[None])[0].to(torch.float16).numpy() for clip in clips])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scratch = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}.part")
+    try:
+        with scratch.open("wb") as stream:
+            np.save(stream, stored)
+        scratch.rename(path)
+    finally:
+        scratch.unlink(missing_ok=True)
 
 
 def _first_sequences(pairs: Pairs, rows: NDArray[np.int64], *, count: int | None, seed: int) -> NDArray[np.bool_]:

@@ -30,7 +30,9 @@ def network_artifact(recipe: TrainingRecipe, data: dict[str, Any]) -> Artifact:
     return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=held, seed=recipe.seed)
 
 
-def card_of(recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any]) -> dict[str, Any]:
+def card_of(
+    recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any]
+) -> dict[str, Any]:
     """All that is known of a model, as JSON."""
     learner = trained.learner
     best = trained.course.best

@@ -1,0 +1,215 @@
+"""`flagdata evaluate`: trained networks on clips that they never saw, in one table."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.console import document, json_option, lake_option, progress, say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from models.evaluation.curves import LearningPoint
+    from models.evaluation.evaluation import Evaluation
+    from models.evaluation.predictions import Predictions
+
+    from flagdata.dataset import Pairs, Source
+    from flagdata.lake import Artifact
+    from models.estimator import Estimator
+    from models.training.inputs import Prepared
+
+
+@click.command()
+@click.argument("models", metavar="MODEL...", nargs=-1, required=True)
+@click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
+@click.option("--side", default="test", show_default=True, help="Side of it: train, validation, test.")
+@click.option("--at", metavar="REF", help="Tag, branch or version of the lake; by default its head.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", default=Path("evaluation"), show_default=True,
+              help="Where the page, the table in Markdown and the JSON go.")  # fmt: skip
+@click.option("--name", default="evaluation", show_default=True, help="Of the files, without their endings.")
+@click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
+              help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.")  # fmt: skip
+@click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
+@click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")
+@click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of draws and of the bootstrap.")
+@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
+@json_option
+@lake_option
+def evaluate(
+    models: Sequence[str],
+    dataset: str,
+    side: str,
+    at: str | None,
+    out: Path,
+    name: str,
+    cache: Path | None,
+    reference: str | None,
+    tsne: str | None,
+    handmade: bool,
+    seed: int,
+    workers: int | None,
+    as_json: bool,
+    lake_path: str,
+) -> None:
+    """Judge trained networks on one side of a data set and write the table.
+
+    MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
+    that comes with the package. Networks that were trained on a part of the sequences make the learning curve.
+
+    \b
+      flagdata evaluate wave sdn --at v1 --lake lake --out evaluation
+    """
+    from models.evaluation.evaluation import as_document
+
+    import flagdata
+    from models.evaluation import report
+
+    source = flagdata.open(lake_path)
+    folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
+    desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed)
+    found = desk.evaluation(models, side=side, reference=reference, tsne=tsne, handmade=handmade)
+    page, text, data = report.write(found, out, name=name)
+    if as_json:
+        document("evaluation", as_document(found))
+    else:
+        click.echo(report.markdown(found))
+        say(f"{page}\n{text}\n{data}")
+
+
+class _Desk:
+    """Where models are judged: a data set, and what was prepared of it."""
+
+    def __init__(self, source: Source, dataset: str, at: str | None, cache: Path, workers: int, seed: int) -> None:
+        self._source, self._dataset, self._at = source, dataset, at
+        self._cache, self._workers, self._seed = cache, workers, seed
+        self._pairs: dict[str, Pairs] = {}
+        self._prepared: dict[tuple[str, str], Prepared] = {}
+
+    def evaluation(
+        self, names: Sequence[str], *, side: str, reference: str | None, tsne: str | None, handmade: bool
+    ) -> Evaluation:
+        from models.evaluation.evaluation import evaluate as scored
+
+        told: list[Predictions] = []
+        learning: list[tuple[int, Predictions]] = []
+        for row, estimator in self._models(names):
+            predictions = self._predictions(estimator, side)
+            sequences = estimator.card["recipe"]["data"]["sequences"] if row is not None else None  # pyright: ignore[reportIndexIssue]
+            if sequences is None:
+                told.append(predictions)
+            else:
+                learning.append((int(sequences), predictions))
+        if handmade:
+            told += self._handmade(side)
+        return scored(
+            told or [predictions for _, predictions in learning], data=f"{self._dataset}, {side} side, at {self._at or 'head'}",
+            seed=self._seed, reference=reference, tsne_of=tsne, learning=_points(learning, told, self._all_sequences()),
+        )  # fmt: skip
+
+    def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
+        from flagdata.errors import UnknownNameError
+        from flagdata.schema import Kind
+        from models import estimator
+
+        lake = self._source.lake
+        rows = lake.rows(f"kind = '{Kind.NETWORK}'", at=self._at, columns=["artifact", "name"]).to_pylist()
+        found: list[tuple[Artifact | None, Estimator]] = []
+        for name in names:
+            if name == "shipped":
+                found.append((None, estimator.shipped()))
+                continue
+            meant = [row["artifact"] for row in rows if row["name"] == name]
+            meant = meant or [row["artifact"] for row in rows if len(name) >= 6 and row["artifact"].startswith(name)]
+            if not meant:
+                raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows} | {"shipped"}))
+            for artifact in sorted(meant):
+                row = lake.artifact(artifact, at=self._at)
+                found.append((row, estimator.load(lake.object_path(str(row.object)))))
+        return found
+
+    def _side(self, side: str) -> Pairs:
+        from flagdata.dataset import ExplicitSplit
+        from models.training.recipe import DataSpec
+
+        if side not in self._pairs:
+            spec = DataSpec(dataset=self._dataset)
+            split = ExplicitSplit(where={name: spec.where(name) for name in {"train", side}})
+            self._pairs[side] = self._source.pairs(at=self._at, split=side, split_by=split)
+        return self._pairs[side]
+
+    def _clips(self, side: str, estimator: Estimator) -> Prepared:
+        from models.training.inputs import prepare_clips
+
+        key = (side, estimator.front_end.hash)
+        if key not in self._prepared:
+            pairs = self._side(side)
+            with _bar(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
+                self._prepared[key] = prepare_clips(
+                    pairs, estimator.front_end, estimator.cropping, folder=self._cache, workers=self._workers,
+                    advance=advance,
+                )  # fmt: skip
+        return self._prepared[key]
+
+    def _predictions(self, estimator: Estimator, side: str) -> Predictions:
+        from models.evaluation.predict import predict, time_a_clip
+        from models.learner import Loss
+
+        contrast = estimator.learners[0].objective is Loss.CONTRASTIVE
+        return predict(
+            estimator, self._clips(side, estimator), label=estimator.name, note=_note(estimator), seed=self._seed,
+            milliseconds=time_a_clip(estimator, self._side(side)),
+            fitted_on=self._clips("train", estimator) if contrast else None,
+        )  # fmt: skip
+
+    def _all_sequences(self) -> int:
+        return len(set(self._side("train").table.seed.tolist()))
+
+    def _handmade(self, side: str) -> list[Predictions]:
+        from models.evaluation.handmade import predictions
+
+        return predictions(
+            self._side("train"), self._side(side), cache=self._cache, workers=self._workers, seed=self._seed, bars=_bar
+        )
+
+
+def _note(estimator: Estimator) -> str:
+    card: Any = estimator.card
+    shape = estimator.front_end
+    size = f"{shape.frames}×{shape.size}×{shape.size}"
+    best = card.get("best") or {}
+    epochs = f", {card['epochs']} epochs, best {best['number'] + 1}" if best else ""
+    return f"{size}, {shape.maps}{epochs}, seed {card['seed']}"
+
+
+def _points(
+    learning: Sequence[tuple[int, Predictions]], told: Sequence[Predictions], everything: int
+) -> list[LearningPoint]:
+    """RMSE of wind against the number of sequences; the models of all of them are its last points."""
+    from models.evaluation.bootstrap import Resamples, estimate
+    from models.evaluation.curves import LearningPoint
+    from models.evaluation.predictions import WIND
+    from models.evaluation.scores import SCORES
+
+    from flagdata.rng import stream
+
+    labels = {predictions.label for _, predictions in learning}
+    rows = [*learning, *((everything, own) for own in told if own.label in labels)]
+    points = []
+    for sequences, own in sorted(rows, key=lambda row: (row[1].label, row[0])):
+        resamples = Resamples.of(own.group, generator=stream(0, "learning"))
+        found = estimate(SCORES["rmse"].values(own, WIND, resamples), clips=len(own.group), groups=resamples.groups)
+        points.append(
+            LearningPoint(label=own.label, sequences=sequences, rmse=found.value, interval=(found.low, found.high))
+        )
+    return points
+
+
+def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
+    return progress(total, label=label, unit=unit)
