@@ -1,8 +1,8 @@
 """Intervals over sequences: clips of one simulation are not independent, so whole groups are drawn with replacement.
 
 Percentile bootstrap of clusters (Davison and Hinkley, Bootstrap Methods and their Application, 1997, sections 3.8 and
-5.3). Scores are functions of sums over clips, so a draw is a vector of how often each group occurs, and its sums are one
-matrix product. Two models that are scored with the same `Resamples` are compared pair by pair.
+5.3). Scores are functions of sums over clips, so a draw is a vector of how often each group occurs, and its sums are
+one matrix product. Two models that are scored with the same `Resamples` are compared pair by pair.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ class Estimate:
 
     Attributes:
         value: of the data; NaN where it is undefined (a correlation with a constant).
-        low, high: percentile interval of `LEVEL`; NaN with fewer than two groups, of which nothing is known about others.
+        low, high: percentile interval of `LEVEL`; NaN with fewer than two groups, which say nothing about
+            others.
         clips, groups: how many the value rests on.
     """
 

@@ -115,18 +115,16 @@ def _mean(share: Array, resamples: Resamples) -> Array:
 
 
 def coverage(
-    predictions: Predictions, target: str, resamples: Resamples, *, levels: tuple[float, ...] = LEVELS
+    runs: tuple[Predictions, ...], target: str, resamples: Resamples, *, levels: tuple[float, ...] = LEVELS
 ) -> tuple[Coverage, ...]:
-    """Covered share of central intervals at nominal levels, with intervals over groups."""
-    return tuple(
-        Coverage(
-            level=level,
-            share=estimate(
-                coverage_values(predictions, target, level, resamples), clips=predictions.clips, groups=resamples.groups
-            ),
-        )
-        for level in levels
-    )
+    """Covered share of central intervals at nominal levels, mean over runs of one model, with intervals over groups."""
+    found = [cells(run, target) for run in runs]
+    return tuple(_covered(level, [of.central(level) for of in found], resamples) for level in levels)
+
+
+def _covered(level: float, shares: list[Array], resamples: Resamples) -> Coverage:
+    values = np.mean([_mean(share, resamples) for share in shares], axis=0)
+    return Coverage(level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups))
 
 
 def pit(predictions: Predictions, target: str) -> Array:
@@ -135,21 +133,21 @@ def pit(predictions: Predictions, target: str) -> Array:
     return (found.low + found.high) / 2
 
 
-def rank_histogram(predictions: Predictions, target: str, *, bins: int = BINS) -> RankHistogram:
-    """Ranks of the truths among the draws in `bins` bins, with the band of a calibrated model.
+def rank_histogram(runs: tuple[Predictions, ...], target: str, *, bins: int = BINS) -> RankHistogram:
+    """Ranks of the truths among the draws in `bins` bins, mean over runs of one model, with a calibrated model's band.
 
     A cell that reaches over an edge counts in both bins by its shares, so s + 1 need not be a multiple of the bins.
     """
     if bins < 2:
         raise InputError(f"{bins} bins", where="bins", fix="give at least 2")
-    found = cells(predictions, target)
     edges = np.linspace(0, 1, bins + 1)
-    inside = np.diff(np.stack([found.below(float(edge)) for edge in edges]), axis=0)
-    _, index, size = np.unique(predictions.group, return_inverse=True, return_counts=True)
+    found = [cells(run, target) for run in runs]
+    below = np.mean([[of.below(float(edge)) for edge in edges] for of in found], axis=0)
+    _, index, size = np.unique(runs[0].group, return_inverse=True, return_counts=True)
     groups = len(size)
     low, high = binom.interval(BAND, groups, 1 / bins)
     return RankHistogram(
-        share=tuple((inside / size[index]).sum(axis=1) / groups),
+        share=tuple(float(share) for share in (np.diff(below, axis=0) / size[index]).sum(axis=1) / groups),
         low=float(low) / groups,
         high=float(high) / groups,
         groups=groups,
@@ -157,13 +155,13 @@ def rank_histogram(predictions: Predictions, target: str, *, bins: int = BINS) -
 
 
 def tarp(
-    predictions: Predictions,
+    runs: tuple[Predictions, ...],
     resamples: Resamples,
     *,
     generator: np.random.Generator,
     levels: tuple[float, ...] = CURVE,
 ) -> tuple[Coverage, ...]:
-    """Expected coverage of all targets together by tests of accuracy with random points.
+    """Expected coverage of all targets together by tests of accuracy with random points, mean over runs of one model.
 
     Each clip gets a reference point, uniform over the box of all truths and independent of the clip. The ball around it
     that reaches to the truth holds a share of the draws; if the distributions are calibrated, that share is uniform.
@@ -171,14 +169,21 @@ def tarp(
     its range. A model whose distributions are all the prior is calibrated too: this says nothing of sharpness.
 
     Args:
-        predictions: with samples.
-        resamples: of its groups.
-        generator: of the reference points.
+        runs: with samples.
+        resamples: of the clips' groups.
+        generator: of the reference points, which are the same for all runs.
         levels: nominal.
 
     Raises:
         InputError: no samples, or a target that is the same in all clips.
     """
+    reference = generator.uniform(size=runs[0].truth.shape)
+    found = [_ball(run, reference) for run in runs]
+    return tuple(_covered(level, [of.below(level) for of in found], resamples) for level in levels)
+
+
+def _ball(predictions: Predictions, reference: Array) -> Cells:
+    """Where the truth's distance from the reference (n, t) stands among the draws'."""
     draws = _draws(predictions).astype(np.float64)
     low, high = predictions.truth.min(axis=0), predictions.truth.max(axis=0)
     if not (high > low).all():
@@ -187,15 +192,6 @@ def tarp(
             f"{constant} is the same in all clips", where=f"predictions of {predictions.label!r}",
             fix="test on sequences that differ in it, or leave it out of the targets",
         )  # fmt: skip
-    reference = generator.uniform(size=predictions.truth.shape)
-    truth = (predictions.truth - low) / (high - low)
-    to_truth = np.linalg.norm(truth - reference, axis=1)
+    to_truth = np.linalg.norm((predictions.truth - low) / (high - low) - reference, axis=1)
     to_draws = np.linalg.norm((draws - low) / (high - low) - reference[:, None, :], axis=2)
-    found = Cells.of(to_truth, to_draws)
-    return tuple(
-        Coverage(
-            level=level,
-            share=estimate(_mean(found.below(level), resamples), clips=predictions.clips, groups=resamples.groups),
-        )
-        for level in levels
-    )
+    return Cells.of(to_truth, to_draws)

@@ -74,7 +74,9 @@ class Predictions:
                 raise InputError("the embedding has no dimension", where=where, fix="give None for a model without")
         if self.parameters < 0 or not math.isfinite(self.milliseconds) or self.milliseconds < 0:
             raise InputError(
-                f"{self.parameters} parameters and {self.milliseconds} ms a clip", where=where, fix="give what was counted"
+                f"{self.parameters} parameters and {self.milliseconds} ms a clip",
+                where=where,
+                fix="give what was counted",
             )
 
     @staticmethod

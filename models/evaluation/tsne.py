@@ -54,10 +54,14 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
     wind = predictions.truth[:, predictions.column(WIND)]
     chosen = np.arange(predictions.clips)
     if predictions.clips > most:
-        chosen = np.sort(rng.stream(seed, "evaluation", "t-sne", "clips").choice(predictions.clips, most, replace=False))
+        chosen = np.sort(
+            rng.stream(seed, "evaluation", "t-sne", "clips").choice(predictions.clips, most, replace=False)
+        )
     if len(chosen) <= perplexity:
         raise InputError(
-            f"{len(chosen)} clips and a perplexity of {perplexity:g}", where=where, fix="lay out more clips, or lower it"
+            f"{len(chosen)} clips and a perplexity of {perplexity:g}",
+            where=where,
+            fix="lay out more clips, or lower it",
         )
     optimiser = TSNE(
         n_components=2, perplexity=perplexity, method="barnes_hut", init="pca", learning_rate="auto",
