@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from flagdata import rng
 from flagdata.errors import UnknownNameError
 from flagdata.findings import Finding, Severity
@@ -141,6 +143,12 @@ def evaluate(
     values = {label: table.mean_values(of) for label, of in runs.items()}
     with_wind = {label: of for label, of in models.items() if WIND in of[0].targets}
     with_samples = {label: of for label, of in models.items() if of[0].samples is not None}
+    varied = {label: of for label, of in with_samples.items() if (np.ptp(of[0].truth, axis=0) > 0).all()}
+    findings += [
+        _warning("no-tarp", f"a target of {label} is the same in all clips: there is no expected coverage (TARP)")
+        for label in with_samples
+        if label not in varied
+    ]
     if reference is None and with_wind:
         reference = min(with_wind, key=lambda label: float(values[label]["rmse"][0]))
     return Evaluation(
@@ -169,7 +177,7 @@ def evaluate(
         ),
         expected=tuple(
             Expected(label=label, curve=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")))
-            for label, of in with_samples.items()
+            for label, of in varied.items()
         ),
         learning=tuple(learning),
         frames=tuple(frames),

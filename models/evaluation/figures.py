@@ -38,10 +38,8 @@ def _svg(figure: Figure, name: str) -> Markup:
     target = io.StringIO()
     figure.savefig(target, format="svg", transparent=True, metadata={"Date": None})
     text = target.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(
-        r'(<svg [^>]*?)width="[^"]*" height="[^"]*"|(<svg [^>]*?)height="[^"]*" ?width="[^"]*"', r"\1\2", text, count=1
-    )
+    head, tail = text[text.index("<svg") :].split(">", 1)
+    text = re.sub(r' (width|height)="[^"]*"', "", head) + ">" + tail
     text = re.sub(r"(\bid=\"|url\(#|href=\"#)", rf"\g<1>{name}-", text)
     for colour, variable in _THEME.items():
         text = text.replace(colour, f"var({variable})")
@@ -138,6 +136,7 @@ def ranks(curves: Sequence[Calibration]) -> Markup:
     labels = list(dict.fromkeys(one.label for one in curves))
     columns = max(sum(one.label == label for one in curves) for label in labels)
     look = _look(labels)
+    top = 1.15 * max(max(*one.ranks.share, one.ranks.high) for one in curves)
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(_WIDTH, 1.8 * len(labels) + 0.3), layout="constrained")
         grid = figure.subplots(len(labels), columns, squeeze=False, sharey=True)
@@ -147,7 +146,7 @@ def ranks(curves: Sequence[Calibration]) -> Markup:
                 edges = np.linspace(0, 1, len(one.ranks.share) + 1)
                 axes.axhspan(one.ranks.low, one.ranks.high, color=_QUIET, alpha=0.18, linewidth=0)
                 axes.stairs(one.ranks.share, edges, color=look[label]["color"], linewidth=1.4)
-                axes.set(title=f"{label}: {one.target}", xlim=(0, 1), ylim=(0, None))
+                axes.set(title=f"{label}: {one.target}", xlim=(0, 1), ylim=(0, top))
             line[0].set_ylabel("share of clips")
             for axes in line[len(own) :]:
                 axes.set_axis_off()

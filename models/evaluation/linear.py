@@ -124,8 +124,8 @@ def leave_one_group_out(
 ) -> Array:
     """Predictions (n, t) for each group by principal component regression on all others.
 
-    PCA and regression are both fitted without the group. Nothing is fitted anew from clips: the other groups' scatter and
-    cross moments are the whole's less the group's own, so a fold costs one eigenvalue problem of min(n - 1, d) rows.
+    PCA and regression are both fitted without the group. The other groups' scatter and cross moments are the whole's
+    less the group's own (a closed form, exact), so a fold costs one eigenvalue problem of min(n - 1, d) rows.
     Coordinates are first turned into the embedding's own row space, which loses nothing and changes no PCA.
 
     Args:

@@ -42,6 +42,6 @@ FLAGSIM = (
 TRIPLETS = ((10, 0.893), (20, 0.921), (30, 0.963), (40, 0.901), (50, 0.924))
 """(frames, triplet accuracy) of the paper's SDN."""
 WARNING = (
-    "If a share 1 − A of the errors exceeds 0.5 m/s, then RMSE ≥ 0.5 √(1 − A) m/s. Four rows of the paper's table break "
-    "this bound, so its two columns cannot be in the same units. They are quoted, not compared with."
+    "If a share 1 − A of the errors exceeds 0.5 m/s, then RMSE ≥ 0.5 √(1 − A) m/s. Four rows of the paper's table "
+    "break this bound, so its two columns cannot be in the same units. They are quoted, not compared with."
 )

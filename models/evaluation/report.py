@@ -246,14 +246,15 @@ def _pictures(found: Evaluation) -> list[Picture]:
                 title="Calibration",
                 svg=figures.calibration(found.calibrations, found.expected),
                 caption="Share of truths inside central intervals, over their nominal level. Below the dashed line "
-                "distributions are too narrow or biased, above it too wide. TARP (Lemos et al. 2023) tests all targets together.",
+                "distributions are too narrow or biased, above it too wide. TARP (Lemos et al. 2023) tests all targets "
+                "together.",
             ),
             Picture(
                 title="Ranks of the truth among the draws",
                 svg=figures.ranks(found.calibrations),
-                caption="Flat if calibrated (Talts et al. 2018); a hump is too wide, a trough too narrow, a slope biased. "
-                f"Shaded: where at least {100 * BAND:.0f} % of the shares of a calibrated model lie, bin by bin, sequences being "
-                "independent and clips of one sequence not.",
+                caption="Flat if calibrated (Talts et al. 2018); a hump is too wide, a trough too narrow, a slope "
+                f"biased. Shaded: where at least {100 * BAND:.0f} % of the shares of a calibrated model lie, bin by "
+                "bin, sequences being independent and clips of one sequence not.",
             ),
         ]
     if found.learning:
@@ -277,8 +278,8 @@ def _pictures(found: Evaluation) -> list[Picture]:
             Picture(
                 title=f"t-SNE of the embedding of {found.layout.label}",
                 svg=figures.t_sne(found.layout),
-                caption=f"{len(found.layout.wind):,} of {found.layout.clips:,} clips. Distances between clusters and their "
-                "sizes mean nothing.",
+                caption=f"{len(found.layout.wind):,} of {found.layout.clips:,} clips. Distances between clusters and "
+                "their sizes mean nothing.",
                 square=True,
             )
         )

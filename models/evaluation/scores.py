@@ -1,4 +1,4 @@
-"""Scores of point estimates: RMSE, Acc@0.5, bias, R², Pearson's r, error against wind, and the bound between two of them.
+"""Scores of point estimates: RMSE, Acc@0.5, bias, R², Pearson's r, error against wind, and a bound between two of them.
 
 All in the units of the target; wind speed in m/s.
 """
@@ -81,16 +81,16 @@ SCORES: dict[str, Score] = {
     "pearson": Score(terms=_moments, value=_pearson),
 }
 """By name. "accuracy" is the share of clips whose error is at most 0.5 (Acc@0.5 for wind in m/s); "bias" is the mean of
-estimate less truth; "relative_error" is the RMSE over the standard deviation of the truth over the clips tested, which is
-1 for whoever always says their mean, and equals √(1 - R²)."""
+estimate less truth; "relative_error" is the RMSE over the standard deviation of the truth over the clips tested, which
+is 1 for whoever always says their mean, and equals √(1 - R²)."""
 
 
 def rmse_bound(accuracy: float) -> float:
     """The least RMSE [m/s] that goes with an Acc@0.5: RMSE ≥ 0.5 √(1 - A).
 
     Proof. Let e be the errors of n clips and A the share of those with |e| ≤ 0.5. The other (1 - A) n clips have
-    e² > 0.25, and no square is negative, so n RMSE² = Σ e² ≥ 0.25 (1 - A) n. Equality is approached by errors of 0 and of
-    just more than 0.5. ∎ (Chebyshev's inequality for the empirical distribution.)
+    e² > 0.25, and no square is negative, so n RMSE² = Σ e² ≥ 0.25 (1 - A) n. Equality is approached by errors of 0 and
+    of just more than 0.5. ∎ (Chebyshev's inequality for the empirical distribution.)
 
     Raises:
         InputError: the accuracy is no share.
@@ -102,7 +102,7 @@ def rmse_bound(accuracy: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class BinError:
-    """Errors of clips whose true wind lies in a bin [m/s]; `low` belongs to it, `high` to the next, the last has both."""
+    """Errors of clips whose true wind lies in a bin [m/s]: `low` belongs to it, `high` to the last bin only."""
 
     low: float
     high: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -182,7 +182,7 @@ def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Res
         bound=float(np.mean(bounds)) if bounds else None, speed=float(np.mean([own.milliseconds for own in runs])),
     )  # fmt: skip
     notes = "; ".join(dict.fromkeys(own.note for own in runs if own.note))
-    whole = Row(**{**whole.__dict__, "note": notes})
+    whole = replace(whole, note=notes)
     return (whole, *single) if len(runs) > 1 else (whole,)
 
 
@@ -308,8 +308,9 @@ COLUMNS = (
     Column(heading="note", cell=lambda row: (row.note or _NONE,)),
 )
 LEGEND = (
-    f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's and do not "
-    "hold what another training run would give, which the range of the runs shows. Bound: 0.5 √(1 − Acc@0.5) m/s, the least "
-    "RMSE that goes with the accuracy. Area weight error / spread: RMSE over the standard deviation of the true area weight over "
-    "the clips tested, which are draws of its prior; 1 for whoever always says the mean."
+    f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's "
+    "and do not hold what another training run would give, which the range of the runs shows. Bound: "
+    "0.5 √(1 − Acc@0.5) m/s, the least RMSE that goes with the accuracy. Area weight error / spread: RMSE over the "
+    "standard deviation of the true area weight over the clips tested, which are draws of its prior; 1 for whoever "
+    "always says the mean."
 )
