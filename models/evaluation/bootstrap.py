@@ -1,0 +1,115 @@
+"""Intervals over sequences: clips of one simulation are not independent, so whole groups are drawn with replacement.
+
+Percentile bootstrap of clusters (Davison and Hinkley, Bootstrap Methods and their Application, 1997, sections 3.8 and
+5.3). Scores are functions of sums over clips, so a draw is a vector of how often each group occurs, and its sums are
+one matrix product. Two models that are scored with the same `Resamples` are compared pair by pair.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+
+LEVEL = 0.90
+DRAWS = 2000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A score and its interval.
+
+    Attributes:
+        value: of the data; NaN where it is undefined (a correlation with a constant).
+        low, high: percentile interval of `LEVEL`; NaN with fewer than two groups, which say nothing about
+            others.
+        clips, groups: how many the value rests on.
+    """
+
+    value: float
+    low: float
+    high: float
+    clips: int
+    groups: int
+
+    @property
+    def known(self) -> bool:
+        """Whether it has an interval."""
+        return math.isfinite(self.low) and math.isfinite(self.high)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values; null for what is not known."""
+        return {
+            "value": self.value if math.isfinite(self.value) else None,
+            "interval": [self.low, self.high] if self.known else None,
+            "level": LEVEL,
+            "clips": self.clips,
+            "groups": self.groups,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Resamples:
+    """The data and draws of its groups with replacement.
+
+    Attributes:
+        index: (n,) the group of each clip, 0 to G - 1.
+        counts: (1 + draws, G) how often each group occurs; the first row is all ones, the data themselves.
+    """
+
+    index: NDArray[np.int64]
+    counts: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, group: NDArray[np.int64], *, generator: np.random.Generator, draws: int = DRAWS) -> Resamples:
+        """Draws from the groups of clips.
+
+        Args:
+            group: (n,) label of each clip's group.
+            generator: of the draws; a named stream.
+            draws: how many, at least 1.
+        """
+        if draws < 1:
+            raise InputError(f"{draws} bootstrap draws", where="draws", fix=f"give at least 1; {DRAWS} is usual")
+        labels, index = np.unique(group, return_inverse=True)
+        size = len(labels)
+        drawn = generator.multinomial(size, np.full(size, 1 / size), size=draws)
+        return cls(index=index.astype(np.int64), counts=np.vstack([np.ones((1, size)), drawn]))
+
+    @property
+    def groups(self) -> int:
+        return self.counts.shape[1]
+
+    def sums(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sums (1 + draws, k) over clips of terms (n, k), in the data and in each draw."""
+        per_group = np.zeros((self.groups, terms.shape[1]))
+        np.add.at(per_group, self.index, terms)
+        return self.counts @ per_group
+
+    def pair_ratio(self, hits: NDArray[np.float64], of: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Σ hits / Σ of (1 + draws,), where both (G, G) are sums over pairs of groups; a pair counts as often as the
+        product of its groups' occurrences."""
+        upper = np.einsum("bi,bi->b", self.counts @ hits, self.counts)
+        return ratio(upper, np.einsum("bi,bi->b", self.counts @ of, self.counts))
+
+
+def ratio(upper: NDArray[np.float64], lower: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quotient, NaN where the denominator is not positive."""
+    return np.divide(upper, lower, out=np.full(np.shape(upper), np.nan), where=lower > 0)
+
+
+def estimate(values: NDArray[np.float64], *, clips: int, groups: int) -> Estimate:
+    """The interval of values (1 + draws,), of which the first is the data's.
+
+    Draws in which the score is undefined (none of a bin's groups occurs) are left out.
+    """
+    drawn = values[1:][np.isfinite(values[1:])]
+    if groups < 2 or drawn.size == 0:
+        return Estimate(value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups)
+    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return Estimate(value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups)

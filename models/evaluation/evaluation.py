@@ -1,0 +1,250 @@
+"""Every score of every model, computed once: what the page, the words and the JSON document are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from flagdata import rng
+from flagdata.errors import UnknownNameError
+from flagdata.findings import Finding, Severity
+from models.evaluation import paper, table, triplets
+from models.evaluation.bootstrap import DRAWS, Resamples
+from models.evaluation.calibration import CURVE, LEVELS, Coverage, RankHistogram, coverage, rank_histogram, tarp
+from models.evaluation.curves import FramesPoint, LearningPoint
+from models.evaluation.linear import Readout
+from models.evaluation.predictions import WIND, Predictions
+from models.evaluation.scores import BinError, error_against
+from models.evaluation.tsne import Layout, layout
+
+SCHEMA = "flagdata.evaluation/1"
+_LEVELS = tuple(sorted({*CURVE, *LEVELS}))
+_COMPARED = ("rmse", "accuracy", "density_error", "triplets")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindError:
+    """A model's error against the true wind."""
+
+    label: str
+    bins: tuple[BinError, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """How far a model's distributions of one target are to be believed."""
+
+    label: str
+    target: str
+    curve: tuple[Coverage, ...]
+    ranks: RankHistogram
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expected:
+    """Expected coverage of all targets together (TARP)."""
+
+    label: str
+    curve: tuple[Coverage, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Read:
+    """The linear readout of a model's embedding on some data set."""
+
+    label: str
+    data: str
+    readout: Readout
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """All scores of all models on the same clips.
+
+    Attributes:
+        data: what was tested on, as data set and tag.
+        seed: of resamples, triplets, reference points and t-SNE.
+        clips, groups: tested on; groups are sequences.
+        rows: of the table.
+        targets: scores of every target.
+        reference: label that the differences are against; the lowest wind RMSE unless another was asked for, None if no
+            model gives the wind.
+        differences: paired, over the same draws of sequences.
+        wind_errors, calibrations, expected: of the models that have them.
+        learning, frames, reads, layout: given, or made of what was given.
+        findings: what a reader has to know.
+    """
+
+    data: str
+    seed: int
+    clips: int
+    groups: int
+    rows: tuple[table.Row, ...]
+    targets: tuple[table.TargetRow, ...]
+    reference: str | None
+    differences: tuple[table.Difference, ...]
+    wind_errors: tuple[WindError, ...]
+    calibrations: tuple[Calibration, ...]
+    expected: tuple[Expected, ...]
+    learning: tuple[LearningPoint, ...]
+    frames: tuple[FramesPoint, ...]
+    reads: tuple[Read, ...]
+    layout: Layout | None
+    findings: tuple[Finding, ...]
+
+
+def evaluate(
+    predictions: Sequence[Predictions],
+    *,
+    data: str,
+    seed: int,
+    draws: int = DRAWS,
+    reference: str | None = None,
+    learning: Sequence[LearningPoint] = (),
+    frames: Sequence[FramesPoint] = (),
+    reads: Sequence[Read] = (),
+    tsne_of: str | None = None,
+) -> Evaluation:
+    """Score models that were tested on the same clips.
+
+    Args:
+        predictions: of each model; several of one label are its runs with other seeds.
+        data: data set and tag, for the heading.
+        seed: of all that is drawn.
+        draws: of the bootstrap.
+        reference: label that the others are compared with.
+        learning, frames, reads: scores of models on other data, shown beside these.
+        tsne_of: label whose first run's embedding is laid out; needs scikit-learn.
+
+    Raises:
+        InputError: predictions that are not of the same clips.
+        UnknownNameError: a label that no model has.
+        UsageError: t-SNE without scikit-learn.
+    """
+    models = table.models(predictions)
+    for label in (reference, tsne_of):
+        if label is not None and label not in models:
+            raise UnknownNameError.of("model", label, models)
+    group = predictions[0].group
+    resamples = Resamples.of(group, generator=rng.stream(seed, "evaluation", "bootstrap"), draws=draws)
+    findings: list[Finding] = []
+    chosen = triplets.draw(group, seed=seed) if triplets.possible(group) else None
+    if chosen is None:
+        findings.append(
+            _warning("no-triplets", "no sequence has two clips beside another's: there is no triplet accuracy")
+        )
+    if resamples.groups < 20:
+        what = f"intervals rest on {resamples.groups} sequences; below 20 a percentile interval is too narrow"
+        findings.append(_warning("few-sequences", what))
+    runs = {label: [table.metric_values(own, resamples, chosen) for own in of] for label, of in models.items()}
+    values = {label: table.mean_values(of) for label, of in runs.items()}
+    with_wind = {label: of for label, of in models.items() if WIND in of[0].targets}
+    with_samples = {label: of for label, of in models.items() if of[0].samples is not None}
+    varied = {label: of for label, of in with_samples.items() if (np.ptp(of[0].truth, axis=0) > 0).all()}
+    findings += [
+        _warning("no-tarp", f"a target of {label} is the same in all clips: there is no expected coverage (TARP)")
+        for label in with_samples
+        if label not in varied
+    ]
+    if reference is None and with_wind:
+        reference = min(with_wind, key=lambda label: float(values[label]["rmse"][0]))
+    return Evaluation(
+        data=data,
+        seed=seed,
+        clips=len(group),
+        groups=resamples.groups,
+        rows=tuple(row for label, of in models.items() for row in table.rows(of, runs[label], resamples)),
+        targets=tuple(row for of in models.values() for row in table.target_rows(of, resamples)),
+        reference=reference,
+        differences=()
+        if reference is None
+        else table.differences(values, reference, clips=len(group), groups=resamples.groups, metrics=_COMPARED),
+        wind_errors=tuple(
+            WindError(label=label, bins=error_against(of, WIND, resamples)) for label, of in with_wind.items()
+        ),
+        calibrations=tuple(
+            Calibration(
+                label=label,
+                target=target,
+                curve=coverage(of, target, resamples, levels=_LEVELS),
+                ranks=rank_histogram(of, target),
+            )
+            for label, of in with_samples.items()
+            for target in of[0].targets
+        ),
+        expected=tuple(
+            Expected(label=label, curve=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")))
+            for label, of in varied.items()
+        ),
+        learning=tuple(learning),
+        frames=tuple(frames),
+        reads=tuple(reads),
+        layout=None if tsne_of is None else layout(models[tsne_of][0], seed=seed),
+        findings=(*findings, *(finding for read in reads for finding in read.readout.findings)),
+    )
+
+
+def _warning(kind: str, what: str) -> Finding:
+    return Finding(kind=kind, severity=Severity.WARNING, what=what)
+
+
+def as_document(found: Evaluation) -> dict[str, Any]:
+    """The evaluation as JSON values with its schema tag; null for what is not known."""
+    return {
+        "schema": SCHEMA,
+        "data": found.data,
+        "seed": found.seed,
+        "clips": found.clips,
+        "groups": found.groups,
+        "models": [row.as_dict() for row in found.rows],
+        "targets": [row.as_dict() for row in found.targets],
+        "reference": found.reference,
+        "differences": [one.as_dict() for one in found.differences],
+        "wind_errors": [
+            {
+                "label": of.label,
+                "bins": [
+                    {"low": b.low, "high": b.high, "rmse": b.rmse.as_dict(), "bias": b.bias.as_dict()} for b in of.bins
+                ],
+            }
+            for of in found.wind_errors
+        ],
+        "calibration": [
+            {"label": of.label, "target": of.target, "coverage": _curve(of.curve), "ranks": asdict(of.ranks)}
+            for of in found.calibrations
+        ],
+        "tarp": [{"label": of.label, "coverage": _curve(of.curve)} for of in found.expected],
+        "learning": [asdict(point) for point in found.learning],
+        "frames": [asdict(point) for point in found.frames],
+        "linear": [
+            {
+                "label": of.label,
+                "data": of.data,
+                "components": of.readout.components,
+                "pearson": {
+                    target: r.as_dict() for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
+                },
+            }
+            for of in found.reads
+        ],
+        "t_sne": None
+        if found.layout is None
+        else {
+            "label": found.layout.label,
+            "places": found.layout.places.tolist(),
+            "wind": found.layout.wind.tolist(),
+        },
+        "paper": {
+            "warning": paper.WARNING,
+            "flagsim": [{**asdict(row), "bound": row.bound, "breaks_bound": row.breaks_bound} for row in paper.FLAGSIM],
+            "triplets": [{"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS],
+        },
+        "findings": [finding.as_dict() for finding in found.findings],
+    }
+
+
+def _curve(curve: tuple[Coverage, ...]) -> list[dict[str, Any]]:
+    return [{"level": point.level, "share": point.share.as_dict()} for point in curve]

@@ -1,0 +1,104 @@
+"""Triplet accuracy of an embedding: how often a clip is nearer to one of its own simulation than to one of another.
+
+Veit, Belongie and Karaletsos, Conditional similarity networks, CVPR 2017; Runia et al., Cloth in the Wind, CVPR 2020,
+section 6. Distances are Euclidean; ties count half.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata import rng
+from flagdata.errors import InputError
+from models.evaluation.bootstrap import Resamples
+
+COUNT = 3500
+"""Triplets the paper drew from its test set."""
+
+
+def possible(group: NDArray[np.int64]) -> bool:
+    """Whether clips (n,) of these groups have any triplet: two groups, one of them with two clips."""
+    size = np.unique(group, return_counts=True)[1]
+    return len(size) > 1 and bool((size > 1).any())
+
+
+def draw(group: NDArray[np.int64], *, seed: int, count: int = COUNT) -> NDArray[np.int64]:
+    """Triplets (count, 3) of clips: anchor, positive, negative; the same for one seed.
+
+    The anchor is uniform among clips that share their group with another, the positive among those others, the negative
+    among clips of other groups.
+
+    Raises:
+        InputError: there is no triplet, or a count below 1.
+    """
+    _check(group)
+    if count < 1:
+        raise InputError(f"{count} triplets", where="count", fix="give at least 1")
+    generator = rng.stream(seed, "evaluation", "triplets")
+    order = np.argsort(group, kind="stable")
+    _, start, size = np.unique(group[order], return_index=True, return_counts=True)
+    of = np.repeat(np.arange(len(size)), size)
+    anchor = generator.choice(np.flatnonzero(size[of] > 1), size=count)
+    first, own = start[of[anchor]], size[of[anchor]]
+    positive = first + (anchor - first + 1 + generator.integers(0, own - 1)) % own
+    negative = generator.integers(0, len(group) - own)
+    negative = np.where(negative < first, negative, negative + own)
+    return order[np.column_stack([anchor, positive, negative])]
+
+
+def accuracy_values(
+    embedding: NDArray[np.floating], triplets: NDArray[np.int64], resamples: Resamples
+) -> NDArray[np.float64]:
+    """(1 + draws,): triplet accuracy in the data and in each draw of groups.
+
+    A triplet rests on two sequences; in a draw it counts as often as the product of their occurrences.
+
+    Args:
+        embedding: (n, d).
+        triplets: (t, 3).
+        resamples: of the clips' groups.
+    """
+    points = embedding.astype(np.float64)
+    anchor, positive, negative = triplets.T
+    near = ((points[anchor] - points[positive]) ** 2).sum(axis=1)
+    far = ((points[anchor] - points[negative]) ** 2).sum(axis=1)
+    hits, of = (np.zeros((resamples.groups, resamples.groups)) for _ in range(2))
+    place = (resamples.index[anchor], resamples.index[negative])
+    np.add.at(hits, place, (near < far) + 0.5 * (near == far))
+    np.add.at(of, place, 1.0)
+    return resamples.pair_ratio(hits, of)
+
+
+def all_accuracy_values(embedding: NDArray[np.floating], resamples: Resamples) -> NDArray[np.float64]:
+    """(1 + draws,): triplet accuracy over every triplet there is, n · (own - 1) · (n - own) of them.
+
+    Raises:
+        InputError: there is no triplet.
+    """
+    _check(resamples.index)
+    order = np.argsort(resamples.index, kind="stable")
+    points, index = embedding[order].astype(np.float64), resamples.index[order]
+    start = np.searchsorted(index, np.arange(resamples.groups))
+    size = np.diff(np.append(start, len(index)))
+    hits, of = (np.zeros((resamples.groups, resamples.groups)) for _ in range(2))
+    for anchor, own in enumerate(index):
+        distance = ((points - points[anchor]) ** 2).sum(axis=1)
+        positive = np.delete(distance[start[own] : start[own] + size[own]], anchor - start[own])
+        if positive.size == 0:
+            continue
+        positive.sort()
+        farther = np.searchsorted(positive, distance, side="left") + np.searchsorted(positive, distance, side="right")
+        hits[own] += np.add.reduceat(farther / 2, start)
+        of[own] += positive.size * size
+    np.fill_diagonal(hits, 0.0)
+    np.fill_diagonal(of, 0.0)
+    return resamples.pair_ratio(hits, of)
+
+
+def _check(group: NDArray[np.int64]) -> None:
+    if not possible(group):
+        raise InputError(
+            "the clips have no triplet", where="the groups of clips",
+            fix="give clips of at least two simulations, two or more of one of them",
+        )  # fmt: skip

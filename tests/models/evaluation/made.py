@@ -1,0 +1,52 @@
+"""Predictions made for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.evaluation.predictions import Predictions
+
+
+def generator(seed: int) -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(seed))
+
+
+def of_wind(
+    truth: list[float] | NDArray, mean: list[float] | NDArray, *, group: list[int] | NDArray | None = None,
+    label: str = "made", embedding: NDArray | None = None, samples: NDArray | None = None,
+) -> Predictions:  # fmt: skip
+    """Predictions of wind speed alone; each clip is its own sequence unless told otherwise."""
+    return Predictions(
+        label=label,
+        targets=("wind_speed",),
+        truth=np.asarray(truth, dtype=np.float64)[:, None],
+        mean=np.asarray(mean, dtype=np.float64)[:, None],
+        samples=None if samples is None else samples.astype(np.float32)[:, :, None],
+        embedding=None if embedding is None else embedding.astype(np.float32),
+        group=np.arange(len(truth)) if group is None else np.asarray(group, dtype=np.int64),
+        parameters=10,
+        milliseconds=1.5,
+        note="made",
+    )
+
+
+def posterior(*, clips: int, draws: int, wide: float, shift: float, targets: int, seed: int, group: int = 1) -> Predictions:
+    """θ ~ N(0, 1) seen with noise of variance 1: the posterior is N(x / 2, 1/2). Draws are of N(x / 2 + shift σ, (wide σ)²)
+    with σ² = 1/2, so wide = 1 and shift = 0 is exact. Clips come `group` to a sequence, with θ of their own."""
+    random = generator(seed)
+    truth = random.normal(size=(clips, targets))
+    mean = (truth + random.normal(size=truth.shape)) / 2 + shift * np.sqrt(0.5)
+    samples = mean[:, None, :] + wide * np.sqrt(0.5) * random.normal(size=(clips, draws, targets))
+    return Predictions(
+        label="posterior",
+        targets=("wind_speed", "density", "anisotropy")[:targets],
+        truth=truth,
+        mean=mean,
+        samples=samples.astype(np.float32),
+        embedding=None,
+        group=np.arange(clips) // group,
+        parameters=10,
+        milliseconds=1.5,
+        note="",
+    )
