@@ -1,0 +1,125 @@
+"""Whether a clip lies outside what a model was trained on, by the distance of its summary, at a stated false-alarm rate.
+
+The distance is Mahalanobis's with the covariance of Ledoit and Wolf (Journal of Multivariate Analysis 88, 2004). Its
+threshold is conformal (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005; Laxhammar and Falkman,
+2010): no distribution is assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+
+
+def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
+    """Return the covariance (d, d) of points (n, d), drawn towards m·1, and by how much, from 0 to 1.
+
+    Σ* = ρ m 1 + (1 − ρ) S with S = XᵀX/n, m = tr S/d, ρ = b²/d², d² = ‖S − m 1‖²/d and b² = min(d²,
+    Σ ‖x xᵀ − S‖²/(d n²)): Ledoit and Wolf 2004, lemmas 3.2 to 3.4 and equation 14.
+
+    Raises:
+        InputError: fewer than two points, or numbers that are not finite.
+    """
+    x = np.asarray(points, dtype=np.float64)
+    if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
+        raise InputError(f"summaries of shape {x.shape}, or not finite", fix="give (n, d) with at least 2 clips")
+    x = x - x.mean(axis=0)
+    n, d = x.shape
+    sample = x.T @ x / n
+    level = np.trace(sample) / d
+    spread = np.square(sample - level * np.eye(d)).sum() / d
+    fourth = np.square(np.square(x).sum(axis=1)).sum()
+    noise = (fourth - n * np.square(sample).sum()) / (d * n**2)
+    shrinkage = float(min(noise, spread) / spread) if spread > 0 else 1.0
+    return shrinkage * level * np.eye(d) + (1 - shrinkage) * sample, shrinkage
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Familiarity:
+    """How usual summaries are among those of the training and validation clips.
+
+    Attributes:
+        centre: (d,), mean of the training summaries.
+        whitening: (d, d), W with WᵀW = Σ*⁻¹ of the training summaries.
+        reference: (n,), ascending distances of validation clips, which were not trained on.
+    """
+
+    centre: NDArray[np.float64]
+    whitening: NDArray[np.float64]
+    reference: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, training: NDArray[np.floating], validation: NDArray[np.floating]) -> Familiarity:
+        """Measure it on summaries (n, d) of training clips and of validation clips.
+
+        The stated rate holds for a clip that is exchangeable with the validation clips, so take one clip of each
+        sequence for these: clips of one sequence are alike.
+
+        Raises:
+            InputError: summaries of different lengths, too few, or not finite; all training summaries equal.
+        """
+        covariance, _ = shrunk_covariance(training)
+        values, vectors = np.linalg.eigh(covariance)
+        if values[0] <= 0:
+            raise InputError("all training summaries are equal", fix="train the network, or give more clips")
+        cloud = cls(
+            centre=np.asarray(training, dtype=np.float64).mean(axis=0),
+            whitening=vectors.T / np.sqrt(values)[:, None],
+            reference=np.zeros(0),
+        )
+        reference = np.sort(cloud.distance(validation))
+        if len(reference) == 0 or not np.isfinite(reference).all():
+            raise InputError("no validation summaries, or some that are not finite", fix="give at least one, finite")
+        return cls(centre=cloud.centre, whitening=cloud.whitening, reference=reference)
+
+    def distance(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Mahalanobis distance of summaries (n, d) from the training clips: (n,), infinite where not finite."""
+        x = np.asarray(summaries, dtype=np.float64)
+        if x.ndim != 2 or x.shape[1] != len(self.centre):
+            raise InputError(f"summaries of shape {x.shape}", fix=f"give (n, {len(self.centre)})")
+        finite = np.isfinite(x).all(axis=1)
+        offset = np.where(finite[:, None], x, self.centre) - self.centre
+        return np.where(finite, np.linalg.norm(offset @ self.whitening.T, axis=1), np.inf)
+
+    def p_value(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Conformal p of summaries (n, d): (1 + validation clips at least as far)/(validation clips + 1), (n,)."""
+        nearer = np.searchsorted(self.reference, self.distance(summaries), side="left")
+        return (1 + len(self.reference) - nearer) / (len(self.reference) + 1)
+
+    def threshold(self, false_alarm: float) -> float:
+        """Distance beyond which a clip is called unfamiliar, such that this happens to familiar ones at most so often.
+
+        Args:
+            false_alarm: share of familiar clips, above 0.
+
+        Raises:
+            InputError: a share that is out of range or finer than the number of validation clips allows.
+        """
+        n = len(self.reference)
+        if not 0 < false_alarm < 1:
+            raise InputError(f"false-alarm rate {false_alarm}", fix="give a share between 0 and 1")
+        exceeded = int(np.floor(false_alarm * (n + 1) + 1e-9))
+        if exceeded < 1:
+            raise InputError(
+                f"{n} validation clips cannot tell a false-alarm rate of {false_alarm:g}",
+                fix=f"give a rate of {1 / (n + 1):.2g} or more, or at least {int(np.ceil(1 / false_alarm)) - 1} clips",
+            )
+        return float(self.reference[n - exceeded])
+
+    def unfamiliar(self, summaries: NDArray[np.floating], *, false_alarm: float) -> NDArray[np.bool_]:
+        """Tell which summaries (n, d) lie outside: beyond `threshold`, which is p ≤ false_alarm: (n,)."""
+        return self.distance(summaries) > self.threshold(false_alarm)
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Return all of its state by name, as it can be stored."""
+        return {"centre": self.centre, "whitening": self.whitening, "reference": self.reference}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Familiarity:
+        """Rebuild it from what `arrays` gave."""
+        return cls(centre=arrays["centre"], whitening=arrays["whitening"], reference=arrays["reference"])
