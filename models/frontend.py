@@ -29,9 +29,10 @@ from torch.nn import functional
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from models.filters import derivatives, smoothing_matrix
+from models.handmade import FEATURES, features
 
-Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps"]
-"""What a front end gives: standardised frames, or one of the two kinds of maps."""
+Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps", "handmade"]
+"""What a front end gives: standardised frames, one of the two kinds of maps, or the page of hand-made features."""
 
 BANDS = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.32), (0.32, 0.52), (0.52, 1.0))
 """Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins in (low, high]."""
@@ -94,6 +95,8 @@ class FrontEnd:
             return (1, self.frames, self.size, self.size)
         if self.maps == "spectral-maps":
             return (4, self.size // 2, self.size // 2)
+        if self.maps == "handmade":
+            return (len(FEATURES),)
         return (len(WAVE_CHANNELS), self.size // 4, self.size // 4)
 
     @property
@@ -123,6 +126,8 @@ class FrontEnd:
         frames = standardised(clip)
         if self.maps == "frames":
             return frames.unsqueeze(0)
+        if self.maps == "handmade":
+            return features(frames[None, None], rate=self.rate)[0]
         smooth = self._temporal.to(frames)
         slopes = derivatives((smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma)
         pooled = torch.stack([_half(slope) for slope in slopes])  # (2, time, H/2, W/2)

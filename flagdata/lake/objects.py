@@ -62,7 +62,8 @@ def content_hash(path: Path) -> str:
 
 
 class Objects:
-    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; one made before format 2 gets its last when needed."""
+    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; one made before format 2 gets its last when
+    needed."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -75,7 +76,8 @@ class Objects:
         """
         if not OBJECT_NAME.fullmatch(name):
             raise InputError(
-                f"{name!r} is not an object name", where=str(self.root),
+                f"{name!r} is not an object name",
+                where=str(self.root),
                 fix="give mcap/<sha256>, zarr/<treehash> or model/<treehash>",
             )
         store, _, digest = name.partition("/")

@@ -15,13 +15,12 @@ from flagdata.console import document, json_option, lake_option, progress, say
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from models.evaluation.curves import LearningPoint
-    from models.evaluation.evaluation import Evaluation
-    from models.evaluation.predictions import Predictions
-
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
     from models.estimator import Estimator
+    from models.evaluation.curves import LearningPoint
+    from models.evaluation.evaluation import Evaluation
+    from models.evaluation.predictions import Predictions
     from models.training.inputs import Prepared
 
 
@@ -66,10 +65,9 @@ def evaluate(
     \b
       flagdata evaluate wave sdn --at v1 --lake lake --out evaluation
     """
-    from models.evaluation.evaluation import as_document
-
     import flagdata
     from models.evaluation import report
+    from models.evaluation.evaluation import as_document
 
     source = flagdata.open(lake_path)
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
@@ -109,7 +107,8 @@ class _Desk:
         if handmade:
             told += self._handmade(side)
         return scored(
-            told or [predictions for _, predictions in learning], data=f"{self._dataset}, {side} side, at {self._at or 'head'}",
+            told or [predictions for _, predictions in learning],
+            data=f"{self._dataset}, {side} side, at {self._at or 'head'}",
             seed=self._seed, reference=reference, tsne_of=tsne, learning=_points(learning, told, self._all_sequences()),
         )  # fmt: skip
 
@@ -192,12 +191,11 @@ def _points(
     learning: Sequence[tuple[int, Predictions]], told: Sequence[Predictions], everything: int
 ) -> list[LearningPoint]:
     """RMSE of wind against the number of sequences; the models of all of them are its last points."""
+    from flagdata.rng import stream
     from models.evaluation.bootstrap import Resamples, estimate
     from models.evaluation.curves import LearningPoint
     from models.evaluation.predictions import WIND
     from models.evaluation.scores import SCORES
-
-    from flagdata.rng import stream
 
     labels = {predictions.label for _, predictions in learning}
     rows = [*learning, *((everything, own) for own in told if own.label in labels)]

@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 import torch
-from models.evaluation.predictions import Predictions
 from torch import Tensor
 
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
 from models.estimator import Estimator
+from models.evaluation.predictions import Predictions
 from models.learner import Learner, Loss
 from models.training.inputs import Prepared
 
@@ -44,7 +44,8 @@ def predict(
         samples, mean, embedding = _told(estimator, prepared, seed=seed)
     return Predictions(
         label=label, targets=targets, truth=prepared.truth(targets), mean=mean, samples=samples, embedding=embedding,
-        group=prepared.sequence, parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
+        group=prepared.sequence,
+        parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
         milliseconds=milliseconds, note=note,
     )  # fmt: skip
 

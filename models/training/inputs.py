@@ -30,10 +30,12 @@ from flagdata.dataset.pairs import Pairs
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import stream
+from flagdata.timebase import NANOSECONDS
 from models import targets
 from models.crops import Cropping
 from models.frontend import FrontEnd, standardised
 
+_RATE_ERROR = 0.01
 Advance = Callable[[int], None]
 
 
@@ -189,6 +191,7 @@ def _prepared(
     workers: int,
     advance: Advance,
 ) -> Prepared:
+    _check_rate(pairs, rows, front_end)
     own = folder / f"{front_end.maps}-{front_end.hash}"
     named = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
     paths = tuple(own / name[:2] / f"{name}.npy" for name in named)
@@ -212,6 +215,20 @@ def _prepared(
         sequence=np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone),
         fingerprint=digest("\n".join([pairs.fingerprint, *named])), front_end=front_end,
     )  # fmt: skip
+
+
+def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> None:
+    """Make sure that the clips have the rate that the front end's frequencies are told by."""
+    table = pairs.table
+    seconds = (table.end[rows] - table.start[rows]) / NANOSECONDS
+    rate = (table.frame_count[rows] - 1) / np.maximum(seconds, 1e-9)
+    wrong = np.flatnonzero(np.abs(rate / front_end.rate - 1) > _RATE_ERROR)
+    if len(wrong):
+        raise InputError(
+            f"{len(wrong)} of {len(rows)} clips have another rate than {front_end.rate:g} Hz; "
+            f"the first has {rate[wrong[0]]:g}",
+            where=f"clip {table.artifact[rows[wrong[0]]]}", fix="ingest or build at that rate, or select by rate",
+        )  # fmt: skip
 
 
 def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:
