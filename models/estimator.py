@@ -7,6 +7,7 @@ estimate carries a p-value of the distance of its summary to the training clips'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +30,7 @@ SHIPPED = Path(__file__).parent / "shipped"
 """Models that come with the package, a folder each."""
 DEFAULT = "wave"
 DRAWS = 400
-_CLOUD = "cloud.safetensors"
+CLOUD = "cloud.safetensors"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,26 +129,36 @@ class Estimator:
             seed: of the draws; the same inputs and seed give the same draws.
             draws: of each clip's distribution, shared among the learners.
         """
-        if self.learners[0].objective is not Loss.POSTERIOR:
-            raise InputError(f"the model {self.name!r} gives no distribution", fix="take one with a posterior loss")
+        embeddings = self.embeddings(inputs)
+        values = self.learners[0].scaling.values(self.logits(embeddings, seed=seed, draws=draws))
+        told = embeddings[0].cpu().numpy().astype(np.float32)
+        return Estimates(
+            targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
+            unlike=None if self.cloud is None else self.cloud.p_value(told),
+        )  # fmt: skip
+
+    @torch.no_grad()
+    def embeddings(self, inputs: Tensor) -> list[Tensor]:
+        """(n, dimension) of each learner."""
+        return [learner.network(inputs) for learner in self.learners]
+
+    @torch.no_grad()
+    def logits(self, embeddings: Sequence[Tensor], *, seed: int, draws: int) -> Tensor:
+        """(n, draw, target) draws as the learners know them (`models.targets`), spread by `widening`.
+
+        Raises:
+            InputError: a model without distributions.
+        """
         share = -(-draws // len(self.learners))
-        found, summaries = [], []
-        for place, learner in enumerate(self.learners):
-            embedding = learner.network(inputs)
-            summaries.append(embedding)
-            generator = torch.Generator(device=inputs.device)
+        found = []
+        for place, (learner, embedding) in enumerate(zip(self.learners, embeddings, strict=True)):
+            generator = torch.Generator(device=embedding.device)
             generator.manual_seed(child_seed(seed, "draws", place))
             mixture = learner.mixture(embedding)
             found.append(mixture.sample(share, generator) * learner.spread + learner.centre)
         logits = torch.cat(found, dim=1)
         centre = logits.mean(dim=1, keepdim=True)
-        spread = self.widening.to(logits)
-        values = self.learners[0].scaling.values(centre + (logits - centre) * spread)
-        told = summaries[0].cpu().numpy().astype(np.float32)
-        return Estimates(
-            targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
-            unlike=None if self.cloud is None else self.cloud.p_value(told),
-        )  # fmt: skip
+        return centre + (logits - centre) * self.widening.to(logits)
 
 
 def load(folder: Path) -> Estimator:
@@ -185,7 +196,7 @@ def load(folder: Path) -> Estimator:
         raise CorruptError(
             f"the model does not fit this version: {error}", where=str(folder), fix="train it again, or update flagdata"
         ) from None
-    path = folder / _CLOUD
+    path = folder / CLOUD
     cloud = None
     if path.exists():
         cloud = Familiarity.of_arrays({name: value.double().numpy() for name, value in read_tensors(path).items()})

@@ -107,7 +107,7 @@ def trained(
     from models.training.steps import Training
 
     source = flagdata.open(lake_path)
-    train_pairs, validation_pairs = (_pairs(source, recipe, side, at=at) for side in ("train", "validation"))
+    train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     wanted = network_artifact(recipe, data).id
     known = source.lake.rows(f"artifact = '{wanted}'", at=branch, columns=["artifact"]).num_rows
@@ -158,7 +158,12 @@ def _report(source: Source, artifact: str, branch: str) -> dict[str, Any]:
     return {"artifact": row.id, "object": row.object, **{key: card[key] for key in kept}}
 
 
-def _pairs(source: Source, recipe: TrainingRecipe, side: str, *, at: str | None) -> Pairs:
+def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | None) -> Pairs:
+    """The pairs of one side of a recipe's data set.
+
+    Raises:
+        NotFoundError, RefusedError: there are none, or the sides leak.
+    """
     from flagdata.dataset import ExplicitSplit
 
     split = ExplicitSplit(where={name: recipe.data.where(name) for name in ("train", "validation", "test")})
