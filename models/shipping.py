@@ -1,8 +1,8 @@
 """From trained networks of a lake to one model that comes with the package: `python -m models.shipping --help`.
 
 Several seeds of one recipe become one estimator; its distributions are spread so that their intervals on validation
-clips cover what they say; the summaries of the training clips are kept, so that a clip unlike them is known. Weights are
-stored as float16, which moves an estimate by a hundredth of its standard deviation.
+clips cover what they say; the summaries of the training clips are kept, so that a clip unlike them is known. Weights
+are stored as float16, which moves an estimate by a hundredth of its standard deviation.
 """
 
 from __future__ import annotations

@@ -1,0 +1,53 @@
+"""Targets: ranges, bending summaries by hand, and logits that come back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from flagdata.errors import InputError, UnknownNameError
+from models.targets import TARGETS, Scaling, truth
+
+NAMES = ("wind_speed", "density", "bending_scale", "anisotropy")
+
+
+def test_bending_is_summed_up_by_its_mean_logarithm_and_by_warp_over_weft() -> None:
+    """Warp (first five) 10⁻³, between 10⁻⁴, weft (last five) 10⁻⁵: mean −4, ratio 2 decades."""
+    bending = np.repeat([1e-3, 1e-4, 1e-5], 5)
+    parameters = {f"bending.{index}": np.array([value]) for index, value in enumerate(bending)}
+    parameters |= {"wind_speed": np.array([3.0]), "density": np.array([0.12])}
+    assert truth(parameters, NAMES)[0] == pytest.approx([3.0, 0.12, -4.0, 2.0])
+
+
+def test_logits_come_back_within_the_range_and_at_its_ends() -> None:
+    values = torch.tensor([[0.0, 0.10, -5.0, -1.8], [10.0, 0.17, -4.0, 1.8], [5.0, 0.135, -4.5, 0.0]])
+    scaling = Scaling(names=NAMES)
+    assert scaling.learned(values).isfinite().all()
+    torch.testing.assert_close(scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-4)
+    middle = scaling.learned(values)[2]
+    torch.testing.assert_close(middle, torch.zeros(4), rtol=0, atol=1e-5)
+
+
+def test_no_logit_gives_a_value_beyond_the_widened_range() -> None:
+    values = Scaling(names=("wind_speed",)).values(torch.tensor([[-50.0], [50.0]]))
+    assert values[:, 0].tolist() == pytest.approx([-0.05, 10.05])
+
+
+def test_the_spread_of_a_prior_is_that_of_a_uniform_one() -> None:
+    assert Scaling(names=("wind_speed",)).spread[0] == pytest.approx(np.sqrt(100 / 12))
+
+
+def test_unknown_targets_are_named_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="wind_sped"):
+        Scaling(names=("wind_sped",))
+
+
+def test_clips_that_do_not_state_a_parameter_are_an_error_that_names_it() -> None:
+    with pytest.raises(InputError, match=r"bending\.0"):
+        truth({"wind_speed": np.array([1.0])}, ("anisotropy",))
+
+
+def test_the_papers_ranges_are_the_papers() -> None:
+    assert (TARGETS["wind_speed"].low, TARGETS["wind_speed"].high) == (0.0, 10.0)
+    assert (TARGETS["density"].low, TARGETS["density"].high) == (0.10, 0.17)

@@ -1,0 +1,208 @@
+"""`flagdata train` and `flagdata evaluate` on a small lake: artifacts, provenance, what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+
+import flagdata
+from flagdata.cli import root
+from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake import Lake
+from models import estimator, shipping
+from models.storage import WEIGHTS, read_card
+from models.training.command import sides_of
+from models.training.inputs import prepare_clips, prepare_films
+from models.training.recipe import TRAININGS, load, parse
+
+
+def run(*arguments: str) -> dict[str, object]:
+    done = CliRunner().invoke(root, [*arguments, "--json"], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def lake(lake_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy that models are committed to: two seeds of the small recipe."""
+    from tests.models.conftest import RECIPE
+
+    path = tmp_path_factory.mktemp("trained") / "lake"
+    shutil.copytree(lake_path, path)
+    recipe = path.parent / "small.toml"
+    recipe.write_text(RECIPE)
+    for seed in (1, 2):
+        run("train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1")
+    return path
+
+
+def test_a_model_is_an_artifact_with_what_it_came_from(lake: Path) -> None:
+    rows = Lake.open(lake).rows("kind = 'network'").to_pylist()
+    assert [row["name"] for row in rows] == ["small", "small"]
+    assert sorted(row["seed"] for row in rows) == [1, 2]
+    card = read_card(Lake.open(lake).object_path(rows[0]["object"]))
+    pairs = sides_of(flagdata.open(lake), load(str(lake.parent / "small.toml")), "train", at="v1")
+    assert card["data"]["at"] == "v1"
+    assert card["data"]["train"] == pairs.fingerprint
+    assert card["recipe_hash"]
+    assert card["code_version"]
+    assert card["batches"]["epoch"] == card["epochs"] == 3
+    assert not list(Lake.open(lake).object_path(rows[0]["object"]).glob("*.pt"))
+
+
+def test_training_again_changes_nothing(lake: Path) -> None:
+    before = Lake.open(lake).rows().num_rows
+    report = run("train", str(lake.parent / "small.toml"), "--at", "v1", "--lake", str(lake))
+    assert report["seed"] == 1
+    assert Lake.open(lake).rows().num_rows == before
+
+
+def test_models_are_judged_with_intervals_over_simulations(lake: Path, tmp_path: Path) -> None:
+    found = run("evaluate", "small", "--dataset", "made", "--at", "main", "--lake", str(lake), "--out", str(tmp_path))
+    assert (tmp_path / "evaluation.html").stat().st_size > 1000
+    text = json.dumps(found)
+    assert '"small"' in text
+    assert '"rmse"' in text
+
+
+def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(lake: Path, tmp_path: Path) -> None:
+    recipe = load(str(lake.parent / "small.toml"))
+    source = flagdata.open(lake)
+    train, validation, test = (sides_of(source, recipe, side, at="v1") for side in ("train", "validation", "test"))
+    cache = tmp_path / "cache"
+    known = prepare_films(
+        train, recipe.front_end, recipe.cropping, variants=2, folder=cache, workers=1, advance=lambda count: None
+    )
+    judged = prepare_clips(
+        validation, recipe.front_end, recipe.cropping, folder=cache, workers=1, advance=lambda count: None
+    )
+    rows = source.lake.rows("kind = 'network'", columns=["object"]).to_pylist()
+    members = [source.lake.object_path(row["object"]) for row in rows]
+    shipped = shipping.write(tmp_path / "small", members, train=known, validation=judged, name="small")
+    assert len(shipped.learners) == 2
+    clips = np.stack([test[index].clip[0].numpy() for index in range(4)])
+    found = shipped.estimate(shipped.inputs(clips), seed=1, draws=200)
+    again = shipped.estimate(shipped.inputs(clips), seed=1, draws=200)
+    assert found.draws.shape == (4, 200, 1)
+    assert np.array_equal(found.draws, again.draws)
+    low, high = found.interval(0.9)
+    assert ((low <= found.mean) & (found.mean <= high)).all()
+    assert found.unlike is not None
+    still = np.full_like(clips, 100)
+    odd = shipped.estimate(shipped.inputs(still), seed=1).unlike
+    assert odd is not None
+    assert odd.max() <= found.unlike.max()
+    with pytest.raises(InputError, match="12"):
+        shipped.inputs(clips[:, :11])
+
+
+def test_a_model_that_was_cut_off_is_an_error_with_its_place(lake: Path, tmp_path: Path) -> None:
+    row = Lake.open(lake).rows("kind = 'network'").to_pylist()[0]
+    folder = tmp_path / "model"
+    shutil.copytree(Lake.open(lake).object_path(row["object"]), folder)
+    path = folder / WEIGHTS
+    path.chmod(0o644)
+    path.write_bytes(path.read_bytes()[:-10])
+    with pytest.raises(CorruptError):
+        estimator.load(folder)
+    with pytest.raises(NotFoundError):
+        estimator.load(tmp_path)
+
+
+def test_inputs_that_were_prepared_are_used_again_and_damage_is_found(lake: Path, tmp_path: Path) -> None:
+    recipe = load(str(lake.parent / "small.toml"))
+    pairs = sides_of(flagdata.open(lake), recipe, "train", at="v1")
+
+    def prepared() -> tuple[object, list[int]]:
+        counts: list[int] = []
+        found = prepare_films(
+            pairs, recipe.front_end, recipe.cropping, variants=2, folder=tmp_path, workers=2, advance=counts.append
+        )
+        return found, counts
+
+    first, _ = prepared()
+    second, counts = prepared()
+    entries, variants = np.arange(4), np.ones(4, dtype=np.int64)
+    assert torch.equal(first.batch(entries, variants), second.batch(entries, variants))  # pyright: ignore[reportAttributeAccessIssue]
+    assert counts == [20]
+    damaged = next(tmp_path.rglob("*.npy"))
+    damaged.write_bytes(damaged.read_bytes()[:50])
+    with pytest.raises(CorruptError, match="prepared input"):
+        second.batch(np.arange(20), np.zeros(20, dtype=np.int64))  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_part_of_the_sequences_is_the_beginning_of_one_order(lake: Path, tmp_path: Path) -> None:
+    recipe = load(str(lake.parent / "small.toml"))
+    pairs = sides_of(flagdata.open(lake), recipe, "train", at="v1")
+
+    def sequences(count: int | None) -> set[int]:
+        found = prepare_films(
+            pairs, recipe.front_end, recipe.cropping, variants=2, folder=tmp_path, workers=1,
+            advance=lambda done: None, sequences=count,
+        )  # fmt: skip
+        return set(found.sequence.tolist())
+
+    assert len(sequences(3)) == 3
+    assert sequences(3) < sequences(6) < sequences(None)
+    with pytest.raises(InputError, match="10"):
+        sequences(11)
+
+
+def test_clips_of_another_rate_are_refused(tmp_path: Path) -> None:
+    from tests.models.conftest import RECIPE, fill
+
+    lake = Lake.create(tmp_path / "lake")
+    fill(lake, period=33_333_333)
+    recipe = parse(RECIPE, name="small", where="test")
+    pairs = sides_of(flagdata.open(tmp_path / "lake"), recipe, "validation", at=None)
+    with pytest.raises(InputError, match="another rate than 25 Hz"):
+        prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=1, advance=lambda n: None)
+
+
+@pytest.mark.parametrize("name", TRAININGS.names())
+def test_every_recipe_of_the_catalog_is_read_and_makes_its_network(name: str) -> None:
+    recipe = load(name)
+    with torch.device("meta"):
+        assert sum(weights.numel() for weights in recipe.learner().network.parameters()) > 100_000
+    assert recipe.front_end.frames == 30
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "named"),
+    [
+        ("dimension = 4", "dimensions = 4", InputError, "does not take"),
+        ('maps = "wave-maps"', 'maps = "spectral-maps"', UsageError, 'maps = "wave-maps"'),
+        ('"wind_speed"', '"wind_sped"', UnknownNameError, "wind_speed"),
+        ('name = "wave"', 'name = "wav"', UnknownNameError, "wave"),
+        ("components = 2", "margin = 1.0", UsageError, "margin"),
+        ("patience = 9", "drop-after = 9", UsageError, "drop-after"),
+        ("variants = 2", "variant = 2", UnknownNameError, "variants"),
+        ('dataset = "made"', 'dataset = "ma%de"', InputError, "data set"),
+    ],
+)
+def test_a_recipe_that_does_not_fit_says_what_and_how(old: str, new: str, error: type[Exception], named: str) -> None:
+    from tests.models.conftest import RECIPE
+
+    with pytest.raises(error) as caught:
+        parse(RECIPE.replace(old, new), name="small", where="test").learner()
+    assert named in f"{caught.value} {getattr(caught.value, 'fix', '')}"
+
+
+def test_a_network_that_is_not_there_is_an_error_with_those_that_are(lake: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="smal"):
+        CliRunner().invoke(
+            root, ["evaluate", "smal", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path)],
+            catch_exceptions=False,
+        )  # fmt: skip
+
+
+def test_clips_without_ground_truth_are_refused_with_the_reason(lake: Path) -> None:
+    recipe = parse((lake.parent / "small.toml").read_text().replace('"made"', '"nothing"'), name="x", where="test")
+    with pytest.raises((NotFoundError, Exception), match="no|none"):
+        sides_of(flagdata.open(lake), recipe, "train", at="v1")
