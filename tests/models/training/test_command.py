@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import flagdata
 from flagdata.cli import root
-from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import CorruptError, InputError, NotFoundError, RefusedError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from models import estimator, shipping
 from models.storage import WEIGHTS, read_card
@@ -202,7 +202,7 @@ def test_a_network_that_is_not_there_is_an_error_with_those_that_are(lake: Path,
         )  # fmt: skip
 
 
-def test_clips_without_ground_truth_are_refused_with_the_reason(lake: Path) -> None:
+def test_a_data_set_that_is_not_there_is_an_error(lake: Path) -> None:
     recipe = parse((lake.parent / "small.toml").read_text().replace('"made"', '"nothing"'), name="x", where="test")
-    with pytest.raises((NotFoundError, Exception), match="no|none"):
+    with pytest.raises(RefusedError, match="holds none of the clips"):
         sides_of(flagdata.open(lake), recipe, "train", at="v1")
