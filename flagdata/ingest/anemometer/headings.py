@@ -43,7 +43,9 @@ _SPELLED: Mapping[str, str] = {
 
 POINTS: Mapping[str, str] = {
     name: f"{number * 22.5:g}"
-    for number, name in enumerate("N NNE NE ENE E ESE SE SSE S SSW SW WSW W WNW NW NNW".split())
+    for number, name in enumerate(
+        ["N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW"]
+    )
 }
 """Points of the compass → degrees from north, as text."""
 _REST = re.compile(
@@ -183,9 +185,7 @@ def assign(
         spelled = known_unit(column.unit)
         if spelled is None or unit(spelled).si != CHANNELS[channel].unit:
             if channel.startswith("wind_"):
-                raise InputError(
-                    f"{column.name!r} is {channel}, but its unit is {column.unit!r}", where=where, fix=fix
-                )
+                raise InputError(f"{column.name!r} is {channel}, but its unit is {column.unit!r}", where=where, fix=fix)
             unread.append(column.name)
             continue
         channels[channel] = ChannelLayout(column=column.number, unit=spelled, range=ranges.get(channel))

@@ -116,8 +116,7 @@ def _column(number: int, text: str, history: Mapping[str, Mapping[str, str]]) ->
     if match is None:
         return Column(number=number, name=text)
     facts = history.get(match["channel"], {})
-    kind = facts.get("type", "")
-    about = f"{facts.get('description', '')} {kind}" if kind not in ("", "Analog") else facts.get("description", "")
+    about = " ".join(facts[key] for key in ("description", "type", "measurand") if facts.get(key, "Analog") != "Analog")
     spelled = match["unit"]
     kind = "wind speed" if spelled.lower() in _SPEEDS else ""
     name = " ".join(part for part in (f"Ch{match['channel']}", about.strip(), kind) if part)

@@ -55,7 +55,9 @@ class Zentra:
         assigned = assign(columns, _NAMES, where=f"{where}, line 3", fix="export in m/s, km/h, mph or kn")
         padded = len(lines) > 3 and not lines[3].replace(",", "").strip()
         first = 4 if padded else 3
-        form, found = stamp_format([line.split(",")[0] for line in lines[first:]], options, f"{where}, line {first + 1}")
+        form, found = stamp_format(
+            [line.split(",")[0] for line in lines[first:]], options, f"{where}, line {first + 1}"
+        )
         port = int(next(layout.column for name, layout in assigned.channels.items() if name == "wind_speed"))
         named = [name for name in sensors[:port] if name]
         export = Export(
@@ -70,7 +72,9 @@ class Zentra:
 
 
 def _heading(lines: tuple[str, ...] | list[str]) -> bool:
-    return len(lines) == 3 and bool(_RECORDS.match(lines[1].strip(' "'))) and lines[2].strip(' "').startswith("Timestamp")
+    return (
+        len(lines) == 3 and bool(_RECORDS.match(lines[1].strip(' "'))) and lines[2].strip(' "').startswith("Timestamp")
+    )
 
 
 def _column(number: int, text: str) -> Column:
