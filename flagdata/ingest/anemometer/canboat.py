@@ -5,9 +5,9 @@
     {"timestamp":"…","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind Data","fields":{"Wind Speed":0.92,…}}
 
 Source: canboat project, README "File formats", wiki "analyzer", and its table of PGNs: 130306 Wind Data is SID, speed
-(uint16, 0.01 m/s), angle (uint16, 0.0001 rad), reference (3 bits: 0 over ground from true north, 1 from magnetic north, 2
-apparent, 3 boat-referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and 5,
-0.01 m/s); the three largest numbers of a field stand for no value. References 3 and 4 are winds computed as if the
+(uint16, 0.01 m/s), angle (uint16, 0.0001 rad), reference (3 bits: 0 over ground from true north, 1 from magnetic north,
+2 apparent, 3 boat-referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and
+5, 0.01 m/s); the three largest numbers of a field stand for no value. References 3 and 4 are winds computed as if the
 platform stood still (theoretical). JSON says by "units" in its first line whether angles are rad ("si") or deg.
 """
 

@@ -41,12 +41,8 @@ _SPELLED: Mapping[str, str] = {
 }  # fmt: skip
 
 
-POINTS: Mapping[str, str] = {
-    name: f"{number * 22.5:g}"
-    for number, name in enumerate(
-        ["N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW"]
-    )
-}
+_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
+POINTS: Mapping[str, str] = {name: f"{number * 22.5:g}" for number, name in enumerate(_ROSE)}
 """Points of the compass → degrees from north, as text."""
 _REST = re.compile(
     r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"

@@ -2,8 +2,8 @@
 
 Directives: %Y %y %m %d %j %H %I %p %M %S %b, and %f, which here stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "+02:00"), %p for "AM", "p.m." or a bare "a" or "p". A blank stands for any run of blanks or
-a "T". Two-digit years are 2000 to 2099.
+optional offset from UTC ("Z", "+02:00"), %p for "AM", "p.m." or a bare "a" or "p". A blank stands for any run of blanks
+or a "T". Two-digit years are 2000 to 2099.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.

@@ -1,10 +1,10 @@
 """Anemoment TriSonica Mini: lines of tags and values, "S  00.08 S2 00.07 D  245 U  00.06 V  00.03 W  00.05 T  21.40".
 
-Source: Anemoment (LI-COR), TriSonica Mini User Manual (July 2022), "Output data": tags S (wind speed), S2 and S3 (in two
-and three dimensions), D and DV (direction, clockwise from the north mark, and its elevation), U, V, W, T [°C], C
-(speed of sound), H [%], DP, P [mbar], PI, RO, MD and others; m/s. Tags may be switched off one by one; values of -99 and
-below are codes for "no value". U and V are kept as written: their axes are a setting. Written by the manual and examples
-of lines; no log of such an instrument was at hand.
+Source: Anemoment (LI-COR), TriSonica Mini User Manual (July 2022), "Output data": tags S (wind speed), S2 and S3 (in
+two and three dimensions), D and DV (direction, clockwise from the north mark, and its elevation), U, V, W, T [°C], C
+(speed of sound), H [%], DP, P [mbar], PI, RO, MD and others; m/s. Tags may be switched off one by one; values of -99
+and below are codes for "no value". U and V are kept as written: their axes are a setting. Written by the manual and
+examples of lines; no log of such an instrument was at hand.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _LINE = re.compile(r"(?:[A-Z][A-Z0-9]{0,2}[ ,:]+-?\d+(?:\.\d+)?(?:[ ,;]+|$))++")
 _PAIR = re.compile(r"([A-Z][A-Z0-9]{0,2})[ ,:]+(-?\d+(?:\.\d+)?)")
 _BEGINS = re.compile(r"S[23]?[ ,:]+-?\d")
 _TAGS = frozenset(
-    ["S", "S2", "S3", "D", "DV", "U", "V", "W", "T", "T1", "T2", "C", "H", "DP", "P", "TU", "AD", "AX", "AY", "AZ", "PI", "RO", "MX", "MY", "MZ", "MD", "TD", "ID", "NW", "Q"]
-)  # fmt: skip
+    ("S", "S2", "S3", "D", "DV", "U", "V", "W", "T", "T1", "T2", "C", "H", "DP", "P", "TU", "AD", "AX", "AY", "AZ")
+) | frozenset(("PI", "RO", "MX", "MY", "MZ", "MD", "TD", "ID", "NW", "Q"))
 _CODE = -99.0
 
 

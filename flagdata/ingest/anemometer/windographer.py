@@ -1,7 +1,7 @@
 """Text exports of Windographer: facts about the site, then a table whose columns the user named.
 
-Source: UL Solutions, Windographer help, "Exporting data". Columns carry a unit only where the user asked for it; without,
-speeds are in the unit of the line "Calm threshold = 0 m/s". Compared with one file of version 4.1.
+Source: UL Solutions, Windographer help, "Exporting data". Columns carry a unit only where the user asked for it;
+without, speeds are in the unit of the line "Calm threshold = 0 m/s". Compared with one file of version 4.1.
 """
 
 from __future__ import annotations
