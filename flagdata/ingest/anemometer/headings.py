@@ -226,6 +226,7 @@ class CompassRows(RowReader):
     def __init__(self, source: TextFile, layout: FileLayout, columns: Sequence[int]) -> None:
         super().__init__(source, layout)
         self._columns = [column - 1 for column in columns]
+        self._degrees = {name: text.replace(".", layout.decimal) for name, text in POINTS.items()}
         self.points = 0
 
     def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
@@ -233,7 +234,7 @@ class CompassRows(RowReader):
         for line, rows in super().blocks(width):
             for row in rows if self._columns else ():
                 for column in self._columns:
-                    degrees = POINTS.get(row[column].strip().upper())
+                    degrees = self._degrees.get(row[column].strip().upper())
                     if degrees is not None:
                         row[column] = degrees
                         self.points += 1

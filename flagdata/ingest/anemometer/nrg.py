@@ -70,7 +70,7 @@ class Nrg:
         export = Export(
             name=self.name,
             file=FileLayout(delimiter="\t", preamble=at, missing=("-999", "9999", "nan")),
-            time=TimeLayout(columns=(1,), format="iso", zone=zone if zone and options.zone is None else None),
+            time=TimeLayout(columns=(1,), format="iso", zone=zone),
             sensor=Sensor(
                 name=channel.get("description") or assigned.names["wind_speed"],
                 height=float(height) if re.fullmatch(r"\d+(\.\d+)?", height) and float(height) > 0 else None,

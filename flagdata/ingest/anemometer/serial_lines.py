@@ -23,7 +23,7 @@ from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import possible
 from flagdata.ingest.anemometer.headings import described
-from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.stamps import Stamps
@@ -246,10 +246,14 @@ def _channels(
 
 
 def _missing(channels: dict[str, NDArray[np.float64]]) -> NDArray[np.uint16]:
-    """The flag MISSING where every channel of wind speed is NaN."""
-    winds = [values for name, values in channels.items() if name in WIND_CHANNELS]
-    absent = np.all([~np.isfinite(values) for values in winds], axis=0) if winds else np.array(False)
-    return np.where(absent, np.uint16(SampleFlag.MISSING), np.uint16(0)).astype(np.uint16)
+    """The flag MISSING where there is neither a speed nor a pair of horizontal components."""
+    speeds = [values for name, values in channels.items() if name.endswith("wind_speed")]
+    pair = [channels[name] for name in ("wind_x", "wind_y") if name in channels]
+    known = [np.isfinite(values) for values in speeds]
+    if len(pair) == 2 and not speeds:
+        known.append(np.isfinite(pair[0]) & np.isfinite(pair[1]))
+    present = np.any(known, axis=0) if known else np.array(False)
+    return np.where(present, np.uint16(0), np.uint16(SampleFlag.MISSING)).astype(np.uint16)
 
 
 def _findings(
