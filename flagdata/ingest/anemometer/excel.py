@@ -10,20 +10,27 @@ import csv
 import datetime as dt
 import importlib
 import io
+import struct
 import warnings
 import zipfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flagdata.errors import InputError, LimitError
+from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.source import TextFile
 
 ZIP = b"PK\x03\x04"
 _WORKBOOK = "xl/workbook.xml"
+# What zipfile, zlib, the XML parser and openpyxl raise for a damaged or encrypted workbook.
+_DAMAGE = (
+    zipfile.BadZipFile, zlib.error, struct.error, SyntaxError, KeyError, ValueError, TypeError, AttributeError,
+    IndexError, EOFError, OSError, RuntimeError, AssertionError, OverflowError,
+)  # fmt: skip
 _WIDEST = 2000
 """Columns of the widest sheet that is read."""
 
@@ -67,7 +74,7 @@ def open_sheet(path: Path, *, limits: Limits) -> SheetText:
         LimitError: larger than `limits` allow, unpacked.
     """
     where = str(path)
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(path) as archive:  # is_workbook has read its directory
         size = sum(item.file_size for item in archive.infolist())
     if size > limits.size:
         raise LimitError(
@@ -86,15 +93,13 @@ def open_sheet(path: Path, *, limits: Limits) -> SheetText:
         warnings.simplefilter("ignore", UserWarning)
         try:
             return _read(openpyxl, path, limits)
-        except (KeyError, ValueError, TypeError, AttributeError, IndexError, EOFError, OSError, SyntaxError) as error:
+        except FlagdataError:
+            raise
+        except _DAMAGE as error:
             raise InputError(
                 f"the workbook cannot be read: {error.__class__.__name__}", where=where,
-                fix="open it in Excel and save the sheet as CSV",
+                fix="copy it again, or open it in Excel and save the sheet as CSV",
             ) from None  # fmt: skip
-        except zipfile.BadZipFile:
-            raise InputError(
-                "the workbook is damaged", where=where, fix="copy it again, or save the sheet as CSV"
-            ) from None
 
 
 def _read(openpyxl: Any, path: Path, limits: Limits) -> SheetText:

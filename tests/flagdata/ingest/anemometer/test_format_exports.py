@@ -164,7 +164,11 @@ def weatherlink(speeds: tuple[float, ...], *, delimiter: str = "\t") -> str:
     rows = [
         ["25/05/26", ("10:30a", "11:30a", "1:30p")[i], "20.1", "21.0", "55", str(speed), "NNE", "9", "N", "1013.2"]
         for i, speed in enumerate(speeds[:3])
-    ] + [["26/05/26", f"1:{10 + i}a", "---", "---", "---", str(s), "---", "9", "N", "---"] for i, s in enumerate(speeds[3:])]  # fmt: skip
+    ]
+    rows += [
+        ["26/05/26", f"1:{10 + i}a", "---", "---", "---", str(speed), "---", "9", "N", "---"]
+        for i, speed in enumerate(speeds[3:])
+    ]
     if delimiter == "\t":
         return "\n".join("\t".join(row) for row in [upper, lower, *rows]) + "\n"
     width = 9
@@ -196,7 +200,10 @@ def test_weatherlink_speeds_that_show_no_unit_are_refused(read: Read) -> None:
 
 
 def test_weatherlink_com_names_its_units(read: Read) -> None:
-    head = '"Date & Time","Temp - °C","Hum - %","Barometer - mb","Avg Wind Speed - km/h","Prevailing Wind Direction","High Wind Speed - km/h"'
+    head = (
+        '"Date & Time","Temp - °C","Hum - %","Barometer - mb","Avg Wind Speed - km/h","Prevailing Wind Direction",'
+        '"High Wind Speed - km/h"'
+    )
     rows = [f'"5/{13 + i}/26 12:05 AM","20.1","55","1013","{18 + i}.0","SW","30"' for i in range(4)]
     rows.append('"5/17/26 12:05 AM","--","--","--","--","--","--"')
     log = read("\n".join(["Station,Somewhere", *[head], *rows, ""]), zone="UTC")
@@ -229,10 +236,10 @@ def test_ecowitt_names_its_units_in_brackets(read: Read, unit: str, scale: float
 
 
 def test_ecowitt_groups_in_a_line_above_belong_to_the_names(read: Read) -> None:
-    head = [
-        '"Time","Outdoor","","Indoor","","Wind","","","Pressure",""',
-        '"","Temperature(℃)","Humidity(%)","Temperature(℃)","Humidity(%)","Wind Speed(m/s)","Wind Gust(m/s)","Wind Direction(º)","Relative(hPa)","Absolute(hPa)"',
-    ]
+    groups = ["Time", "Outdoor", "", "Indoor", "", "Wind", "", "", "Pressure", ""]
+    names = ["", "Temperature(℃)", "Humidity(%)", "Temperature(℃)", "Humidity(%)", "Wind Speed(m/s)", "Wind Gust(m/s)"]
+    names += ["Wind Direction(º)", "Relative(hPa)", "Absolute(hPa)"]
+    head = [",".join(f'"{cell}"' for cell in cells) for cells in (groups, names)]
     rows = [f'"2026/9/18 9:{15 + i}","15.0","80","21.0","50","3.{i}","6.0","180","1013.0","1000.0"' for i in range(4)]
     log = read("\n".join([*head, *rows, ""]), zone="UTC")
     assert (log.format, first(log)) == ("ecowitt", "2026-09-18T09:15:00Z")
@@ -242,7 +249,8 @@ def test_ecowitt_groups_in_a_line_above_belong_to_the_names(read: Read) -> None:
 
 
 def test_easyweather_directions_are_points_of_the_compass(read: Read) -> None:
-    head = "No\tTime\tIndoor Temperature(°C)\tOutdoor Temperature(°C)\tAbsolute Pressure(hpa)\tWind(km/h)\tGust(km/h)\tDirection"
+    names = ["No", "Time", "Indoor Temperature(°C)", "Outdoor Temperature(°C)", "Absolute Pressure(hpa)", "Wind(km/h)"]
+    head = "\t".join([*names, "Gust(km/h)", "Direction"])
     rows = [f"{i}\t2026-09-18 14:{25 + i}\t21,0\t15,0\t1000,0\t{3 + i},6\t7,2\tWSW" for i in range(4)]
     log = read("\n".join([head, *rows, ""]), zone="UTC")
     assert log.series.channels["wind_speed"][0] == pytest.approx(1.0)
@@ -252,8 +260,9 @@ def test_easyweather_directions_are_points_of_the_compass(read: Read) -> None:
 def hobo(unit: str = "m/s") -> str:
     marks = "(LGR S/N: 123, SEN S/N: 456)"
     head = (
-        f'"#","Date Time, GMT-05:00","Wind Speed, {unit} {marks}","Gust Speed, {unit} {marks}","Wind Direction, ø {marks}",'
-        f'"Temp, °C {marks}","RH, % {marks}","Host Connected (LGR S/N: 123)","End Of File (LGR S/N: 123)"'
+        f'"#","Date Time, GMT-05:00","Wind Speed, {unit} {marks}","Gust Speed, {unit} {marks}",'
+        f'"Wind Direction, ø {marks}","Temp, °C {marks}","RH, % {marks}",'
+        f'"Host Connected (LGR S/N: 123)","End Of File (LGR S/N: 123)"'
     )
     rows = [f"{i},07/{15 + i}/26 12:05:00 PM,{2 + i}.5,4.0,{90 + i}.0,20.5,55.0,," for i in range(4)]
     rows += ["5,07/19/26 12:05:00 PM,-888.88,4.0,90.0,20.5,55.0,,", "6,07/19/26 12:06:10 PM,,,,,,Logged,Logged"]
@@ -285,7 +294,8 @@ def test_hobolink_writes_the_sensor_before_the_unit(read: Read) -> None:
 
 def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
     head = [
-        "file_info,,,,air_properties,,,rotated_wind,,", "filename,date,time,DOY,sonic_temperature,air_temperature,air_pressure,u_rot,wind_speed,wind_dir",
+        "file_info,,,,air_properties,,,rotated_wind,,",
+        "filename,date,time,DOY,sonic_temperature,air_temperature,air_pressure,u_rot,wind_speed,wind_dir",
         ",[yyyy-mm-dd],[HH:MM],[ddd.ddd],[K],[K],[Pa],[m+1s-1],[m+1s-1],[deg_from_north]",
     ]  # fmt: skip
     rows = [f"f{i}.raw,2026-05-01,{12 + i}:30,121.5,290.1,289.5,101325,2.5,2.{5 + i},200" for i in range(4)]
