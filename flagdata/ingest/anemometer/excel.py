@@ -104,11 +104,12 @@ def open_sheet(path: Path, *, limits: Limits) -> SheetText:
 
 def _read(openpyxl: Any, path: Path, limits: Limits) -> SheetText:
     where = str(path)
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    try:
-        tables = {sheet.title: _lines(sheet, limits, where) for sheet in book.worksheets}
-    finally:
-        book.close()
+    with path.open("rb") as stream:  # opened here: openpyxl leaves a damaged workbook open
+        book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
+        try:
+            tables = {sheet.title: _lines(sheet, limits, where) for sheet in book.worksheets}
+        finally:
+            book.close()
     filled = {title: lines for title, lines in tables.items() if sum(bool(line.strip(",")) for line in lines) > 1}
     if not filled:
         raise InputError("no sheet with two rows", where=where, fix="check that the workbook holds the log")
