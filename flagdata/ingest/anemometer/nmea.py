@@ -29,6 +29,7 @@ from flagdata.ingest.anemometer.sentences import (
     tag_time,
     time_mark,
 )
+from flagdata.ingest.anemometer.serial_lines import most_stamped
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.schema import SampleFlag
@@ -59,6 +60,7 @@ class _Stream:
     not_sentences: list[int] = field(default_factory=list)
     invalid: list[int] = field(default_factory=list)
     undirected: int = 0
+    unstated: int = 0
     speeds: list[float] = field(default_factory=list)
 
 
@@ -71,6 +73,8 @@ class Nmea:
 
     def recognise(self, head: Head) -> Guess | None:
         """Lines that are sentences, most of them with a right checksum, some of them of wind."""
+        if most_stamped(head):
+            return None  # they are of the format nmea-stamped
         right = wrong = wind = 0
         for line in head.lines:
             try:
@@ -165,13 +169,15 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
 
 def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
     fields = sentence.fields
-    if len(fields) < 5 or fields[1] not in ("R", "T"):
+    if len(fields) < 4 or fields[1] not in ("R", "T"):
         stream.invalid.append(at)
         return
     kind = "apparent" if fields[1] == "R" else "theoretical"
     angle, speed, unit = number(fields[0]), number(fields[2]), SPEED_UNITS.get(fields[3])
     row: dict[str, float] = {}
-    flag = SampleFlag.OK if fields[4] == "A" else SampleFlag.SENSOR_FAULT
+    unstated = len(fields) == 4  # canboat's n2kd leaves the status out
+    stream.unstated += unstated
+    flag = SampleFlag.OK if unstated or fields[4] == "A" else SampleFlag.SENSOR_FAULT
     if angle is not None:
         row[f"{kind}_wind_direction"] = float(np.radians(angle))
     if speed is not None and unit is not None:
@@ -310,6 +316,9 @@ def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
     if stream.unchecked:
         text = f"{stream.unchecked} sentences without a checksum; taken as they are"
         found.append(Finding(kind="no-checksum", severity=Severity.WARNING, count=stream.unchecked, what=text))
+    if stream.unstated:
+        text = f"{stream.unstated} MWV sentences without a status; taken as valid"
+        found.append(Finding(kind="no-status", severity=Severity.WARNING, count=stream.unstated, what=text))
     if stream.undirected:
         text = f"{stream.undirected} MWD sentences without a direction: no wind over ground, not read"
         found.append(Finding(kind="mwd-without-direction", severity=Severity.NOTE, count=stream.undirected, what=text))

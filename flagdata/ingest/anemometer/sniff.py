@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.ingest.anemometer import excel
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind, Head
@@ -27,7 +28,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     if path.is_dir():
         return (_folder(path),)
     head = first_bytes(path)
-    other = signature(head)
+    other = None if excel.is_workbook(path, head) else signature(head)
     if other is not None:
         what, fix = other
         kind: GuessKind = "camera" if "video" in what else "record" if "MCAP" in what else "other"

@@ -131,6 +131,10 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             where=where,
             fix="split it, or give read_log wider limits",
         )
+    from flagdata.ingest.anemometer import excel  # a sheet is a TextFile: excel imports this module
+
+    if excel.is_workbook(path, head):
+        return excel.open_sheet(path, limits=limits)
     other = signature(head)
     if other:
         raise InputError(f"this is {other[0]}, not a text log", where=where, fix=other[1])

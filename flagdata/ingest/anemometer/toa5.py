@@ -1,7 +1,8 @@
 """Campbell Scientific TOA5: four header lines, quoted stamps, a record number a row.
 
 Source: Campbell Scientific, LoggerNet Instruction Manual, appendix "Campbell Scientific File Formats"; diagnostics:
-CSAT3 Instruction Manual, diagnostic word (bits 12 to 15 are warnings, bits 0 to 5 count measurements).
+CSAT3 Instruction Manual, diagnostic word (bits 12 to 15 are warnings, bits 0 to 5 count measurements). A table that a
+spreadsheet has saved again is read too: no quotes, commas that pad the first line, dates in the computer's own order.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.headings import Assigned, column_findings, known_unit, stamp_format
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
@@ -23,6 +25,7 @@ from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
+from flagdata.ingest.anemometer.windographer import NAMES as MAST_NAMES
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants, Sensor
 from flagdata.timebase import NANOSECONDS
@@ -43,6 +46,8 @@ _NAMES: tuple[tuple[str, str], ...] = (
 _DIAGNOSTIC = re.compile(r"diag(_csat|_sonic|nostic)?(_\d+)?|csat_?diag|diag_word", re.IGNORECASE)
 _MISSING = ("nan", '"nan"', "-7999", "7999", "-99999", "-2147483648")
 _WARNINGS = 0xF000
+_FORM = "%Y-%m-%d %H:%M:%S%f"
+_OWN = re.compile(r"\s*\d{4}-")
 
 
 class Toa5:
@@ -50,7 +55,7 @@ class Toa5:
 
     name = "toa5"
     about = "Campbell Scientific TOA5 table"
-    uses = frozenset({"zone", "azimuth"})
+    uses = frozenset({"zone", "azimuth", "date_order"})
 
     def recognise(self, head: Head) -> Guess | None:
         """A first line that begins with "TOA5"."""
@@ -63,15 +68,13 @@ class Toa5:
         """Read a table whose header names wind speed or wind components."""
         header = self._header(source)
         names, units = header[1], header[2]
-        recipe, unread = self._recipe(source, header)
+        recipe, assigned, found = self._recipe(source, header, options)
         extra = [name for name in names if name == "RECORD" or _DIAGNOSTIC.fullmatch(name)]
         rows = RowReader(source, recipe.file)
         table = read_table(rows, recipe, where=str(source.path), zone_name=options.zone, extra=extra)
-        found: list[Finding] = []
         flags = table.reading.flags.copy()
-        if unread:
-            listed = ", ".join(f"{name} [{units[names.index(name)]}]" for name in unread)
-            found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(unread), what=listed))
+        listed = tuple(f"{name} [{units[names.index(name)]}]" for name in assigned.unread)
+        found.extend(column_findings(replace(assigned, unread=listed)))
         for name, values in table.extra.items():
             if name == "RECORD":
                 found.extend(_continuity(values, table.reading.line))
@@ -105,29 +108,32 @@ class Toa5:
             raise InputError(
                 "line 1 does not begin with TOA5", where=f"{where}, line 1", fix="name another format by --as"
             )
-        if "TIMESTAMP" not in rows[1] or len(rows[2]) != len(rows[1]):
+        if _stamp_name(rows[1]) is None or len(rows[2]) != len(rows[1]):
             raise InputError(
                 "lines 2 and 3 do not name TIMESTAMP and a unit for each column", where=f"{where}, line 2",
                 fix="collect the table as TOA5 with header",
             )  # fmt: skip
         return rows
 
-    def _recipe(self, source: TextFile, header: list[list[str]]) -> tuple[Recipe, list[str]]:
+    def _recipe(
+        self, source: TextFile, header: list[list[str]], options: WindOptions
+    ) -> tuple[Recipe, Assigned, list[Finding]]:
         about, names, units = header[0], header[1], header[2]
+        stamp = _stamp_name(names) or "TIMESTAMP"
         channels: dict[str, ChannelLayout] = {}
+        taken: dict[str, str] = {}
         unread: list[str] = []
+        rivals: list[str] = []
         for name, spelling in zip(names, units, strict=True):
             channel = _channel(name)
             if channel is None or channel in channels:
-                if name not in ("TIMESTAMP", "RECORD") and not _DIAGNOSTIC.fullmatch(name):
+                if channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s":
+                    rivals.append(name)
+                elif name not in (stamp, "RECORD") and not _DIAGNOSTIC.fullmatch(name):
                     unread.append(name)
                 continue
-            spelled = spelling or ("%" if channel == "relative_humidity" else "")
-            try:
-                matches = unit(spelled).si == CHANNELS[channel].unit
-            except UnknownNameError:
-                matches = False
-            if not matches:
+            spelled = known_unit(spelling or ("%" if channel == "relative_humidity" else ""))
+            if spelled is None or unit(spelled).si != CHANNELS[channel].unit:
                 if channel.startswith("wind_"):
                     raise InputError(
                         f"{name} looks like {channel}, but its unit is {spelling!r}", where=f"{source.path}, line 3",
@@ -136,24 +142,34 @@ class Toa5:
                 unread.append(name)
                 continue
             channels[channel] = ChannelLayout(column=name, unit=spelled)
+            taken[channel] = name
         if not {"wind_speed", "wind_x"} & set(channels):
             raise InputError(
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
                 fix=f"describe the file by a recipe; its columns are {', '.join(names)}",
             )  # fmt: skip
+        rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
+        form, found = _FORM, ()
+        if options.date_order is not None or not all(_OWN.match(text) for text in rows):
+            form, found = stamp_format(rows, options, f"{source.path}, line 5")
         model = " ".join(cell for cell in about[2:4] if cell)
         recipe = Recipe(
             name="toa5", about="from the file's own header", source="the file",
             file=FileLayout(header=3, preamble=1, missing=_MISSING),
-            time=TimeLayout(columns=("TIMESTAMP",), format="%Y-%m-%d %H:%M:%S%f"),
+            time=TimeLayout(columns=(stamp,), format=form),
             channels=channels,
             sensor=Sensor(name=f"{about[1] if len(about) > 1 else ''} on {model or 'Campbell logger'}".strip()),
         )  # fmt: skip
-        return recipe, unread
+        assigned = Assigned(channels=channels, names=taken, unread=tuple(unread), rivals=tuple(rivals))
+        return recipe, assigned, list(found)
+
+
+def _stamp_name(names: list[str]) -> str | None:
+    return next((name for name in names if name.upper() == "TIMESTAMP"), None)
 
 
 def _channel(name: str) -> str | None:
-    for pattern, channel in _NAMES:
+    for pattern, channel in (*_NAMES, *MAST_NAMES):
         if re.fullmatch(pattern, name, re.IGNORECASE):
             return channel
     return None

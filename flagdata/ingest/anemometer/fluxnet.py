@@ -1,0 +1,79 @@
+"""FLUXNET, AmeriFlux and ICOS ecosystem tables: TIMESTAMP_START, TIMESTAMP_END and variables with fixed units.
+
+Source: AmeriFlux, "Half-hourly and hourly data upload format" and "Data variables": stamps YYYYMMDDHHMM of local
+standard time without daylight saving, WS [m/s], WD [deg], TA [°C], PA [kPa], RH [%], -9999 for no value, position as
+"_H_V_R" behind a name, "_F" for values with gaps filled. Filled values are not read: they are no measurement. Rows are
+stamped by their end. Written by this description; no such table was at hand.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flagdata.errors import InputError
+from flagdata.ingest.anemometer.headings import Column, Export, assign, cut, read_export
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import FileLayout, TimeLayout
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.source import TextFile
+from flagdata.signals import Sensor
+
+_PLACE = r"(_\d+_\d+_\d+|_\d+)?"
+_NAMES = (
+    (rf"WS{_PLACE}", "wind_speed"),
+    (rf"WD{_PLACE}", "wind_direction"),
+    (rf"TA{_PLACE}", "air_temperature"),
+    (rf"PA{_PLACE}", "air_pressure"),
+    (rf"RH{_PLACE}", "relative_humidity"),
+)
+_UNITS = {"WS": "m/s", "WD": "deg", "TA": "degC", "PA": "kPa", "RH": "%"}
+
+
+class Fluxnet:
+    """Format "fluxnet"."""
+
+    name = "fluxnet"
+    about = "FLUXNET, AmeriFlux or ICOS half-hourly table"
+    uses = frozenset({"zone"})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """A heading that begins with TIMESTAMP_START,TIMESTAMP_END."""
+        at = _heading(head.lines)
+        if at is None:
+            return None
+        reasons = (f"line {at + 1} begins with TIMESTAMP_START, TIMESTAMP_END, as flux networks write",)
+        return Guess(format=self.name, score=0.97, reasons=reasons)
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read wind speed and direction of each half-hour or hour."""
+        where = str(source.path)
+        lines = source.head(10)
+        at = _heading(lines)
+        if at is None:
+            raise InputError("no heading with TIMESTAMP_START", where=where, fix="name another format by --as")
+        columns = [
+            Column(number=number, name=name, unit=_UNITS.get(re.split("_", name, maxsplit=1)[0], ""))
+            for number, name in enumerate(cut(lines[at], ","), start=1)
+        ]
+        assigned = assign(
+            columns[2:], _NAMES, where=f"{where}, line {at + 1}", fix="give a table that holds WS, not WS_F alone"
+        )
+        export = Export(
+            name=self.name,
+            file=FileLayout(preamble=at, missing=("-9999", "-6999")),
+            time=TimeLayout(columns=(2,), format="%Y%m%d%H%M"),
+            sensor=Sensor(name="flux tower"),
+            assigned=assigned,
+            described_by="AmeriFlux' data format",
+            averaged=True,
+        )
+        return read_export(source, export, options)
+
+
+def _heading(lines: Sequence[str]) -> int | None:
+    for index, line in enumerate(lines[:5]):
+        if line.lstrip("\ufeff").replace('"', "").startswith("TIMESTAMP_START,TIMESTAMP_END,"):
+            return index
+    return None

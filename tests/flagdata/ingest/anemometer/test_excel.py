@@ -1,0 +1,122 @@
+"""Excel workbooks: the sheet is read as the CSV that Excel would save."""
+
+from __future__ import annotations
+
+import datetime as dt
+import importlib
+import sys
+import zipfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flagdata.errors import InputError, LimitError
+from flagdata.ingest.anemometer import Limits, WindOptions, read_log, sniff
+from flagdata.timebase import iso
+
+Book = Callable[..., Path]
+
+
+@pytest.fixture
+def book(tmp_path: Path) -> Book:
+    """Writes sheets of rows to a workbook and returns its path."""
+    openpyxl: Any = pytest.importorskip("openpyxl", reason="openpyxl absent: pip install 'flagdata[excel]'")
+
+    def write(**sheets: Sequence[Sequence[object]]) -> Path:
+        made = openpyxl.Workbook()
+        made.remove(made.active)
+        for title, rows in sheets.items():
+            sheet = made.create_sheet(title)
+            for row in rows:
+                sheet.append(list(row))
+        path = tmp_path / "wind.xlsx"
+        made.save(path)
+        return path
+
+    return write
+
+
+START = dt.datetime(2026, 5, 1, 23, 59, 58)  # noqa: DTZ001  a sheet's cells have no zone
+PLAIN = [
+    ["time", "wind_speed", "air_temperature"],
+    *([START + dt.timedelta(seconds=i), 3 + i / 2, 20] for i in range(4)),
+]
+
+
+def test_a_sheet_with_dates_is_read_by_its_recipe(book: Book) -> None:
+    path = book(Log=PLAIN)
+    assert sniff(path)[0].recipe == "generic-csv"
+    log = read_log(path, WindOptions(zone="UTC"))
+    assert [iso(int(t)) for t in log.series.time[1:3]] == ["2026-05-01T23:59:59Z", "2026-05-02T00:00:00Z"]
+    assert log.series.channels["wind_speed"].tolist() == [3.0, 3.5, 4.0, 4.5]
+    assert log.series.channels["air_temperature"][0] == pytest.approx(293.15)
+
+
+def test_a_makers_export_in_a_sheet_is_told_as_its_text_is(book: Book) -> None:
+    rows = [
+        ["z6-01234", "Port1", None, "Port8"], ["# Records: 3", "ATMOS 22 Ultrasonic Anemometer", None, "Barometer"],
+        ["Timestamps", " m/s Wind Speed", "° Wind Direction", " kPa Reference Pressure"],
+        *([START + dt.timedelta(minutes=5 * i), 1.5 + i, 90, 97.8] for i in range(4)),
+    ]  # fmt: skip
+    log = read_log(book(Processed=rows), WindOptions(zone="+03:00"))
+    assert (log.format, iso(int(log.series.time[0]))) == ("zentra", "2026-05-01T20:59:58Z")
+    assert log.series.channels["wind_speed"].tolist() == [1.5, 2.5, 3.5, 4.5]
+
+
+def test_the_first_sheet_with_a_table_is_read_and_the_others_are_named(book: Book) -> None:
+    log = read_log(book(Notes=[["made by hand"]], Log=PLAIN, More=PLAIN), WindOptions(zone="UTC"))
+    found = next(finding for finding in log.findings if finding.kind == "several-sheets")
+    assert "'Log'" in found.what
+    assert "'More'" in found.what
+
+
+def test_line_numbers_are_those_of_the_sheets_rows(book: Book) -> None:
+    rows = [list(row) for row in PLAIN]
+    rows[3][1] = "broken"
+    log = read_log(book(Log=rows), WindOptions(zone="UTC"))
+    assert next(finding for finding in log.findings if finding.kind == "unreadable-values").where == "line 4"
+
+
+def test_a_workbook_without_a_table_is_refused(book: Book) -> None:
+    with pytest.raises(InputError, match="no sheet with two rows"):
+        read_log(book(Notes=[["nothing"]]))
+
+
+def test_a_damaged_workbook_is_refused(book: Book) -> None:
+    path = book(Log=PLAIN)
+    whole = path.read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        at = archive.getinfo("xl/worksheets/sheet1.xml").header_offset
+    path.write_bytes(whole[: at + 60] + bytes(40) + whole[at + 100 :])
+    with pytest.raises(InputError) as caught:
+        read_log(path, WindOptions(zone="UTC"))
+    assert "CSV" in (caught.value.fix or "")
+
+
+def test_a_workbook_beyond_the_limits_is_refused_before_it_is_unpacked(book: Book) -> None:
+    path = book(Log=PLAIN)
+    with pytest.raises(LimitError, match="unpacks to"):
+        read_log(path, WindOptions(limits=Limits(size=path.stat().st_size + 1)))
+    with pytest.raises(LimitError, match="more than 2 rows"):
+        read_log(book(Log=PLAIN), WindOptions(limits=Limits(rows=2)))
+
+
+def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "wind.xlsx"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(ImportError):
+        importlib.import_module("openpyxl")
+    with pytest.raises(InputError, match="library that reads it is not installed") as caught:
+        read_log(path)
+    assert "flagdata[excel]" in (caught.value.fix or "")
+
+
+def test_a_zip_archive_that_is_no_workbook_stays_one(tmp_path: Path) -> None:
+    path = tmp_path / "logs.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a.csv", "time,wind_speed\n")
+    assert sniff(path)[0].format == "a zip archive or an Excel workbook"

@@ -1,0 +1,339 @@
+"""Exports of loggers, stations and programs, made by their makers' descriptions: units, zones, markers, cut lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, TimeError
+from flagdata.schema import SampleFlag
+from flagdata.signals import WindLog
+from flagdata.timebase import iso
+
+Read = Callable[..., WindLog]
+
+
+def kinds(log: WindLog) -> dict[str, int]:
+    return {finding.kind: finding.count for finding in log.findings}
+
+
+def first(log: WindLog) -> str:
+    return iso(int(log.series.time[0]))
+
+
+def nrg(*, zone: str = "UTC-5:00", unit: str = "m/s") -> str:
+    head = [
+        "NRG Export Service",
+        "Export version:\t3",
+        "",
+        "Site Properties",
+        f"Time Zone:\t{zone}",
+        "",
+        "Sensor History",
+    ]
+    for channel, kind, about, height in [
+        (1, "Anemometer", "NRG S1", "40.00"), (2, "Anemometer", "NRG 40C", "20.00"),
+        (13, "Vane", "NRG 200M Vane", "38.00"), (15, "Analog", "NRG T60 Temp", "2.00"),
+        (16, "Analog", "PV module temp", "2.00"),
+    ]:  # fmt: skip
+        head += [f"Channel:\t{channel}", f"Type:\t{kind}", f"Description:\t{about}", f"Height:\t{height}", ""]
+    columns = [
+        "Timestamp", f"Ch1_Anem_40.00m_N_Avg_{unit}", f"Ch1_Anem_40.00m_N_SD_{unit}", f"Ch2_Anem_20.00m_N_Avg_{unit}",
+        "Ch13_Vane_38.00m_N_Avg_Deg", "Ch15_Analog_2.00m_N_Avg_C", "Ch16_Analog_2.00m_N_Avg_C",
+    ]  # fmt: skip
+    rows = [f"2026-05-01 12:{10 * i:02d}:00\t{5 + i}.0\t0.5\t4.0\t{200 + i}.0\t15.0\t40.0" for i in range(5)]
+    return "\n".join([*head, "Data", "\t".join(columns), *rows])
+
+
+def test_nrg_channels_are_told_by_their_history(read: Read) -> None:
+    log = read(nrg())
+    assert (log.format, first(log)) == ("nrg", "2026-05-01T17:00:00Z")
+    assert log.series.channels["wind_speed"].tolist() == [5, 6, 7, 8, 9]
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(200))
+    assert log.series.channels["air_temperature"][0] == pytest.approx(288.15)
+    assert (log.series.sensor.name, log.series.sensor.height, log.series.sensor.averaging) == ("NRG S1", 40.0, 600.0)
+    several = next(finding for finding in log.findings if finding.kind == "several-anemometers")
+    assert "Ch2" in several.what
+
+
+def test_an_nrg_zone_that_the_user_contradicts_is_reported(read: Read) -> None:
+    log = read(nrg(), zone="-04:00")
+    assert first(log) == "2026-05-01T16:00:00Z"
+    assert kinds(log)["zone-contradicts"] == 1
+
+
+def test_nrg_speeds_are_in_the_unit_of_their_column_and_a_cut_row_is_left_out(read: Read) -> None:
+    log = read(nrg(unit="mph") + "\n2026-05-01 12:50:00\t5.0")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(5 * 0.44704)
+    assert kinds(log)["cut-off"] == 1
+
+
+def windographer(*, unit: str = "", calm: str = "Calm threshold = 0 m/s") -> str:
+    head = [
+        "Created 10-05-2026 14:36 by Windographer 5.0",
+        "",
+        calm,
+        "",
+        "Time stamps indicate the beginning of the time step.",
+        "",
+    ]
+    names = ["Date/Time", f"Spd80mN{unit}", f"Spd80mNStd{unit}", f"Spd60mN{unit}", "Dir78mS"]
+    rows = [f"2026-01-{day:02d} 12:00\t{day}.5\t0.3\t4.0\t114.2" for day in range(9, 15)]
+    return "\n".join([*head, "\t".join(names), *rows])
+
+
+def test_windographer_speeds_without_a_unit_are_in_that_of_the_calm_threshold(read: Read) -> None:
+    log = read(windographer(calm="Calm threshold = 0 mph"), zone="UTC")
+    assert log.format == "windographer"
+    assert log.series.channels["wind_speed"][0] == pytest.approx(9.5 * 0.44704)
+    assert {"unit-from-preamble", "several-anemometers", "stamps-at-start"} <= set(kinds(log))
+
+
+def test_windographer_units_of_columns_go_before_and_without_any_nothing_is_read(read: Read) -> None:
+    log = read(windographer(unit=" [km/h]"), zone="UTC")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(9.5 / 3.6)
+    assert "unit-from-preamble" not in kinds(log)
+    with pytest.raises(InputError, match="its unit is ''"):
+        read(windographer(calm=""), zone="UTC")
+
+
+def zentra(rows: list[str], *, padded: bool = True) -> str:
+    head = [
+        "\ufeffz6-01234,Port1,,,Port7,", f"# Records: {len(rows)},ATMOS 22 Ultrasonic Anemometer,,,Barometer,",
+        "Timestamps,° Wind Direction, m/s Wind Speed, m/s Gust Speed, kPa Reference Pressure, °C Logger Temperature",
+    ]  # fmt: skip
+    return "\r\n".join([*head, *([",,,,,"] if padded else []), *rows, ""])
+
+
+@pytest.mark.parametrize("padded", [True, False])
+def test_zentra_columns_are_unit_and_name_and_its_time_is_local(read: Read, padded: bool) -> None:
+    rows = [f"9/30/2026 19:{5 * i:02d},307,1.1{i},1.7{i},97.78,25" for i in range(6)]
+    log = read(zentra(rows, padded=padded), zone="+03:00")
+    assert (log.format, first(log), len(log.series)) == ("zentra", "2026-09-30T16:00:00Z", 6)
+    assert log.series.channels["wind_speed"][0] == pytest.approx(1.10)
+    assert log.series.channels["air_pressure"][0] == pytest.approx(97_780)
+    assert "air_temperature" not in log.series.channels
+    assert log.series.sensor.name == "ATMOS 22 Ultrasonic Anemometer on z6-01234"
+
+
+def test_error_codes_of_zentra_are_missing_and_no_zone_is_refused(read: Read) -> None:
+    rows = [f"9/30/2026 19:{5 * i:02d},307,1.1{i},1.7{i},97.78,25" for i in range(6)]
+    rows[2:4] = ["9/30/2026 19:10,#N/A,-9999,#N/A,97.78,25", "9/30/2026 19:15,307,-9992,1.7,97.78,25"]
+    log = read(zentra(rows), zone="UTC")
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [2, 3]
+    with pytest.raises(TimeError, match="no time zone"):
+        read(zentra(rows))
+
+
+def resaved(stamps: list[str]) -> str:
+    head = [
+        "\ufeffTOA5,site,CR1000,E7000,CR1000.Std.22,CPU:mast.CR1,12345,mast,",
+        "Timestamp,RECORD,Spd80mN,Spd80mS,Spd80mNStd,Dir78mS,T2m,RH2m,P2m",
+        "TS,RN,Metres/Second,Metres/Second,Metres/Second,Deg,Celcius,%,Millibar", ",,Avg,Avg,Std,WVc,Smp,Avg,Avg",
+    ]  # fmt: skip
+    rows = [f"{stamp},{i},{8 + i}.37,7.9,1.2,114.2,0.5,98,935" for i, stamp in enumerate(stamps)]
+    return "\n".join([*head, *rows, ""])
+
+
+def test_a_toa5_table_saved_by_a_spreadsheet_is_read_with_its_own_order_of_dates(read: Read) -> None:
+    log = read(resaved([f"{day}/01/2026 12:00:00+01:00" for day in range(9, 16)]))
+    assert (log.format, first(log)) == ("toa5", "2026-01-09T11:00:00Z")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(8.37)
+    assert log.series.channels["air_temperature"][0] == pytest.approx(273.65)
+    assert log.series.channels["air_pressure"][0] == pytest.approx(93_500)
+    assert kinds(log)["several-anemometers"] == 1
+
+
+def test_a_toa5_table_whose_dates_could_be_either_order_is_refused_unless_told(read: Read) -> None:
+    text = resaved([f"09/01/2026 12:0{i}:00" for i in range(4)])
+    with pytest.raises(TimeError, match="day/month or month/day") as caught:
+        read(text, zone="UTC")
+    assert "--date-order" in (caught.value.fix or "")
+    assert first(read(text, zone="UTC", date_order="mdy")) == "2026-09-01T12:00:00Z"
+
+
+# Vantage consoles keep whole mph; WeatherLink rounds what it converts to one decimal.
+MPH = {"mph": (1, 2, 3, 5, 8, 9), "km/h": (1.6, 3.2, 4.8, 8.0, 12.9, 14.5), "m/s": (0.4, 0.9, 1.3, 2.2, 3.6, 4.0)}
+
+
+def weatherlink(speeds: tuple[float, ...], *, delimiter: str = "\t") -> str:
+    upper = ["", "", "Temp", "Hi", "Out", "Wind", "Wind", "Hi", "Hi", ""]
+    lower = ["Date", "Time", "Out", "Temp", "Hum", "Speed", "Dir", "Speed", "Dir", "Bar"]
+    rows = [
+        ["25/05/26", ("10:30a", "11:30a", "1:30p")[i], "20.1", "21.0", "55", str(speed), "NNE", "9", "N", "1013.2"]
+        for i, speed in enumerate(speeds[:3])
+    ]
+    rows += [
+        ["26/05/26", f"1:{10 + i}a", "---", "---", "---", str(speed), "---", "9", "N", "---"]
+        for i, speed in enumerate(speeds[3:])
+    ]
+    if delimiter == "\t":
+        return "\n".join("\t".join(row) for row in [upper, lower, *rows]) + "\n"
+    width = 9
+    lines = ["".join(f"{cell:>{width}}" for cell in row) for row in [upper, lower]]
+    body = ["".join(f"{cell:>{width}}" for cell in row) for row in rows]
+    return "\n".join([*lines, "-" * width * len(lower), *body, ""])
+
+
+@pytest.mark.parametrize(("unit", "speeds"), MPH.items())
+@pytest.mark.parametrize("delimiter", ["\t", " "])
+def test_the_unit_of_a_weatherlink_text_shows_in_whole_miles_per_hour(
+    read: Read, unit: str, speeds: tuple[float, ...], delimiter: str
+) -> None:
+    log = read(weatherlink(speeds, delimiter=delimiter), zone="UTC")
+    # 2 mph = 0.894 m/s; the file's one decimal is 0.05 of its unit
+    assert log.format == "davis"
+    assert log.series.channels["wind_speed"][1] == pytest.approx(0.894, abs=0.03)
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(22.5))
+    assert np.isnan(log.series.channels["wind_direction"][4])
+    assert first(log) == "2026-05-25T10:30:00Z"
+    assert iso(int(log.series.time[2])) == "2026-05-25T13:30:00Z"
+    assert {"unit-from-resolution", "compass-points"} <= set(kinds(log))
+
+
+def test_weatherlink_speeds_that_show_no_unit_are_refused(read: Read) -> None:
+    with pytest.raises(InputError, match="carries no units") as caught:
+        read(weatherlink((0, 0, 0.4, 0, 0, 0)), zone="UTC")
+    assert "recipe" in (caught.value.fix or "")
+
+
+def test_weatherlink_com_names_its_units(read: Read) -> None:
+    head = (
+        '"Date & Time","Temp - °C","Hum - %","Barometer - mb","Avg Wind Speed - km/h","Prevailing Wind Direction",'
+        '"High Wind Speed - km/h"'
+    )
+    rows = [f'"5/{13 + i}/26 12:05 AM","20.1","55","1013","{18 + i}.0","SW","30"' for i in range(4)]
+    rows.append('"5/17/26 12:05 AM","--","--","--","--","--","--"')
+    log = read("\n".join(["Station,Somewhere", *[head], *rows, ""]), zone="UTC")
+    assert (log.format, first(log)) == ("davis", "2026-05-13T00:05:00Z")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(5.0)
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(225))
+    assert "air_pressure" not in log.series.channels
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+
+
+ECOWITT = (
+    "Time,Indoor Temperature(℃),Outdoor Temperature(℃),Outdoor Humidity(%),Wind(m/s),Gust(m/s),Wind Direction(deg),"
+    "ABS Pressure(hPa),REL Pressure(hPa)"
+)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("m/s", 1.0), ("km/h", 1 / 3.6), ("mph", 0.44704), ("knots", 1852 / 3600)])
+def test_ecowitt_names_its_units_in_brackets(read: Read, unit: str, scale: float) -> None:
+    rows = [f"2026-09-18 14:{25 + i},21.0,15.0,80,{3 + i}.5,6.0,{180 + i},1000.1,1013.0" for i in range(4)]
+    text = "\n".join(
+        [ECOWITT.replace("m/s", unit), *rows, "2026-09-18 14:29,21.0,--.-,--,--.-,--.-,---,1000.0,1013.0", "2026-09"]
+    )
+    log = read(text, zone="UTC")
+    assert log.format == "ecowitt"
+    assert log.series.channels["wind_speed"][0] == pytest.approx(3.5 * scale)
+    assert log.series.channels["air_temperature"][0] == pytest.approx(288.15)
+    assert log.series.channels["air_pressure"][0] == pytest.approx(100_010)
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+    assert kinds(log)["cut-off"] == 1
+
+
+def test_ecowitt_groups_in_a_line_above_belong_to_the_names(read: Read) -> None:
+    groups = ["Time", "Outdoor", "", "Indoor", "", "Wind", "", "", "Pressure", ""]
+    names = ["", "Temperature(℃)", "Humidity(%)", "Temperature(℃)", "Humidity(%)", "Wind Speed(m/s)", "Wind Gust(m/s)"]
+    names += ["Wind Direction(º)", "Relative(hPa)", "Absolute(hPa)"]
+    head = [",".join(f'"{cell}"' for cell in cells) for cells in (groups, names)]
+    rows = [f'"2026/9/18 9:{15 + i}","15.0","80","21.0","50","3.{i}","6.0","180","1013.0","1000.0"' for i in range(4)]
+    log = read("\n".join([*head, *rows, ""]), zone="UTC")
+    assert (log.format, first(log)) == ("ecowitt", "2026-09-18T09:15:00Z")
+    assert log.series.channels["wind_speed"].tolist() == [3.0, 3.1, 3.2, 3.3]
+    assert log.series.channels["air_temperature"][0] == pytest.approx(288.15)
+    assert log.series.channels["air_pressure"][0] == pytest.approx(100_000)
+
+
+def test_easyweather_directions_are_points_of_the_compass(read: Read) -> None:
+    names = ["No", "Time", "Indoor Temperature(°C)", "Outdoor Temperature(°C)", "Absolute Pressure(hpa)", "Wind(km/h)"]
+    head = "\t".join([*names, "Gust(km/h)", "Direction"])
+    rows = [f"{i}\t2026-09-18 14:{25 + i}\t21,0\t15,0\t1000,0\t{3 + i},6\t7,2\tWSW" for i in range(4)]
+    log = read("\n".join([head, *rows, ""]), zone="UTC")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(1.0)
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(247.5))
+
+
+def hobo(unit: str = "m/s") -> str:
+    marks = "(LGR S/N: 123, SEN S/N: 456)"
+    head = (
+        f'"#","Date Time, GMT-05:00","Wind Speed, {unit} {marks}","Gust Speed, {unit} {marks}",'
+        f'"Wind Direction, ø {marks}","Temp, °C {marks}","RH, % {marks}",'
+        f'"Host Connected (LGR S/N: 123)","End Of File (LGR S/N: 123)"'
+    )
+    rows = [f"{i},07/{15 + i}/26 12:05:00 PM,{2 + i}.5,4.0,{90 + i}.0,20.5,55.0,," for i in range(4)]
+    rows += ["5,07/19/26 12:05:00 PM,-888.88,4.0,90.0,20.5,55.0,,", "6,07/19/26 12:06:10 PM,,,,,,Logged,Logged"]
+    return "\n".join(['"Plot Title: Roof"', head, *rows, ""])
+
+
+def test_hobo_states_zone_and_units_in_its_heading(read: Read) -> None:
+    log = read(hobo())
+    assert (log.format, first(log)) == ("hobo", "2026-07-15T17:05:00Z")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.pi / 2)
+    assert log.series.channels["relative_humidity"][0] == pytest.approx(0.55)
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4, 5]
+    assert read(hobo("mph")).series.channels["wind_speed"][0] == pytest.approx(2.5 * 0.44704)
+
+
+def test_hobo_in_an_unknown_unit_is_refused(read: Read) -> None:
+    with pytest.raises(InputError, match="its unit is 'Bft'"):
+        read(hobo("Bft"))
+
+
+def test_hobolink_writes_the_sensor_before_the_unit(read: Read) -> None:
+    head = 'Line#,Date,"Wind Speed (S-WSB 10:11-1),m/s,Roof","Wind Direction (S-WDA 10:12-1),Deg,Roof"'
+    rows = [f"{i},07/{15 + i}/26 12:05:00,{2 + i}.5,90" for i in range(4)]
+    log = read("\n".join([head, *rows, ""]), zone="UTC")
+    assert log.format == "hobo"
+    assert log.series.channels["wind_speed"].tolist() == [2.5, 3.5, 4.5, 5.5]
+
+
+def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
+    head = [
+        "file_info,,,,air_properties,,,rotated_wind,,",
+        "filename,date,time,DOY,sonic_temperature,air_temperature,air_pressure,u_rot,wind_speed,wind_dir",
+        ",[yyyy-mm-dd],[HH:MM],[ddd.ddd],[K],[K],[Pa],[m+1s-1],[m+1s-1],[deg_from_north]",
+    ]  # fmt: skip
+    rows = [f"f{i}.raw,2026-05-01,{12 + i}:30,121.5,290.1,289.5,101325,2.5,2.{5 + i},200" for i in range(4)]
+    rows.append("not_enough_data,2026-05-01,16:30,121.7,-9999.0,-9999.0,-9999.0,-9999.0,-9999.0,-9999.0")
+    log = read("\n".join([*head, *rows, ""]), zone="UTC")
+    assert (log.format, first(log), log.series.sensor.averaging) == ("eddypro", "2026-05-01T12:30:00Z", 3600.0)
+    assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(200))
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+
+
+def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:
+    head = "TIMESTAMP_START,TIMESTAMP_END,WS_F,WS_1_1_1,WD_1_1_1,TA_1_1_1,PA_1_1_1,RH_1_1_1"
+    rows = [f"2026050112{30 * (i % 2):02d},2026050112{30 + i},9.9,2.{5 + i},200,15.0,101.3,60" for i in range(4)]
+    rows.append("202605011300,202605011330,9.9,-9999,-9999,-9999,-9999,-9999")
+    log = read("\n".join([head, *rows, ""]), zone="-05:00")
+    assert (log.format, first(log)) == ("fluxnet", "2026-05-01T17:30:00Z")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
+    assert log.series.channels["air_pressure"][0] == pytest.approx(101_300)
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+    filled = head.replace(",WS_1_1_1", ",WS_F_QC")
+    with pytest.raises(InputError, match="no column of wind speed"):
+        read("\n".join([filled, *rows, ""]), zone="-05:00")
+
+
+def surfrad_row(minute: int, speed: float, flag: int) -> str:
+    pairs = [[100.0 + column, 0.0] for column in range(20)]
+    pairs[15:20] = [[20.0, 0], [55.0, 0], [speed, flag], [200.0, 0], [1000.0, 0]]
+    cells = " ".join(f"{value:8.1f} {int(quality)}" for value, quality in pairs)
+    return f" 2026 121  5  1 12 {minute:2d} 12.000  40.00 {cells}"
+
+
+def test_surfrad_is_in_utc_and_its_quality_flag_is_heeded(read: Read) -> None:
+    rows = [surfrad_row(i, 3.5 + i, 0) for i in range(4)] + [surfrad_row(4, -9999.9, 1), surfrad_row(5, 4.0, 2)]
+    log = read("\n".join([" Somewhere", "   40.05  -88.37  230 m version 1", *rows, rows[0][:60]]))
+    assert (log.format, first(log)) == ("surfrad", "2026-05-01T12:00:00Z")
+    assert log.series.channels["wind_speed"][:4].tolist() == [3.5, 4.5, 5.5, 6.5]
+    assert log.series.channels["air_pressure"][0] == pytest.approx(100_000)
+    assert log.series.sensor.height == 10.0
+    assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [4, 5]
+    assert kinds(log)["cut-off"] == 1

@@ -1,0 +1,365 @@
+"""Lines of serial instruments: values, units, status and checksums as the makers' manuals give them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.ingest.anemometer import canboat, gill, metek, trisonica, vaisala, young
+from flagdata.ingest.anemometer.serial_lines import Defect, checksum, split_stamp
+from flagdata.schema import SampleFlag
+from flagdata.signals import WindLog
+from flagdata.timebase import iso
+
+Read = Callable[..., WindLog]
+
+
+def stamped(lines: list[str], *, start: int = 0) -> str:
+    """Each line after a stamp, one a second."""
+    return "".join(f"2026-05-01T12:00:{start + i:02d}.000Z,{line}\n" for i, line in enumerate(lines))
+
+
+def kinds(log: WindLog) -> dict[str, int]:
+    return {finding.kind: finding.count for finding in log.findings}
+
+
+POLAR = [f"\x02Q,{229 + i},00{2 + i}.74,M,00,\x03" for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    ("line", "stamp", "raw"),
+    [
+        ("2026-05-01T12:00:00.123Z,Q,1", "2026-05-01T12:00:00.123Z", "Q,1"),
+        ("2026-05-01 12:00:00+02:00;Q,1", "2026-05-01T12:00:00+02:00", "Q,1"),
+        ("[2026-05-01 12:00:00.123] Q,1", "2026-05-01T12:00:00.123", "Q,1"),
+        ("2026/05/01,12:00:00,Q,1", "2026/05/01T12:00:00", "Q,1"),
+        ("2026-05-01 12:00:00,123 Q,1", "2026-05-01T12:00:00,123", "Q,1"),
+        ("2026-05-01T12:00:00,229,002.74", "2026-05-01T12:00:00", "229,002.74"),
+        ("1777636800.25\tQ,1", "1777636800.25", "Q,1"),
+        ("1777636800250 Q,1", "1777636800250", "Q,1"),
+        ('2026-05-01T12:00:00Z,"Q,1"', "2026-05-01T12:00:00Z", "Q,1"),
+        ("Q,229,002.74,M,00,", "", "Q,229,002.74,M,00,"),
+    ],
+)
+def test_the_stamp_before_a_line_is_told_from_the_line(line: str, stamp: str, raw: str) -> None:
+    assert split_stamp(line) == (stamp, raw)
+
+
+@pytest.mark.parametrize(
+    ("line", "values"),
+    [
+        # WindSonic manual, 9.1: 229°, 2.74 m/s, checksum 16
+        ("\x02Q,229,002.74,M,00,\x0316", {0: 2.74, 1: np.radians(229)}),
+        ("<STX>Q,229,002.74,M,00,<ETX>16", {0: 2.74, 1: np.radians(229)}),
+        ("Q,229,002.74,M,00,16", {0: 2.74, 1: np.radians(229)}),
+        ("Q,229,002.74,M,00", {0: 2.74, 1: np.radians(229)}),
+        # WindObserver 65 manual, 7.8: checksum 25, with speed of sound and temperature
+        ("\x02A,+000.04,-000.02,M,+345.01,+022.36,00,\x0325", {2: 0.04, 3: -0.02, 5: 295.51}),
+        # WindObserver II manual, 8.8: 121°, 0.08 m/s, checksum 06
+        ("\x02A,121,000.08,M,+344.66,+021.76,00,\x0306", {0: 0.08, 1: np.radians(121), 5: 294.91}),
+        # WindMaster manual, 7.1, mode 1: U, V, W
+        ("\x02Q,-000.07,+000.04,+000.03,M,+344.22,+021.50,00,\x03", {2: -0.07, 3: 0.04, 4: 0.03, 5: 294.65}),
+        ("Q,090,010.00,N,00,", {0: 10 * 1852 / 3600}),
+        ("Q,090,010.00,P,00,", {0: 4.4704}),
+        ("Q,090,036.00,K,00,", {0: 10.0}),
+        ("Q,,000.04,M,00,", {0: 0.04}),
+    ],
+)
+def test_gill_lines_read_as_their_manuals_say(line: str, values: dict[int, float]) -> None:
+    sample = gill.parse(line)
+    assert not isinstance(sample, Defect)
+    assert {index: sample[0][index] for index in values} == pytest.approx(values)
+    assert sample[1] == SampleFlag.OK
+
+
+@pytest.mark.parametrize(
+    ("line", "defect"),
+    [
+        ("\x02Q,229,002.74,M,00,\x0317", Defect.CHECKSUM),
+        ("\x02Q,228,002.74,M,00,\x0316", Defect.CHECKSUM),
+        ("\x02Q,229,002.7", Defect.CUT),
+        ("CONFIGURATION MODE", Defect.OTHER),
+        ("Q" + " " * 60_000, Defect.OTHER),
+    ],
+)
+def test_gill_lines_that_are_no_reading_are_told_apart(line: str, defect: Defect) -> None:
+    assert gill.parse(line) is defect
+
+
+@pytest.mark.parametrize("status", ["01", "02", "04", "08", "09", "10"])
+def test_each_fault_code_of_gill_leaves_the_row_out_of_averages(read: Read, status: str) -> None:
+    log = read(stamped([*POLAR, POLAR[0].replace(",00,", f",{status},")]))
+    assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [6]
+
+
+def test_a_gill_log_reports_wrong_checksums_and_a_cut_last_line(read: Read) -> None:
+    lines = [*POLAR, "\x02Q,229,002.74,M,00,\x0317", "\x02Q,229,00"]
+    log = read(stamped(lines))
+    assert log.format == "gill"
+    assert len(log.series) == 6
+    found = kinds(log)
+    assert (found["checksum-errors"], found["cut-off"], found["read-by-description"]) == (1, 1, 1)
+
+
+def test_components_of_a_gill_blow_towards_its_north_mark(read: Read) -> None:
+    # manual, 9.2: U positive from the south mark, V positive from the east: 1 m/s each is wind from the south-east
+    lines = [f"Q,+00{1 + i}.00,+00{1 + i}.00,M,00," for i in range(4)]
+    log = read(stamped(lines), azimuth=0.0)
+    assert log.series.channels["wind_direction"] == pytest.approx([np.radians(135)] * 4)
+    assert log.series.channels["wind_x"][0] == pytest.approx(1.0)
+    turned = read(stamped(lines), azimuth=np.radians(90))
+    assert turned.series.channels["wind_direction"] == pytest.approx([np.radians(225)] * 4)
+
+
+def test_lines_without_a_stamp_are_refused_with_what_to_do(read: Read) -> None:
+    with pytest.raises(TimeError, match="carry no time") as caught:
+        read("\n".join(POLAR))
+    assert "stamp" in (caught.value.fix or "")
+
+
+def test_stamps_without_a_zone_need_one(read: Read) -> None:
+    text = stamped(POLAR).replace("Z,", ",")
+    with pytest.raises(TimeError, match="no time zone"):
+        read(text)
+    assert iso(int(read(text, zone="+02:00").series.time[0])) == "2026-05-01T10:00:00Z"
+
+
+def test_a_north_mark_that_points_elsewhere_turns_directions(read: Read) -> None:
+    log = read(stamped(POLAR), azimuth=np.radians(180))
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(49))
+
+
+@pytest.mark.parametrize(
+    ("message", "crc"),
+    # WXT520 and WXT530 user guides, "Polling with CRC": queries, and the answer to a query for its checksum
+    [
+        ("0r1", "Goe"), ("0r2", "Gje"), ("0r3", "Kid"), ("0r5", "Kcd"), ("0r", "BVT"), ("0r0", "Kld"),
+        ("0tX,Use chksum Goe", "IU~"),
+    ],
+)  # fmt: skip
+def test_the_checksum_of_vaisala_is_the_manuals(message: str, crc: str) -> None:
+    assert vaisala.crc16(message) == crc
+
+
+@pytest.mark.parametrize(
+    ("field", "speed"), [("1.0M", 1.0), ("3.6K", 1.0), ("10.0S", 4.4704), ("10.0N", 10 * 1852 / 3600)]
+)
+def test_vaisala_speeds_are_in_the_unit_that_follows_them(field: str, speed: float) -> None:
+    sample = vaisala.parse(f"0R1,Dn=236D,Dm=283D,Dx=031D,Sn=0.0M,Sm={field},Sx=2.2M")
+    assert not isinstance(sample, Defect)
+    assert sample[0][:2] == pytest.approx([speed, np.radians(283)])
+
+
+def test_vaisala_messages_of_wind_and_weather_are_read_together(read: Read) -> None:
+    lines = []
+    for i in range(4):
+        lines += [f"0R1,Dm=2{i}0D,Sm=1.{i}M", "0R2,Ta=23.6C,Ua=14.2P,Pa=1026.6H"]
+    composite = [f"0R0,Dm=2{i}0D,Sm=3.{i}M,Ta=23.6C,Ua=50.0P,Pa=1000.0H" for i in range(4)]
+    log = read(stamped([*lines, *composite]))
+    assert (log.format, len(log.series)) == ("vaisala", 8)
+    assert log.series.channels["air_temperature"][-1] == pytest.approx(296.75)
+    assert log.series.channels["relative_humidity"][-1] == pytest.approx(0.5)
+    assert log.series.channels["air_pressure"][-1] == pytest.approx(100_000)
+
+
+def test_vaisalas_mark_of_invalid_data_is_a_fault_and_a_wrong_checksum_is_left_out(read: Read) -> None:
+    good = "0r1,Dm=283D,Sm=1.0M"
+    lines = [f"{good}{vaisala.crc16(good)}"] * 3 + ["0R1,Dm=000#,Sm=0.0#", f"{good}xyz", "0R1,Dm=28"]
+    log = read(stamped(lines))
+    assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [3]
+    assert (kinds(log)["checksum-errors"], kinds(log)["cut-off"]) == (1, 1)
+
+
+TRISONICA = (
+    "S  00.08 S2 00.07 D  245 DV 033 U  00.06 V  00.03 W  00.05 T  21.40 C  346.68 H  17.92 DP -03.68 P  1006.05"
+)
+
+
+def test_trisonica_tags_give_horizontal_wind_and_weather(read: Read) -> None:
+    log = read(stamped([TRISONICA, TRISONICA.replace("00.07", "01.07"), TRISONICA.replace("00.07", "02.07")]))
+    first = {name: values[0] for name, values in log.series.channels.items()}
+    assert log.format == "trisonica"
+    assert first["wind_speed"] == pytest.approx(0.07)
+    assert first["wind_direction"] == pytest.approx(np.radians(245))
+    assert first["wind_z"] == pytest.approx(0.05)
+    assert first["sonic_temperature"] == pytest.approx(294.55)
+    assert first["relative_humidity"] == pytest.approx(0.1792)
+    assert first["air_pressure"] == pytest.approx(100_605)
+
+
+@pytest.mark.parametrize(
+    ("line", "speed"),
+    [
+        ("S 05.00, D 010, U 03.00, V 04.00", 5.0),
+        ("U 03.00 V 04.00 W 12.00", 5.0),
+        ("S 05.00 D 010 T 20.00", 5.0),
+        ("S 05.00 S2 -99.70 D -99.90 T 20.00", np.nan),
+    ],
+)
+def test_trisonica_lines_with_fewer_tags_still_give_the_horizontal_speed(line: str, speed: float) -> None:
+    sample = trisonica.parse(line)
+    assert not isinstance(sample, Defect)
+    assert sample[0][0] == pytest.approx(speed, nan_ok=True)
+
+
+def test_young_formats_are_told_apart_by_their_decimals() -> None:
+    polar = young.parse("   5.00  90.0  30.0 346.70  25.14")
+    assert not isinstance(polar, Defect)
+    # speed is the length of the vector: 5 m/s at 30° up has a horizontal part of 5 cos 30° and 2.5 m/s upwards
+    assert polar[0][0] == pytest.approx(5 * np.sqrt(3) / 2)
+    assert polar[0][1] == pytest.approx(np.pi / 2)
+    assert polar[0][4:] == pytest.approx([2.5, 298.29])
+    components = young.parse("  -3.00   4.00   0.10 346.70  25.14")
+    assert not isinstance(components, Defect)
+    assert (components[0][0], *components[0][2:5]) == pytest.approx((5.0, -3.0, 4.0, 0.1))
+
+
+def test_a_young_log_is_read_and_its_components_have_no_azimuth(read: Read) -> None:
+    polar = [f" {2 + i}.50 {100 + i}.0 0.0 346.70 25.14" for i in range(5)]
+    log = read(stamped([*polar, " 2.50 10"]))
+    assert (log.format, len(log.series), kinds(log)["cut-off"]) == ("young", 5, 1)
+    with pytest.raises(UsageError, match="own axes"):
+        read(stamped([f" {2 + i}.50 1.00 0.10 346.70 25.14" for i in range(5)]), azimuth=0.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "speed", "temperature"),
+    [
+        # uSonic-2 manual, 3.3.3: 460 cm/s, 4°, 21.86 °C
+        ("M:v=460 d=4 t=2186", 4.6, 295.01),
+        ("M:x =   300 y =  -400 z =     3 t =  2186", 5.0, 295.01),
+        ("H:x = 300 y = -400 z = 3 t = -9999", 5.0, np.nan),
+    ],
+)
+def test_metek_telegrams_are_in_centimetres_a_second(line: str, speed: float, temperature: float) -> None:
+    sample = metek.parse(line)
+    assert not isinstance(sample, Defect)
+    assert (sample[0][0], sample[0][-1]) == pytest.approx((speed, temperature), nan_ok=True)
+    assert sample[1] == SampleFlag.OK
+
+
+def test_metek_lines_are_stamped_by_the_instruments_own_clock(read: Read) -> None:
+    text = "".join(f"T:23.07.09 14:45:0{i}\nM:v=46{i} d=4 t=2186\n" for i in range(5))
+    log = read(text + "M:v=4", zone="UTC")
+    assert (log.format, len(log.series)) == ("metek", 5)
+    assert iso(int(log.series.time[0])) == "2009-07-23T14:45:00Z"
+    assert log.series.channels["wind_direction"] == pytest.approx([np.radians(4)] * 5)
+    assert kinds(log)["cut-off"] == 1
+
+
+def test_a_metek_telegram_of_another_kind_is_a_fault_and_no_value_is_missing(read: Read) -> None:
+    lines = [f"M:x = {300 + i} y = 0 z = 0 t = 2186" for i in range(4)]
+    log = read(stamped([*lines, "E:x = 1 y = 0 z = 0 t = 2186", "M:x = -9999 y = 0 z = 0 t = 2186"]))
+    assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [4]
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [5]
+
+
+def wind_bytes(speed: int, angle: int, reference: int) -> str:
+    data = bytes([0, *speed.to_bytes(2, "little"), *angle.to_bytes(2, "little"), 0xF8 | reference, 0xFF, 0xFF])
+    return ",".join(f"{byte:02x}" for byte in data)
+
+
+def raw(second: int, *, speed: int = 500, angle: int = 15_708, reference: int = 2, device: int = 36) -> str:
+    return f"2026-05-01T12:00:{second:02d}.000Z,2,130306,{device},255,8,{wind_bytes(speed, angle, reference)}\n"
+
+
+def test_raw_nmea_2000_wind_is_hundredths_of_metres_a_second(read: Read) -> None:
+    log = read("".join(raw(i, speed=500 + 7 * i) for i in range(6)))
+    assert log.format == "canboat"
+    assert log.series.channels["apparent_wind_speed"][:2] == pytest.approx([5.0, 5.07])
+    assert log.series.channels["apparent_wind_direction"] == pytest.approx([1.5708] * 6)
+    assert kinds(log)["apparent-wind-only"] == 1
+
+
+@pytest.mark.parametrize(
+    ("reference", "speed", "angle"),
+    [
+        (0, "wind_speed", "wind_direction"),
+        (1, "wind_speed", "wind_direction_magnetic"),
+        (2, "apparent_wind_speed", "apparent_wind_direction"),
+        (3, "theoretical_wind_speed", "theoretical_wind_direction"),
+    ],
+)
+def test_the_reference_of_nmea_2000_decides_the_channel(read: Read, reference: int, speed: str, angle: str) -> None:
+    log = read("".join(raw(i, speed=500 + i, reference=reference) for i in range(4)))
+    assert set(log.series.channels) == {speed, angle}
+
+
+def test_the_three_forms_of_canboat_give_the_same_wind(read: Read) -> None:
+    forms: dict[str, list[str]] = {"raw": [], "text": [], "json": []}
+    for i in range(4):
+        at = f"2026-05-01T12:00:0{i}.000Z"
+        forms["raw"].append(raw(i, speed=92 + i, angle=10_000))
+        forms["text"].append(
+            f"{at} 2  36 255 130306 Wind Data:  SID = 177; Wind Speed = {0.92 + i / 100:.2f} m/s; "
+            "Wind Angle = 57.2958 deg; Reference = Apparent\n"
+        )
+        forms["json"].append(
+            f'{{"timestamp":"{at}","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind Data","fields":'
+            f'{{"SID":177,"Wind Speed":{0.92 + i / 100:.2f},"Wind Angle":57.2958,"Reference":"Apparent"}}}}\n'
+        )
+    logs = [read("".join(lines)) for lines in forms.values()]
+    for log in logs:
+        assert log.format == "canboat"
+        assert log.series.channels["apparent_wind_speed"] == pytest.approx([0.92, 0.93, 0.94, 0.95])
+        assert log.series.channels["apparent_wind_direction"] == pytest.approx([1.0] * 4, abs=1e-5)
+        assert iso(int(log.series.time[1])) == "2026-05-01T12:00:01Z"
+
+
+def test_json_in_si_units_has_radians() -> None:
+    network = canboat._Network(None)
+    assert network('{"version":"4.12","units":"si","showLookupValues":true}') is Defect.OTHER
+    fields = '{"Wind Speed":2.0,"Wind Angle":1.5,"Reference":{"value":2,"name":"Apparent"}}'
+    sample = network(f'{{"timestamp":"x","pgn":130306,"src":1,"fields":{fields}}}')
+    assert not isinstance(sample, Defect)
+    assert sample[0][3:5] == pytest.approx([2.0, 1.5])
+
+
+def test_no_value_on_nmea_2000_is_missing_and_a_cut_line_is_left_out(read: Read) -> None:
+    lines = [raw(i, speed=500 + i) for i in range(5)]
+    log = read("".join([*lines, raw(5, speed=0xFFFF), raw(6)[:-8]]))
+    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [5]
+    assert kinds(log)["cut-off"] == 1
+
+
+def test_several_devices_on_nmea_2000_are_told_apart_by_address(read: Read) -> None:
+    text = "".join(raw(2 * i, speed=500 + i) + raw(2 * i + 1, device=7) for i in range(4))
+    with pytest.raises(InputError, match="several devices") as caught:
+        read(text)
+    assert "--talker 7" in (caught.value.fix or "")
+    assert len(read(text, talker="36").series) == 4
+
+
+def test_a_fixed_platform_makes_apparent_wind_wind_unless_it_moves(read: Read) -> None:
+    text = "".join(raw(i, speed=500 + i) for i in range(5))
+    log = read(text, platform="fixed", azimuth=np.radians(90))
+    assert log.series.channels["wind_speed"][0] == pytest.approx(5.0)
+    assert log.series.channels["wind_direction"][0] == pytest.approx(1.5708 + np.pi / 2)
+    moving = "2026-05-01T12:00:00.000Z,2,129026,1,255,8,00,fc,00,00,2c,01,ff,ff\n"  # 0x012c = 300: 3 m/s
+    with pytest.raises(InputError, match="over ground in the median"):
+        read(text + moving, platform="fixed")
+
+
+def nmea(body: str) -> str:
+    return f"${body}*{checksum(body):02X}"
+
+
+def test_stamped_sentences_are_read_at_their_own_stamps(read: Read) -> None:
+    lines = [nmea(f"IIMWV,{226 + i}.0,R,00{2 + i}.4,N,A") for i in range(6)]
+    log = read(stamped([*lines, lines[0][:-1] + "0"]), platform="fixed")
+    assert (log.format, len(log.series)) == ("nmea-stamped", 6)
+    assert np.diff(log.series.time).tolist() == [10**9] * 5
+    assert log.series.channels["wind_speed"][0] == pytest.approx(2.4 * 1852 / 3600)
+    assert not (log.series.flags & SampleFlag.TIME_UNSURE).any()
+    assert kinds(log)["checksum-errors"] == 1
+    assert "time-interpolated" not in kinds(log)
+
+
+def test_sentences_of_n2kd_without_status_are_taken_with_a_finding(read: Read) -> None:
+    lines = [nmea(f"02MWV,{327 + i}.6,R,1.89,N") for i in range(4)]
+    log = read(stamped(lines), platform="fixed")
+    assert kinds(log)["no-status"] == 4
+    assert log.series.channels["wind_speed"] == pytest.approx([1.89 * 1852 / 3600] * 4)
