@@ -21,6 +21,7 @@ from flagdata.provenance import code_version
 from flagdata.record import Record
 from flagdata.schema import CLIP_FRAMES, FRAME_RATE
 from flagdata.timebase import NANOSECONDS
+from measure.demo import estimates
 from measure.demo.field import BEFORE, WIND_RATE, Field
 from measure.pages.render import data_url, render
 from models.spectral import SpectralDecomposition
@@ -57,12 +58,18 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
     shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
     wind_image, caption = _wind_plot(record, lake, at, made)
+    series = estimates.read(pairs)
     target = folder / "index.html"
     values = {
         "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",
         "seconds": seconds,
         "clock": recovered(row, made.clock_offset),
-        "images": {"wind": wind_image, "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png")},
+        "estimates": series.sentence,
+        "images": {
+            "wind": wind_image,
+            "estimates": estimates.picture(series),
+            "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png"),
+        },
         "wind_caption": caption,
         "counts": {
             "pairs": len(pairs),
