@@ -54,7 +54,7 @@ class Series:
         else:
             doubt = f"{unlike} (expected of clips like those: {FALSE_ALARM:.0%})."
         return (
-            f"The model {self.model!r}, trained on simulated flags alone, differs from the anemometer's minute means by "
+            f"The model {self.model!r}, trained on simulated flags, differs from the anemometer's minute means by "
             f"{rmse:.1f} m/s (root mean square). {doubt}"
         )
 
