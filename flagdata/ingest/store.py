@@ -19,6 +19,7 @@ from flagdata.align.paired import host_clock
 from flagdata.errors import ConflictError, InputError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.source import Source
@@ -348,7 +349,9 @@ def _wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None
     """The report of a log; of a recipe file that was named, only its base name stays."""
     series = log.series
     time = series.time
-    steps = np.diff(time)
+    kinds = [time[rows] for _, rows in streams(series.channels)]
+    steps = np.diff(max(kinds, key=len))
+    longest = max((int(np.diff(kind).max()) for kind in kinds if len(kind) > 1), default=None)
     speed = series.channels.get("wind_speed")
     sensor = {name: value for name, value in vars(series.sensor).items() if value is not None}
     return {
@@ -359,7 +362,7 @@ def _wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None
         **_span(int(time[0]), int(time[-1])),
         "samples": len(series),
         "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,
-        "longest_gap": float(steps.max()) / NANOSECONDS if len(steps) else None,
+        "longest_gap": longest / NANOSECONDS if longest is not None else None,
         "channels": {
             name: {"unit": CHANNELS[name].unit, "values": int(np.isfinite(values).sum())}
             for name, values in series.channels.items()

@@ -32,6 +32,8 @@ CHANCE = 0.5
 """Number of outages of such a length expected by chance below which an interval may be a clock set on."""
 FARTHEST = 14 * HOUR
 """Zones differ by no more."""
+NEVER_SET = 1000 * DAY
+"""A longer interval is that of a clock which began at its maker's date and was set later."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +70,7 @@ def set_back(time: Instants) -> tuple[Jump, ...]:
 
 
 def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
-    """Intervals by which the clock may have been set on: whole hours that chance does not explain.
+    """Intervals by which the clock may have been set on: whole hours that chance does not explain, or years.
 
     Args:
         time: (n,) instants in the order of the rows.
@@ -81,7 +83,11 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
     undone = {-jump.size for jump in returns}
     wide = np.flatnonzero(steps > 1.5 * step)
     found: list[Jump] = []
-    for row in np.flatnonzero((steps > HOUR // 2) & (steps <= FARTHEST + 2 * step)):
+    for row in np.flatnonzero(steps > HOUR // 2):
+        if steps[row] > NEVER_SET:
+            found.append(Jump(row=int(row) + 1, size=int(steps[row]) - step, whole=False))
+        if steps[row] > FARTHEST + 2 * step:
+            continue
         jump = _jump(int(row) + 1, int(steps[row]), step)
         remainder = int(steps[row]) - jump.size
         if not jump.whole or not step // 2 <= remainder <= step + max(step // 2, JITTER // 2):
@@ -191,20 +197,29 @@ def report(
 
 def doubt(time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64]) -> tuple[Finding, ...]:
     """What is said of intervals that a clock set on would leave, and missing rows as well; nothing is changed."""
-    return tuple(
-        Finding(
-            kind="clock-set-on", severity=Severity.WARNING, value=jump.size / NANOSECONDS,
-            where=f"line {line[jump.row]}",
-            what=f"an interval is longer than usual by {span(jump.size)}, to within the rows' step: either the clock "
-            f"was {jump.told()} at line {line[jump.row]} ({iso(int(time[jump.row - 1]))} is followed by "
-            f"{iso(int(time[jump.row]))}) and what follows is off by that much, or so many rows are missing",
-            fix=_fix(jump),
+    found: list[Finding] = []
+    for jump in jumps:
+        before, after = iso(int(time[jump.row - 1])), iso(int(time[jump.row]))
+        what = (
+            f"an interval is longer than usual by {span(jump.size)}: the clock of the {jump.row} rows before line "
+            f"{line[jump.row]} was not set yet ({before} is followed by {after}), so that their stamps say nothing"
+            if jump.size > NEVER_SET
+            else f"an interval is longer than usual by {span(jump.size)}, to within the rows' step: either the clock "
+            f"was {jump.told()} at line {line[jump.row]} ({before} is followed by {after}) and what follows is off by "
+            "that much, or so many rows are missing"
         )
-        for jump in jumps
-    )  # fmt: skip
+        found.append(
+            Finding(
+                kind="clock-set-on", severity=Severity.WARNING, value=jump.size / NANOSECONDS,
+                where=f"line {line[jump.row]}", what=what, fix=_fix(jump),
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def _fix(jump: Jump) -> str:
+    if jump.size > NEVER_SET:
+        return "to let those rows end where the others begin: --clock last"
     choice = "if the clock was set, say whose stamps are right: --clock first (before it) or --clock last (after it)"
     if abs(jump.size) != HOUR:
         return choice
@@ -212,7 +227,9 @@ def _fix(jump: Jump) -> str:
 
 
 def span(length: int) -> str:
-    """A length of time [ns] in words: "1 h", "1 h 30 min", "37.2 s"."""
+    """A length of time [ns] in words: "1 h", "1 h 30 min", "37.2 s", "9618 days"."""
+    if length > 100 * DAY:
+        return f"{length / DAY:.0f} days"
     if length % (60 * NANOSECONDS) == 0 and length:
         hours, minutes = divmod(length // (60 * NANOSECONDS), 60)
         return " ".join(f"{number} {unit}" for number, unit in ((hours, "h"), (minutes, "min")) if number)

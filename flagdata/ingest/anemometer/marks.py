@@ -165,18 +165,23 @@ class TimeLine:
 def _one_clock(
     marks: Instants, at: NDArray[np.int64], choice: ClockChoice | None
 ) -> tuple[Instants, tuple[Finding, ...]]:
-    """Marks of a clock that was set back for good, on one clock; others as they are."""
-    stray = clocks.excursions(marks, most=max(FEW, len(marks) // 100))
+    """Marks on one clock where it was set back for good; those that leave the stream's time for a moment do not rise."""
+    most = max(FEW, len(marks) // 100)
+    stray = clocks.excursions(marks, most=most) if len(clocks.set_back(marks)) <= most else np.zeros(len(marks), bool)
     settled = np.flatnonzero(~stray)
     jumps = clocks.set_back(marks[settled])
-    if not 0 < len(jumps) <= clocks.MOST:
-        return marks, ()
-    one, _ = clocks.continued(marks[settled], jumps, choice)
+    jumps = jumps if len(jumps) <= clocks.MOST else ()
     out = marks.copy()
-    out[settled] = one
-    # Stray marks are behind their neighbours, or ahead of all that follow: they take the place of the mark before.
-    out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
-    return out, clocks.report(marks[settled], jumps, at[settled], choice)
+    out[settled], _ = clocks.continued(marks[settled], jumps, choice)
+    found = clocks.report(marks[settled], jumps, at[settled], choice)
+    if stray.any():
+        out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
+        finding = Finding(
+            kind="time-backwards", severity=Severity.WARNING, count=int(stray.sum()), where=f"line {at[stray][0]}",
+            what=f"{int(stray.sum())} times of the stream leave its course and come back to it; not used",
+        )  # fmt: skip
+        found = (*found, finding)
+    return out, found
 
 
 def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:

@@ -26,7 +26,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import clock
 from flagdata.ingest.anemometer.clock import DAY, JITTER, ClockChoice, Jump
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.spread import distinct
+from flagdata.ingest.anemometer.spread import FAST, distinct
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -217,6 +217,7 @@ def _without_repeats(reading: Reading) -> Reading:
         same &= np.diff(reading.host_time) == 0
     # Coarse stamps make equal rows too: only isolated pairs are the same row written twice.
     shared = float((np.diff(reading.time) == 0).mean())
+    same &= ~_with_room(reading)
     if not same.any() or shared > 0.2:
         return reading
     twice = np.concatenate(([False], same))
@@ -225,3 +226,13 @@ def _without_repeats(reading: Reading) -> Reading:
         where=f"line {reading.line[twice][0]}", what=f"{int(twice.sum())} rows repeat the one before them; left out",
     )  # fmt: skip
     return reading.take(~twice).with_findings((finding,))
+
+
+def _with_room(reading: Reading) -> NDArray[np.bool_]:
+    """Pairs of neighbours, (n - 1,), beside which a fast logger left out a step: the second is a sample, come late."""
+    steps = np.diff(reading.time)
+    period = clock.usual(reading.time)
+    if period >= FAST:
+        return np.zeros(len(steps), dtype=bool)
+    wide = steps > 1.5 * period
+    return np.concatenate(([False], wide[:-1])) | np.concatenate((wide[1:], [False]))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading, streams
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS
 
@@ -29,16 +29,34 @@ STUCK_REPEATS = 60
 
 
 def gaps(reading: Reading) -> tuple[Finding, ...]:
-    """Stretches without rows: longer than the jitter of the stamps explains.
+    """Stretches without rows, of each kind of wind by itself: longer than the jitter of the stamps explains.
 
     A gap is an interval beyond 1.5 times the median m, and beyond m + 3 (q - m) with the 99th percentile q, but in any
     case one beyond 3 m.
     """
-    if len(reading.time) < 4:
+    kinds = streams(reading.channels)
+    if len(kinds) == 1:
+        return _gaps_of(reading, np.arange(len(reading.time)), "")
+    # A row without a value was not lost, though nobody knows of which kind it is.
+    blank = np.ones(len(reading.time), dtype=bool)
+    for _, rows in kinds:
+        blank[rows] = False
+    found: list[Finding] = []
+    for names, rows in kinds:
+        kept = np.union1d(rows, np.flatnonzero(blank))
+        of = next(name for name in names if name in WIND_CHANNELS)
+        found.extend(_gaps_of(reading.take(kept), np.flatnonzero(~blank[kept]), f" of {of}"))
+    return tuple(found)
+
+
+def _gaps_of(reading: Reading, own: NDArray[np.int64], of: str) -> tuple[Finding, ...]:
+    """Gaps between rows; what is usual is told by the rows `own`, and `of` says of which kind they are."""
+    if len(own) < 4:
         return ()
+    between = np.diff(reading.time[own])
+    usual = float(np.median(between))
+    jitter = 3 * (float(np.quantile(between, 0.99)) - usual)
     steps = np.diff(reading.time)
-    usual = float(np.median(steps))
-    jitter = 3 * (float(np.quantile(steps, 0.99)) - usual)
     wide = np.flatnonzero(steps > max(1.5 * usual, min(usual + jitter, 3 * usual)))
     if len(wide) == 0:
         return ()
@@ -49,7 +67,7 @@ def gaps(reading: Reading) -> tuple[Finding, ...]:
         Finding(
             kind="gaps", severity=Severity.WARNING, count=len(wide), value=seconds,
             where=f"line {reading.line[longest + 1]}",
-            what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'} longer than the usual "
+            what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
             f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
             "the line named",
         ),

@@ -32,6 +32,8 @@ from flagdata.timebase import NANOSECONDS
 
 FAST = NANOSECONDS
 """Period below which two rows of one stamp are two samples, and not two records that claim one instant [ns]."""
+COARSE = NANOSECONDS
+"""Stamps to a second or finer that stand for several rows are coarse; others are held [ns]."""
 BURST = 4.0
 ENOUGH = 10
 
@@ -124,8 +126,8 @@ def _spread(reading: Reading, again: NDArray[np.bool_]) -> Reading:
     period = float(np.median(ratio)) if len(ratio) else float(reading.step / max(1, int(runs.rows.max())))
     usual = max(1, int(np.median(runs.rows[inner] if len(runs.rows) > 3 else runs.rows)))
     hold = round(float(np.median(runs.room))) if len(runs.room) else reading.step
-    continuity = _continuity(reading, again) if hold > 1.5 * reading.step else None
-    burst = continuity is not None and continuity > BURST
+    continuity = _continuity(reading, again)
+    burst = continuity is not None and continuity > BURST and hold > 1.5 * reading.step
     if burst:
         period, hold = reading.step / usual, reading.step
     room = np.round(period * runs.rows).astype(np.int64)
@@ -137,8 +139,10 @@ def _spread(reading: Reading, again: NDArray[np.bool_]) -> Reading:
         time[: runs.rows[0]] = runs.stamp[1] - np.round(period * np.arange(runs.rows[0], 0, -1)).astype(np.int64)
     last = int(runs.start[-1])
     time[last:] = runs.stamp[-1] + np.round(period * np.arange(int(runs.rows[-1]))).astype(np.int64)
-    found = _coarse(reading, again, usual) if hold <= 1.5 * reading.step else None
-    found = found or _held(reading, runs, period=period, hold=hold, continuity=continuity)
+    if not burst and hold <= 1.5 * reading.step and hold <= COARSE:
+        found = _coarse(reading, again, usual)
+    else:
+        found = _held(reading, runs, period=period, burst=burst, continuity=continuity)
     flags = (reading.flags | SampleFlag.TIME_UNSURE).astype(np.uint16)
     return replace(reading, time=time).with_findings((found,), flags=flags)
 
@@ -158,29 +162,33 @@ def _coarse(reading: Reading, again: NDArray[np.bool_], usual: int) -> Finding:
     )  # fmt: skip
 
 
-def _held(reading: Reading, runs: _Runs, *, period: float, hold: int, continuity: float | None) -> Finding:
-    """What is said of stamps that stand for longer than they are written to."""
+def _held(reading: Reading, runs: _Runs, *, period: float, burst: bool, continuity: float | None) -> Finding:
+    """What is said of stamps that stand for longer than a second, or than they are written to."""
     counts = runs.rows[1:-1] if len(runs.rows) > 3 else runs.rows
     low, high = int(counts.min()), int(counts.max())
-    rows = f"{low}" if low == high else f"{low} to {high}"
     step = period / NANOSECONDS
-    if continuity is not None and continuity > BURST:
-        what = f"spread within {hold / NANOSECONDS:g} s, the step of the stamps"
-        sure = f"the readings jump from stamp to stamp ({continuity:.3g} times as much as from row to row): bursts"
+    every = float(np.median(runs.room)) / NANOSECONDS if len(runs.room) else step * high
+    what = f"one every {step:.4g} s ({1 / step:.4g} Hz)"
+    spread = max(float(np.abs(counts - np.median(counts)).max()) * step, step)
+    sure = f"each time is sure to about {spread:.3g} s beside the delay of the clock itself"
+    if continuity is None:
+        why = f"the readings do not tell whether rows came evenly or in bursts; if evenly, {sure}"
+    elif continuity <= BURST:
+        why = (
+            f"the readings run on across the stamps ({continuity:.3g} times the mean square difference within), so "
+            f"rows came evenly and {sure}"
+        )
     else:
-        what = f"spread evenly, one every {step:.4g} s ({1 / step:.4g} Hz)"
-        if continuity is None:
-            sure = "whether rows came in bursts the readings do not tell"
-        else:
-            sure = f"the readings run on across the stamps ({continuity:.3g} times the differences within): no bursts"
-    spread = float(np.abs(counts - np.median(counts)).max()) * step
+        why = (
+            f"the readings jump from stamp to stamp ({continuity:.3g} times the mean square difference within): rows "
+            f"came in bursts, whose place within {every:g} s is not known"
+        )
     return Finding(
         kind="held-stamps", severity=Severity.WARNING, count=len(reading.time), value=step,
         where=f"line {reading.line[1]}",
-        what=f"a stamp stands for {rows} rows and is renewed every {float(np.median(runs.room)) / NANOSECONDS:g} s: the "
-        f"clock was read less often than the sensor; the rows are {what}; {sure}. Each time is sure to about "
-        f"{max(spread, step):.3g} s beside the delay of the clock itself",
-        fix="if the sensor has another rate, log its own stamps",
+        what=f"a stamp stands for {low if low == high else f'{low} to {high}'} rows and is renewed every {every:g} s: "
+        f"the rows are spread {f'within {reading.step / NANOSECONDS:g} s, ' if burst else 'evenly, '}{what}; {why}",
+        fix=None if continuity is not None and continuity <= BURST else "log a stamp with every row",
     )  # fmt: skip
 
 

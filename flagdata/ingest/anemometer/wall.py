@@ -95,7 +95,7 @@ def to_utc(
 
 def zone_advice(wall: NDArray[np.int64], lines: NDArray[np.int64]) -> str:
     """What to say to a user who named no zone: a place, where a fixed offset would leave some of the rows wrong."""
-    jumps = [jump for jump in _whole_jumps(wall) if abs(jump.size) == _HOUR]
+    jumps = [jump for jump in _whole_jumps(wall) if jump.size == -_HOUR]
     if not jumps:
         return "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
     told = ", ".join(f"{jump.told()} at line {lines[jump.row]}" for jump in jumps)
@@ -199,9 +199,10 @@ def _late(
 
 def _with_jumps(fix: str, jumps: Sequence[Jump], lines: NDArray[np.int64]) -> str:
     """Advice that names an offset, for a log whose own clock was set: then no one offset is right for all of it."""
-    if not jumps:
+    back = [jump for jump in jumps if jump.size < 0]
+    if not back:
         return fix
-    told = ", ".join(f"{jump.told()} at line {lines[jump.row]}" for jump in jumps[: clock.MOST])
+    told = ", ".join(f"{jump.told()} at line {lines[jump.row]}" for jump in back)
     return (
         f"the log's own clock was {told}, so that no one offset is right for all its rows: give the fixed offset of "
         "the first rows and --clock first, or that of the last rows and --clock last"
