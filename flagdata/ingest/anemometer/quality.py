@@ -141,6 +141,47 @@ def dead_zone(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]
     )  # fmt: skip
 
 
+def idle(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Speeds that stay at exactly 0, as of a sensor that is not connected or blocked.
+
+    On a platform that may move no calm reads 0 for `STUCK_REPEATS` rows over `STUCK_SECONDS`: such runs of apparent or
+    theoretical wind are STALE. On a mast a calm may last; a log that never reads anything else is reported.
+    """
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    found: list[Finding] = []
+    for name in SPEEDS:
+        values = reading.channels.get(name)
+        if values is None:
+            continue
+        rows = np.flatnonzero(np.isfinite(values))
+        starts, lengths = _runs(values[rows] == 0)
+        if len(starts) == 0:
+            continue
+        span = (reading.time[rows[starts + lengths - 1]] - reading.time[rows[starts]]) / NANOSECONDS
+        long = (lengths >= STUCK_REPEATS) & (span >= STUCK_SECONDS)
+        always = bool(long.any()) and int(lengths[long].sum()) == len(rows)
+        if not long.any() or (name == "wind_speed" and not always):
+            continue
+        zero = np.concatenate([rows[s : s + k] for s, k in zip(starts[long], lengths[long], strict=True)])
+        what = (
+            f"{name} reads exactly 0 in {'all ' if always else ''}{len(zero)} rows, for {float(span[long].max()):.0f} s "
+            "on end: "
+        )
+        if name == "wind_speed":
+            what += "a calm all along, or a sensor that is not connected or blocked"
+        else:
+            flags[zero] |= SampleFlag.STALE
+            what += "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
+            what += "out of averages"
+        found.append(
+            Finding(
+                kind="stays-at-zero", severity=Severity.WARNING, count=len(zero), value=float(span[long].max()),
+                where=f"line {reading.line[zero[0]]}", what=what, fix="check the sensor, its cable and the column",
+            )
+        )  # fmt: skip
+    return flags, tuple(found)
+
+
 def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     """Runs in which every wind reading repeats exactly, longer than chance and resolution explain: STALE.
 
