@@ -29,6 +29,7 @@ from flagdata.ingest.camera.container import (
     survey_file,
 )
 from flagdata.ingest.camera.damage import Damage
+from flagdata.ingest.camera import gif
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import luma_of_frame
 from flagdata.ingest.camera.options import CameraOptions
@@ -91,6 +92,8 @@ class VideoSource:
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
         found = []
+        if self._container.format.name == gif.CONTAINER:
+            found += gif.check(self._path, self._timing, true_fps=self._options.true_fps)
         if first.interlaced_frame:
             found.append(
                 Finding(
