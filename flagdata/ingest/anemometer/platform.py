@@ -82,7 +82,7 @@ def motion(reading: Reading, positions: Mapping[str, NDArray[np.float64]]) -> Mo
     if {"latitude", "longitude"} <= set(positions):
         far = extent(positions["latitude"], positions["longitude"])
         if far > RANGE:
-            return Motion(text=f"moves: its positions reach over {far:.3g} m", speed=None)
+            return Motion(text=f"moves: its positions reach over {far:.0f} m", speed=None)
     return None
 
 
