@@ -146,9 +146,7 @@ def _excursion(time: Instants, steps: NDArray[np.int64], at: int, step: int, mos
     return slice(at, at)
 
 
-def continued(
-    time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None
-) -> tuple[Instants, NDArray[np.bool_]]:
+def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, NDArray[np.bool_]]:
     """One clock through all jumps, and which rows were shifted for it: (n,) both.
 
     Args:

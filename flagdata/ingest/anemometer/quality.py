@@ -171,7 +171,9 @@ def idle(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
             what += "a calm all along, or a sensor that is not connected or blocked"
         else:
             flags[zero] |= SampleFlag.STALE
-            what += "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
+            what += (
+                "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
+            )
             what += "out of averages"
         found.append(
             Finding(

@@ -180,9 +180,7 @@ def _followed(change: _Change, wall: NDArray[np.int64], jumps: Sequence[Jump]) -
     return None if nearest is None or least <= max(2 * usual, 2 * clock.JITTER) else nearest
 
 
-def _late(
-    change: _Change, jump: Jump, wall: NDArray[np.int64], lines: NDArray[np.int64], place: tzinfo
-) -> Finding:
+def _late(change: _Change, jump: Jump, wall: NDArray[np.int64], lines: NDArray[np.int64], place: tzinfo) -> Finding:
     zone_change = change.instant + change.before
     last = int(wall[jump.row - 1])
     delay = last + clock.usual(wall) - zone_change

@@ -19,6 +19,7 @@ from av.video.stream import VideoStream
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import gif
 from flagdata.ingest.camera.avchd import recording_time
 from flagdata.ingest.camera.container import (
     BY_DECODE_ORDER,
@@ -29,7 +30,6 @@ from flagdata.ingest.camera.container import (
     survey_file,
 )
 from flagdata.ingest.camera.damage import Damage
-from flagdata.ingest.camera import gif
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import luma_of_frame
 from flagdata.ingest.camera.options import CameraOptions

@@ -189,7 +189,10 @@ def test_a_streams_clock_set_back_for_good_leaves_its_rate(read: Read) -> None:
     for second in range(3000):
         clock = 43_200 + second - (3600 if second >= 1000 else 0)
         hhmmss = f"{clock // 3600:02d}{clock // 60 % 60:02d}{clock % 60:02d}"
-        lines += [sentence(f"GPZDA,{hhmmss},01,05,2026,00,00"), sentence(f"WIMWV,{second % 360},R,{5 + second % 3},M,A")]
+        lines += [
+            sentence(f"GPZDA,{hhmmss},01,05,2026,00,00"),
+            sentence(f"WIMWV,{second % 360},R,{5 + second % 3},M,A"),
+        ]
     found = read("\n".join(lines) + "\n")
     assert told(found, "clock-set-back").value == -3600
     # a row lies half-way between two marks of a second

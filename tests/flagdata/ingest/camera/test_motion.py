@@ -155,9 +155,7 @@ def test_a_folder_of_images_gets_a_proposal_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [34, 60])
-def test_a_faint_tip_that_swings_out_now_and_then_lies_in_the_proposal(
-    length: int, film: Callable[..., Path]
-) -> None:
+def test_a_faint_tip_that_swings_out_now_and_then_lies_in_the_proposal(length: int, film: Callable[..., Path]) -> None:
     """A strip 6 px thin at the flag's free end, 30 gray levels beside its 80, seen in a quarter of the time."""
     flag = (140, 60, 80)
 

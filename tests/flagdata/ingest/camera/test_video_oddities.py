@@ -212,7 +212,9 @@ def test_a_camcorders_m2ts_with_time_codes_between_packets_is_whole(
 
 
 @pytest.mark.parametrize("hundredths", [0, 1])
-def test_a_gif_that_states_no_rate_is_no_camera_of_100_hz(hundredths: int, tmp_path: Path, plain: CameraOptions) -> None:
+def test_a_gif_that_states_no_rate_is_no_camera_of_100_hz(
+    hundredths: int, tmp_path: Path, plain: CameraOptions
+) -> None:
     path = tmp_path / "film.gif"
     pictures = [Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8)) for k in range(9)]
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=10 * hundredths)
