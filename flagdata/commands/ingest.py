@@ -63,11 +63,17 @@ from flagdata.errors import UsageError
     "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
 )
 @click.option("--date-order", type=click.Choice(["dmy", "mdy"]), help="Wind: of dates written with numbers only.")
-@click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
+@click.option(
+    "--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle (any format)."
+)
 @click.option("--talker", metavar="ID", help="Wind: of NMEA 0183, where several instruments share a stream.")
 @click.option(
     "--azimuth", type=float, metavar="DEG", help="Wind: of the sensor's north or bow, clockwise from true north."
 )
+@click.option(
+    "--clock", type=click.Choice(["first", "last"]),
+    help="Wind: where the log's clock was set back or on, whose stamps are right: those before it, or those after.",
+)  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
 @click.option("--unit", default="m", show_default=True, metavar="UNIT", help="Meshes, markers: of positions in space.")
@@ -97,6 +103,7 @@ def ingest(
     platform: str | None,
     talker: str | None,
     azimuth: float | None,
+    clock: str | None,
     zero_offset: str | None,
     encoding: str | None,
     unit: str,
@@ -133,7 +140,7 @@ def ingest(
         wind=wind_options(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
-            zero_offset=zero_offset, encoding=encoding,
+            clock=clock, zero_offset=zero_offset, encoding=encoding,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=unit),
         markers=marker_options(rate=rate if "rate" in given else None, length=unit),

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
 CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
-WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "zero_offset", "encoding")
+WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding")
 LENGTHS = ("unit",)
 """Of meshes and markers."""
 FOREIGN = {
@@ -97,6 +97,7 @@ def wind_options(
     platform: Any,
     talker: str | None,
     azimuth: float | None,
+    clock: Any,
     zero_offset: str | None,
     encoding: str | None,
 ) -> WindIngest:
@@ -129,6 +130,7 @@ def wind_options(
             platform=platform,
             talker=talker,
             azimuth=float(unit("deg").to_si(azimuth)) if azimuth is not None else None,
+            clock=clock,
             zero_offset=offset,
         )
     )

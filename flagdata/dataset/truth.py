@@ -80,12 +80,12 @@ def over_ground(series: WindSeries) -> Series | None:
     """Speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a sonic.
 
     `None` when the series has neither. The wind that a moving platform feels, or that its instrument computes as if the
-    platform stood still, is not the wind at a flag.
+    platform stood still, is not the wind at a flag; nor are the components that apparent wind was made of.
     """
     channels = series.channels
     if "wind_speed" in channels:
         return np.asarray(channels["wind_speed"], dtype=np.float64)
-    if "wind_x" in channels and "wind_y" in channels:
+    if "wind_x" in channels and "wind_y" in channels and "apparent_wind_speed" not in channels:
         return np.hypot(channels["wind_x"], channels["wind_y"])
     return None
 

@@ -16,9 +16,11 @@ import numpy as np
 import pyarrow.compute as pc
 
 from flagdata.align.paired import host_clock
-from flagdata.errors import ConflictError, InputError
+from flagdata.errors import ConflictError, FlagdataError, InputError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.neighbours import hours_off
+from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.source import Source
@@ -28,11 +30,13 @@ from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.record.writer import ATTACHMENT_LIMIT, JPEG_QUALITY
 from flagdata.schema import CHANNELS, Kind
-from flagdata.signals import CameraInfo, WindLog
+from flagdata.signals import CameraInfo, WindLog, WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 
 Progress = Callable[[int], object]
 REPORT_SCHEMA = "flagdata.ingest-report/1"
+NEIGHBOURS = 3
+"""Logs of a session that a new one is compared with: those that share most of its time."""
 CROP_PICTURE = "crop.png"
 """Attachment of a camera record whose crop was found from motion: the motion in red, the crop in yellow."""
 
@@ -195,6 +199,7 @@ def ingest_wind(
     time = log.series.time
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
+    findings = (*findings, *_beside(lake, log.series, labels.session, branch=branch))
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
@@ -217,6 +222,28 @@ def ingest_wind(
         )  # fmt: skip
         transaction.add(artifact)
     return result_of(lake, transaction, artifact, report, labels, branch=branch)
+
+
+def _beside(lake: Lake, series: WindSeries, session: str | None, *, branch: str) -> tuple[Finding, ...]:
+    """Logs of the same session, or of none, on the branch whose wind this one is, hours apart."""
+    start, end = int(series.time[0]), int(series.time[-1])
+    rows = lake.rows(at=branch).filter(pc.field("kind") == Kind.WIND.value).to_pylist()
+    near = [
+        artifact for artifact in map(Artifact.from_row, rows)
+        if artifact.session == session and artifact.start is not None and artifact.end is not None
+        and min(end, artifact.end) - max(start, artifact.start) > 0
+    ]  # fmt: skip
+    near.sort(key=lambda artifact: max(start, artifact.start or 0) - min(end, artifact.end or 0))
+    found: list[Finding] = []
+    for artifact in near[:NEIGHBOURS]:
+        try:
+            other = Record.open(lake.object_path(str(artifact.object))).wind()
+        except FlagdataError:
+            continue  # damage of another artifact is found by verify; it does not keep this log out
+        finding = hours_off(series, other, name=artifact.name) if other is not None else None
+        if finding is not None:
+            found.append(finding)
+    return tuple(found)
 
 
 @dataclass
@@ -348,7 +375,9 @@ def _wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None
     """The report of a log; of a recipe file that was named, only its base name stays."""
     series = log.series
     time = series.time
-    steps = np.diff(time)
+    kinds = [time[rows] for _, rows in streams(series.channels)]
+    steps = np.diff(max(kinds, key=len))
+    longest = max((int(np.diff(kind).max()) for kind in kinds if len(kind) > 1), default=None)
     speed = series.channels.get("wind_speed")
     sensor = {name: value for name, value in vars(series.sensor).items() if value is not None}
     return {
@@ -359,7 +388,7 @@ def _wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None
         **_span(int(time[0]), int(time[-1])),
         "samples": len(series),
         "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,
-        "longest_gap": float(steps.max()) / NANOSECONDS if len(steps) else None,
+        "longest_gap": longest / NANOSECONDS if longest is not None else None,
         "channels": {
             name: {"unit": CHANNELS[name].unit, "values": int(np.isfinite(values).sum())}
             for name, values in series.channels.items()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flagdata.errors import UsageError
+from flagdata.ingest.anemometer import platform
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.draft import draft
 from flagdata.ingest.anemometer.options import WindOptions
@@ -20,7 +21,7 @@ class Delimited:
 
     name = "delimited"
     about = "delimited text described by a sensor recipe"
-    uses = frozenset({"zone", "azimuth"})
+    uses = frozenset({"zone", "azimuth", "platform"})
 
     def recognise(self, head: Head) -> Guess | None:
         """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
@@ -56,8 +57,11 @@ class Delimited:
             )
         rows = RowReader(source, recipe.file)
         where = str(source.path)
-        reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
-        return with_horizontal(reading, options.azimuth, where=where)
+        columns = platform.position_columns(rows.header or ())
+        table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns or ())
+        reading = with_horizontal(table.reading, options.azimuth, where=where)
+        positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns or (), strict=False)}
+        return platform.settle(reading, options.platform, positions=positions, where=where)
 
 
 def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:

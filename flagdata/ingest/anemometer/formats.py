@@ -20,7 +20,8 @@ class Format(Protocol):
     Attributes:
         name: its name in the table.
         about: one line.
-        uses: names of the `WindOptions` it heeds; others are refused when given.
+        uses: names of the `WindOptions` it heeds; others are refused when given, but for those that are settled for
+            every format alike (`WindOptions.given`). A format that names "platform" settles it itself.
     """
 
     name: str

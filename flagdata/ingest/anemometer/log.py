@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import possible, quality, zero
+from flagdata.ingest.anemometer import platform, possible, quality, zero
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
@@ -49,13 +49,15 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
             f"the format {name} has no use for: {', '.join(sorted(unused))}", where=str(path), fix="leave it out"
         )
     reading = reader.read(source, options)
+    if "platform" not in reader.uses:
+        reading = platform.settle(reading, options.platform, where=str(path))
     reading = reading.with_findings(source.findings)
     if len(reading.time) == 0:
         raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
     zero.check(reading, options.zero_offset, where=str(path))
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
-    reading = zero.settle(possible.impossible(in_order(reading, where=str(path))), choice)
-    for check in (quality.faults, quality.negative, quality.dead_zone, quality.stale, quality.at_nyquist):
+    reading = zero.settle(possible.impossible(in_order(reading, where=str(path), choice=options.clock)), choice)
+    for check in (quality.faults, quality.negative, quality.dead_zone, quality.idle, quality.stale, quality.at_nyquist):
         reading = _apply(reading, check)
     findings = (*reading.findings, *quality.gaps(reading))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import clock as clocks
+from flagdata.ingest.anemometer.clock import ClockChoice
 from flagdata.ingest.anemometer.sentences import TimeMark
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS
@@ -17,6 +19,8 @@ from flagdata.timebase import NANOSECONDS
 DAY = 86_400 * NANOSECONDS
 # The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
 _TRUST = ("ZDA", "RMC", "GGA", "GLL")
+FEW = 10
+"""Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
 DISORDER = 2 * NANOSECONDS
 """A mark this much behind the one before it is reported; less is the order of sentences within a second."""
 
@@ -64,11 +68,14 @@ class TimeLine:
         self.line.setdefault("TAG", []).append(line)
         self.clock.setdefault("TAG", []).append(instant)
 
-    def place(self, lines: NDArray[np.int64], *, date: dt.date | None, where: str) -> Placed:
+    def place(
+        self, lines: NDArray[np.int64], *, date: dt.date | None, where: str, choice: ClockChoice | None = None
+    ) -> Placed:
         """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
 
         Args:
             date: day (UTC) of the first mark, for a stream that states none.
+            choice: whose marks are right where the stream's clock was set back and stays so; `None` where nobody said.
 
         Raises:
             TimeError: fewer than two marks, or no date.
@@ -93,6 +100,8 @@ class TimeLine:
                 text = f"{day[-1]} times the clock passes midnight: the day is counted on"
                 found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
         marks = start + day * DAY + clock
+        marks, told = _one_clock(marks, at, choice)
+        found.extend(told)
         rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
         behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
         if behind.any():
@@ -151,6 +160,28 @@ class TimeLine:
                 where=where, fix="leave out --date",
             )  # fmt: skip
         return start
+
+
+def _one_clock(
+    marks: Instants, at: NDArray[np.int64], choice: ClockChoice | None
+) -> tuple[Instants, tuple[Finding, ...]]:
+    """Marks on one clock where it was set back for good; those that leave the stream's time for a moment do not rise."""
+    most = max(FEW, len(marks) // 100)
+    stray = clocks.excursions(marks, most=most) if len(clocks.set_back(marks)) <= most else np.zeros(len(marks), bool)
+    settled = np.flatnonzero(~stray)
+    jumps = clocks.set_back(marks[settled])
+    jumps = jumps if len(jumps) <= clocks.MOST else ()
+    out = marks.copy()
+    out[settled], _ = clocks.continued(marks[settled], jumps, choice)
+    found = clocks.report(marks[settled], jumps, at[settled], choice)
+    if stray.any():
+        out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
+        finding = Finding(
+            kind="time-backwards", severity=Severity.WARNING, count=int(stray.sum()), where=f"line {at[stray][0]}",
+            what=f"{int(stray.sum())} times of the stream leave its course and come back to it; not used",
+        )  # fmt: skip
+        found = (*found, finding)
+    return out, found
 
 
 def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:

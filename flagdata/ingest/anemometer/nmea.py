@@ -114,7 +114,7 @@ class Nmea:
                 where=where, fix=f"choose one, e.g. --talker {min(stream.talkers)}",
             )  # fmt: skip
         line = np.array(stream.line, dtype=np.int64)
-        placed = stream.times.place(line, date=options.date, where=where)
+        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock)
         channels = {
             name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
         }

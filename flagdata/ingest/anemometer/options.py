@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeAlias
 
 from flagdata.errors import UsageError
+from flagdata.ingest.anemometer.clock import ClockChoice
 
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
@@ -49,6 +50,8 @@ class WindOptions:
         talker: NMEA talker whose wind is read, for streams with several instruments.
         azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative
             direction stays sensor-relative.
+        clock: whose stamps are right where the log's clock was set back or on: those before it ("first") or those after
+            it ("last"); `None` where nobody said.
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
     """
@@ -62,6 +65,7 @@ class WindOptions:
     platform: Literal["fixed", "moving"] | None = None
     talker: str | None = None
     azimuth: float | None = None
+    clock: ClockChoice | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
 
@@ -70,6 +74,8 @@ class WindOptions:
             raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy or mdy")
         if self.platform not in (None, "fixed", "moving"):
             raise UsageError(f"platform {self.platform!r}", where="platform", fix="give fixed or moving")
+        if self.clock not in (None, "first", "last"):
+            raise UsageError(f"clock {self.clock!r}", where="clock", fix="give first or last")
         if self.azimuth is not None and not -7.0 < self.azimuth < 7.0:
             raise UsageError(f"azimuth {self.azimuth} is not in radians", where="azimuth", fix="give -2π to 2π")
         check_zero_offset(self.zero_offset, where="zero_offset")
@@ -77,15 +83,18 @@ class WindOptions:
     def given(self) -> frozenset[str]:
         """Names of the options that a format has to heed.
 
-        Limits and encoding are settled before it, the zero offset after it, for every format alike.
+        Limits and encoding are settled before it; zero offset, a clock set anew and the platform after it, for every
+        format alike.
         """
-        apart = {"format", "recipe", "limits", "encoding", "zero_offset"}
+        apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform"}
         return frozenset(f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) is not None)
 
     def as_dict(self) -> Mapping[str, Any]:
         """Everything that shapes the result, for a recipe hash; limits do not (they only refuse)."""
         content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "limits"}
         content["date"] = self.date.isoformat() if self.date else None
+        if self.clock is None:
+            del content["clock"]  # older lakes have artifacts of the same log whose recipe does not name it
         return content
 
 

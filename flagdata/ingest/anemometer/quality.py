@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading, streams
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS
 
@@ -29,16 +29,34 @@ STUCK_REPEATS = 60
 
 
 def gaps(reading: Reading) -> tuple[Finding, ...]:
-    """Stretches without rows: longer than the jitter of the stamps explains.
+    """Stretches without rows, of each kind of wind by itself: longer than the jitter of the stamps explains.
 
     A gap is an interval beyond 1.5 times the median m, and beyond m + 3 (q - m) with the 99th percentile q, but in any
     case one beyond 3 m.
     """
-    if len(reading.time) < 4:
+    kinds = streams(reading.channels)
+    if len(kinds) == 1:
+        return _gaps_of(reading, np.arange(len(reading.time)), "")
+    # A row without a value was not lost, though nobody knows of which kind it is.
+    blank = np.ones(len(reading.time), dtype=bool)
+    for _, rows in kinds:
+        blank[rows] = False
+    found: list[Finding] = []
+    for names, rows in kinds:
+        kept = np.union1d(rows, np.flatnonzero(blank))
+        of = next(name for name in names if name in WIND_CHANNELS)
+        found.extend(_gaps_of(reading.take(kept), np.flatnonzero(~blank[kept]), f" of {of}"))
+    return tuple(found)
+
+
+def _gaps_of(reading: Reading, own: NDArray[np.int64], of: str) -> tuple[Finding, ...]:
+    """Gaps between rows; what is usual is told by the rows `own`, and `of` says of which kind they are."""
+    if len(own) < 4:
         return ()
+    between = np.diff(reading.time[own])
+    usual = float(np.median(between))
+    jitter = 3 * (float(np.quantile(between, 0.99)) - usual)
     steps = np.diff(reading.time)
-    usual = float(np.median(steps))
-    jitter = 3 * (float(np.quantile(steps, 0.99)) - usual)
     wide = np.flatnonzero(steps > max(1.5 * usual, min(usual + jitter, 3 * usual)))
     if len(wide) == 0:
         return ()
@@ -49,7 +67,7 @@ def gaps(reading: Reading) -> tuple[Finding, ...]:
         Finding(
             kind="gaps", severity=Severity.WARNING, count=len(wide), value=seconds,
             where=f"line {reading.line[longest + 1]}",
-            what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'} longer than the usual "
+            what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
             f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
             "the line named",
         ),
@@ -121,6 +139,49 @@ def dead_zone(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]
             value=threshold, what=f"{int(below.sum())} of {len(speed)} speeds are {text}",
         ),
     )  # fmt: skip
+
+
+def idle(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Speeds that stay at exactly 0, as of a sensor that is not connected or blocked.
+
+    On a platform that may move no calm reads 0 for `STUCK_REPEATS` rows over `STUCK_SECONDS`: such runs of apparent or
+    theoretical wind are STALE. On a mast a calm may last; a log that never reads anything else is reported.
+    """
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    found: list[Finding] = []
+    for name in SPEEDS:
+        values = reading.channels.get(name)
+        if values is None:
+            continue
+        rows = np.flatnonzero(np.isfinite(values))
+        starts, lengths = _runs(values[rows] == 0)
+        if len(starts) == 0:
+            continue
+        span = (reading.time[rows[starts + lengths - 1]] - reading.time[rows[starts]]) / NANOSECONDS
+        long = (lengths >= STUCK_REPEATS) & (span >= STUCK_SECONDS)
+        always = bool(long.any()) and int(lengths[long].sum()) == len(rows)
+        if not long.any() or (name == "wind_speed" and not always):
+            continue
+        zero = np.concatenate([rows[s : s + k] for s, k in zip(starts[long], lengths[long], strict=True)])
+        what = (
+            f"{name} reads exactly 0 in {'all ' if always else ''}{len(zero)} rows, for {float(span[long].max()):.0f} s "
+            "on end: "
+        )
+        if name == "wind_speed":
+            what += "a calm all along, or a sensor that is not connected or blocked"
+        else:
+            flags[zero] |= SampleFlag.STALE
+            what += (
+                "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
+            )
+            what += "out of averages"
+        found.append(
+            Finding(
+                kind="stays-at-zero", severity=Severity.WARNING, count=len(zero), value=float(span[long].max()),
+                where=f"line {reading.line[zero[0]]}", what=what, fix="check the sensor, its cable and the column",
+            )
+        )  # fmt: skip
+    return flags, tuple(found)
 
 
 def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:

@@ -72,3 +72,40 @@ class Reading:
         return replace(
             self, findings=(*self.findings, *found), flags=self.flags if flags is None else flags.astype(np.uint16)
         )
+
+
+def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], NDArray[np.int64]], ...]:
+    """Kinds of wind that come in rows of their own, as sentences do, and the rows of each.
+
+    Channels that share a row are of one kind, whatever is missing from other rows. Of a log with one kind all rows are
+    its own, those without a value among them; of a log with several, those in which a channel of the kind has a value.
+
+    Args:
+        channels: names → (n,) values, NaN where missing.
+
+    Returns:
+        (names, indices of rows) of each kind; a kind is one of wind, so temperatures between are none.
+    """
+    n = len(next(iter(channels.values()))) if channels else 0
+    known = {
+        name: np.isfinite(values) for name, values in channels.items()
+        if name in WIND_CHANNELS or name.endswith(("wind_direction", "wind_direction_magnetic"))
+    }  # fmt: skip
+    groups: list[tuple[set[str], NDArray[np.bool_]]] = []
+    for name, here in known.items():
+        if not here.any():
+            continue
+        names, rows = {name}, here.copy()
+        apart: list[tuple[set[str], NDArray[np.bool_]]] = []
+        for other, theirs in groups:
+            if bool((theirs & rows).any()):
+                names |= other
+                rows = rows | theirs
+            else:
+                apart.append((other, theirs))
+        groups = [*apart, (names, rows)]
+    groups = [(names, rows) for names, rows in groups if not WIND_CHANNELS.isdisjoint(names)]
+    if len(groups) < 2:
+        names = tuple(sorted(groups[0][0])) if groups else ()
+        return ((names, np.arange(n)),)
+    return tuple((tuple(sorted(names)), np.flatnonzero(rows)) for names, rows in groups)

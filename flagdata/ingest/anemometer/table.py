@@ -17,7 +17,7 @@ from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.stamps import YEARS, Stamps
 from flagdata.ingest.anemometer.stamps import parse as parse_stamps
-from flagdata.ingest.anemometer.wall import to_utc
+from flagdata.ingest.anemometer.wall import to_utc, zone_advice
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants
 from flagdata.timebase import zone
@@ -302,8 +302,7 @@ def instants(
     if zone_name is None:
         at = int(np.flatnonzero(~utc)[0])
         raise TimeError(
-            "the stamps carry no time zone", where=f"{where}, line {line[at]}",
-            fix="name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00",
+            "the stamps carry no time zone", where=f"{where}, line {line[at]}", fix=zone_advice(wall, line)
         )  # fmt: skip
     time = wall.copy()
     rows = ~utc

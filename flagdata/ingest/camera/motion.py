@@ -3,7 +3,9 @@
 Short runs of frames are taken all over the recording. In each run the brightness of every frame is fitted to the run's
 median frame (gain and offset, over the pixels that hold still), so that flicker and exposure control are not motion.
 What remains is the temporal standard deviation of each pixel. Where its mean square over the runs stands out, there are
-regions; the one with the most motion in the median run is the flag's, since a passer-by is in few of the runs. The
+regions; the one with the most motion in the median run is the flag's, since a passer-by is in few of the runs. A tip is
+thin, faint or out in few of the runs, and so does not stand out in that mean: the region grows into all that moves in
+any run, however faintly, and touches it, unless that would make it nearly twice as large, as a passer-by does. The
 proposal is the square around it.
 """
 
@@ -32,6 +34,8 @@ _FAINTEST = 1.0  # gray levels; less motion than one is coding noise
 _BRIDGE = 8  # px of the images that are compared
 _PAD = 0.15  # of the motion's extent, on each side: the hoist of a flag hardly moves
 _LEAST_SHARE = 0.5
+_GROWTH = 1.8  # the tip of a flag that is seen without it; who walks into the region makes it larger
+_NEAR = 3  # px of the images that are compared, between what moves and the tip of it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +153,28 @@ def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: st
             fix="give the crop as x,y,width,height",
         )  # fmt: skip
     best = int(np.argmax(energy))
-    return moving & (labels == best + 1), float(energy[best] / energy.sum())
+    region = moving & (labels == best + 1)
+    return _with_tip(region, maps), float(energy[best] / energy.sum())
+
+
+def _with_tip(region: NDArray[np.bool_], maps: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """The region with what moves in any run and touches it; without, where that is much larger than the region."""
+    moving = np.zeros_like(region)
+    for run in maps:
+        smooth = ndimage.gaussian_filter(run, 0.7)
+        middle = float(np.median(smooth))
+        noise = 1.4826 * float(np.median(np.abs(smooth - middle)))
+        above = smooth - middle
+        moving |= above > max(_FAINTEST, 6 * noise, 0.04 * float(np.percentile(above, 99.5)))
+    labels = np.empty(moving.shape, dtype=np.int32)
+    ndimage.label(ndimage.binary_dilation(moving | region, iterations=_NEAR), output=labels)
+    grown = (moving | region) & np.isin(labels, np.unique(labels[region]))
+    return grown if _extent(grown) <= _GROWTH * _extent(region) else region
+
+
+def _extent(region: NDArray[np.bool_]) -> int:
+    rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
+    return int(max(rows[-1] - rows[0], columns[-1] - columns[0])) + 1
 
 
 def _box_around(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:

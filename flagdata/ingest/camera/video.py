@@ -19,6 +19,7 @@ from av.video.stream import VideoStream
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import gif
 from flagdata.ingest.camera.avchd import recording_time
 from flagdata.ingest.camera.container import (
     BY_DECODE_ORDER,
@@ -91,6 +92,8 @@ class VideoSource:
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
         found = []
+        if self._container.format.name == gif.CONTAINER:
+            found += gif.check(self._path, self._timing, true_fps=self._options.true_fps)
         if first.interlaced_frame:
             found.append(
                 Finding(

@@ -152,3 +152,22 @@ def test_a_folder_of_images_gets_a_proposal_too(tmp_path: Path) -> None:
         Image.fromarray(scene(number, flag=flag)).save(tmp_path / f"{number}.png")
     proposal = propose_crop(tmp_path, CameraOptions(sequence_fps=25.0))
     assert covers(proposal.box.as_tuple(), flag)
+
+
+@pytest.mark.parametrize("length", [34, 60])
+def test_a_faint_tip_that_swings_out_now_and_then_lies_in_the_proposal(length: int, film: Callable[..., Path]) -> None:
+    """A strip 6 px thin at the flag's free end, 30 gray levels beside its 80, seen in a quarter of the time."""
+    flag = (140, 60, 80)
+
+    def picture(number: int) -> np.ndarray:
+        image = scene(number, flag=flag).astype(float)
+        if number % 60 >= 45:
+            rows = 90 + number % 12
+            image[rows : rows + 6, 220 : 220 + length] += 30 * np.sin(number + np.arange(length) / 4)
+        return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+    box = propose_crop(film("tip.mp4", picture, frames=120)).box
+    assert covers(box.as_tuple(), flag)
+    assert box.x + box.width >= 220 + length
+    # with its tip the flag is 80 + length px long: the square with its padding stays below 1.6 times that
+    assert box.width <= 1.6 * (80 + length)

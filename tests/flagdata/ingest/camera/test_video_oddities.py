@@ -11,8 +11,9 @@ import av
 import av.error
 import numpy as np
 import pytest
+from PIL import Image
 
-from flagdata.errors import InputError, NotFoundError
+from flagdata.errors import InputError, NotFoundError, TimeError
 from flagdata.findings import Severity
 from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, probe
 from tests.flagdata.ingest.camera.reading import grid_of, read
@@ -208,3 +209,26 @@ def test_a_camcorders_m2ts_with_time_codes_between_packets_is_whole(
     cut.write_bytes(path.read_bytes()[:-50])
     _, _, found = read(cut, plain)
     assert found["truncated"].severity is Severity.WARNING
+
+
+@pytest.mark.parametrize("hundredths", [0, 1])
+def test_a_gif_that_states_no_rate_is_no_camera_of_100_hz(
+    hundredths: int, tmp_path: Path, plain: CameraOptions
+) -> None:
+    path = tmp_path / "film.gif"
+    pictures = [Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8)) for k in range(9)]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=10 * hundredths)
+    with pytest.raises(TimeError, match="--true-fps"):
+        open_camera(path, plain)
+    with open_camera(path, replace(plain, true_fps=30.0)) as film:
+        assert film.info.true_rate == pytest.approx(30.0)
+
+
+def test_a_gifs_rate_is_known_to_half_a_hundredth(tmp_path: Path, plain: CameraOptions) -> None:
+    path = tmp_path / "film.gif"
+    pictures = [Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8)) for k in range(9)]
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=30)
+    with open_camera(path, plain) as film:
+        (finding,) = [f for f in film.findings if f.kind == "gif-delays"]
+    # 1/35 ms and 1/25 ms
+    assert "between 28.6 and 40 Hz" in finding.what

@@ -1,0 +1,153 @@
+"""What the anemometer stands on: on a mast the air past it is the wind, on a boat or vehicle it is not.
+
+Formats that know nothing of platforms deliver `wind_speed` for whatever the sensor read. Where the user says that the
+platform moves, or its own speed or position says so, that becomes `apparent_wind_speed`, which is no ground truth.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.units import UNITS
+
+Platform: TypeAlias = Literal["fixed", "moving"]
+MOVING = 0.5
+"""Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
+RANGE = 100.0
+"""Extent of the positions of a fixed receiver, which its errors alone explain, from the 5th to the 95th percentile
+[m]."""
+POSITION = ("latitude", "longitude")
+EARTH = 6_371_000.0
+"""Mean radius [m]."""
+_COLUMN = r"(?:gps|pos|position)?[\s_.-]*(?:{name})(?:[\s_.-]*\W?(?:deg|degrees|°|dd|decimal)\W?)?"
+_LATITUDE = re.compile(_COLUMN.format(name="lat|latitude"), re.IGNORECASE)
+_LONGITUDE = re.compile(_COLUMN.format(name="lon|lng|long|longitude"), re.IGNORECASE)
+_RENAMED = {"wind_speed": "apparent_wind_speed", "wind_direction": "apparent_wind_direction"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """What a log says of its platform's motion.
+
+    Attributes:
+        text: in words.
+        speed: median over ground [m/s], `None` where only the extent of the positions is known.
+    """
+
+    text: str
+    speed: float | None
+
+
+def position_columns(header: Sequence[str]) -> tuple[str, str] | None:
+    """The columns of latitude and longitude that a header names, each once; `None` where it does not."""
+    found = [
+        [name for name in header if pattern.fullmatch(name.strip()[:40])] for pattern in (_LATITUDE, _LONGITUDE)
+    ]  # fmt: skip
+    if any(len(names) != 1 or list(header).count(names[0]) != 1 for names in found):
+        return None
+    return found[0][0], found[1][0]
+
+
+def extent(latitude: NDArray[np.float64], longitude: NDArray[np.float64]) -> float:
+    """How far positions [deg] reach, without the farthest twentieth on each side [m]; 0 where there are none."""
+    known = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180) & ((latitude != 0) | (longitude != 0))
+    if int(known.sum()) < 2:
+        return 0.0
+    north, east = np.radians(latitude[known]), np.radians(longitude[known])
+    east = np.unwrap(east) * float(np.cos(np.median(north)))
+    low, high = np.quantile(np.stack([north, east]), [0.05, 0.95], axis=1)
+    return float(np.hypot(*(high - low))) * EARTH
+
+
+def motion(reading: Reading, positions: Mapping[str, NDArray[np.float64]]) -> Motion | None:
+    """The motion that a log shows; `None` where it shows none.
+
+    Args:
+        positions: (n,) "latitude" and "longitude" [deg] of the rows, where the file has them.
+    """
+    speed = reading.channels.get("platform_speed")
+    if speed is not None and np.isfinite(speed).any():
+        median = float(np.nanmedian(speed))
+        if median > MOVING * UNITS["kn"].scale:
+            return Motion(text=f"moves at {median:.2g} m/s over ground in the median", speed=median)
+    if {"latitude", "longitude"} <= set(positions):
+        far = extent(positions["latitude"], positions["longitude"])
+        if far > RANGE:
+            return Motion(text=f"moves: its positions reach over {far:.0f} m", speed=None)
+    return None
+
+
+def settle(
+    reading: Reading,
+    told: Platform | None,
+    *,
+    positions: Mapping[str, NDArray[np.float64]] | None = None,
+    where: str,
+) -> Reading:
+    """The reading with its wind in the channels that the platform allows.
+
+    Args:
+        told: by the user.
+        positions: see `motion`.
+
+    Raises:
+        InputError: a platform said to be fixed that moves.
+    """
+    shown = motion(reading, positions or {})
+    if told == "fixed":
+        if shown is not None:
+            raise InputError(
+                f"the platform was said to be fixed, but {shown.text}", where=where,
+                fix="say --platform moving: its wind is then apparent wind",
+            )  # fmt: skip
+        return _fixed(reading)
+    if told is None and shown is None:
+        return _of_unknown(reading)
+    if {"wind_speed", "apparent_wind_speed"} <= set(reading.channels):
+        text = "wind over ground was computed by the instrument from a moving platform's heading and speed"
+        finding = Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text)
+        return reading.with_findings((finding,))
+    names = [name for name in _RENAMED if name in reading.channels and _RENAMED[name] not in reading.channels]
+    known = "a moving platform, as told" if shown is None else f"a platform that {shown.text}"
+    text = f"wind relative to {known}: no ground truth"
+    if "wind_speed" in names:
+        text += "; what the file calls wind speed is kept as apparent_wind_speed"
+    if "wind_direction" in names:
+        text += ", its direction as one from the bow"
+    finding = Finding(
+        kind="apparent-wind-only", severity=Severity.WARNING, value=shown.speed if shown else None, what=text,
+        fix=None if told else "if the log's wind is over ground all the same, leave position and speed out of its file",
+    )  # fmt: skip
+    channels = {_RENAMED[name] if name in names else name: values for name, values in reading.channels.items()}
+    return replace(reading, channels=channels).with_findings((finding,))
+
+
+def _fixed(reading: Reading) -> Reading:
+    """Apparent wind of a sensor that stands still as the wind, where the log has none over ground."""
+    channels = dict(reading.channels)
+    text = "fixed platform, as told"
+    if "wind_speed" not in channels and "apparent_wind_speed" in channels:
+        channels["wind_speed"] = channels.pop("apparent_wind_speed")
+        text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
+    finding = Finding(kind="fixed-platform", severity=Severity.NOTE, what=text)
+    return replace(reading, channels=channels).with_findings((finding,))
+
+
+def _of_unknown(reading: Reading) -> Reading:
+    if "wind_speed" in reading.channels or "apparent_wind_speed" not in reading.channels:
+        return reading
+    finding = Finding(
+        kind="apparent-wind-only", severity=Severity.WARNING,
+        what="wind relative to a platform of unknown motion: no ground truth",
+        fix="if the sensor stands on a mast, say so: --platform fixed",
+    )  # fmt: skip
+    return reading.with_findings((finding,))
