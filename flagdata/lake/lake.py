@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import uuid
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -29,6 +30,7 @@ from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
+_UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
 
 
 class Lake:
@@ -293,7 +295,7 @@ def _usable(path: Path | str) -> Path:
         whole = Path(path).resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
         raise UsageError(f"not a path: {error}", where=repr(str(path)), fix="name another folder") from None
-    if not _is_text(whole) or "\\" in str(whole):  # the Delta library takes a backslash for a separator
+    if _UNUSABLE.search(str(whole)):
         raise UsageError(
             "the path of a lake cannot have a backslash, or a byte that is not UTF-8",
             where=str(whole).encode(errors="backslashreplace").decode(),
@@ -306,14 +308,6 @@ def _usable(path: Path | str) -> Path:
             fix="rename the folder",
         )
     return whole
-
-
-def _is_text(path: Path) -> bool:
-    try:
-        str(path).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _filter(table: pa.Table, where: str) -> pa.Table:

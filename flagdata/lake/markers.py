@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, InputError
+from flagdata.lake.durable import disk_errors
 from flagdata.lake.meshes import write_array
 from flagdata.provenance import canonical
 
@@ -74,22 +75,24 @@ def write_markers(path: Path, sequence: MarkerSequence) -> None:
 
     Raises:
         ConflictError: something is at `path` already.
+        FlagdataError: no space, no permission.
     """
     import zarr
 
     if path.exists():
         raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
-    group = zarr.open_group(path, mode="w-", zarr_format=3)
-    attributes = {
-        "Conventions": "CF-1.11",
-        _HEAD: {"format": MARKERS_FORMAT, "tracked": sequence.tracked},
-        "names": list(sequence.names),
-        "attributes": dict(sequence.attributes),
-    }
-    group.update_attributes(json.loads(canonical(attributes)))
-    write_array(group, "time", sequence.time, ("time",))
-    write_array(group, "positions", sequence.positions, ("time", "marker", "xyz"))
-    write_array(group, "rest", sequence.rest, ("marker", "uv"))
+    with disk_errors("writing markers", path):
+        group = zarr.open_group(path, mode="w-", zarr_format=3)
+        attributes = {
+            "Conventions": "CF-1.11",
+            _HEAD: {"format": MARKERS_FORMAT, "tracked": sequence.tracked},
+            "names": list(sequence.names),
+            "attributes": dict(sequence.attributes),
+        }
+        group.update_attributes(json.loads(canonical(attributes)))
+        write_array(group, "time", sequence.time, ("time",))
+        write_array(group, "positions", sequence.positions, ("time", "marker", "xyz"))
+        write_array(group, "rest", sequence.rest, ("marker", "uv"))
 
 
 def read_markers(path: Path) -> MarkerSequence:

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, InputError
+from flagdata.lake.durable import disk_errors
 from flagdata.provenance import canonical
 from flagdata.schema import CHANNELS
 
@@ -148,28 +149,30 @@ def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> Non
 
     Raises:
         ConflictError: something is at `path` already.
+        FlagdataError: no space, no permission.
     """
     import zarr
 
     if path.exists():
         raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
     ragged = isinstance(sequence, RaggedMeshSequence)
-    group = zarr.open_group(path, mode="w-", zarr_format=3)
-    attributes = {
-        "Conventions": "CF-1.11 UGRID-1.0",
-        _HEAD: {"format": MESHES_FORMAT, "layout": "ragged" if ragged else "fixed"},
-        "attributes": dict(sequence.attributes),
-    }
-    group.update_attributes(json.loads(canonical(attributes)))
-    write_array(group, "time", sequence.time, ("time",))
-    if ragged:
-        write_array(group, "positions", sequence.positions, ("vertex", "xyz"))
-        write_array(group, "vertex_offset", sequence.vertex_offset, ("edge",))
-        write_array(group, "face_offset", sequence.face_offset, ("edge",))
-    else:
-        write_array(group, "positions", sequence.positions, CHANNELS["positions"].dims)
-    write_array(group, "faces", sequence.faces, CHANNELS["faces"].dims)
-    write_array(group, "rest", sequence.rest, CHANNELS["rest"].dims)
+    with disk_errors("writing meshes", path):
+        group = zarr.open_group(path, mode="w-", zarr_format=3)
+        attributes = {
+            "Conventions": "CF-1.11 UGRID-1.0",
+            _HEAD: {"format": MESHES_FORMAT, "layout": "ragged" if ragged else "fixed"},
+            "attributes": dict(sequence.attributes),
+        }
+        group.update_attributes(json.loads(canonical(attributes)))
+        write_array(group, "time", sequence.time, ("time",))
+        if ragged:
+            write_array(group, "positions", sequence.positions, ("vertex", "xyz"))
+            write_array(group, "vertex_offset", sequence.vertex_offset, ("edge",))
+            write_array(group, "face_offset", sequence.face_offset, ("edge",))
+        else:
+            write_array(group, "positions", sequence.positions, CHANNELS["positions"].dims)
+        write_array(group, "faces", sequence.faces, CHANNELS["faces"].dims)
+        write_array(group, "rest", sequence.rest, CHANNELS["rest"].dims)
 
 
 def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> MeshSequence | RaggedMeshSequence:

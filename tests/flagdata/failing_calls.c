@@ -30,11 +30,17 @@ static int fails(void) {
     return 1;
 }
 
+/* Whether it is a file or folder on the disk, and none of the pipes and events that threads wake each other by. */
+static int on_disk(int fd) {
+    struct stat found;
+    return fd > 2 && fstat(fd, &found) == 0 && (S_ISREG(found.st_mode) || S_ISDIR(found.st_mode));
+}
+
 #define REAL(name) ((typeof(&name))dlsym(RTLD_NEXT, #name))
 #define OVER(kind, name, parameters, arguments) \
     kind name parameters { return fails() ? -1 : REAL(name) arguments; }
 #define OVER_FILE(kind, name, parameters, arguments) \
-    kind name parameters { return fd > 2 && fails() ? -1 : REAL(name) arguments; }
+    kind name parameters { return on_disk(fd) && fails() ? -1 : REAL(name) arguments; }
 
 OVER_FILE(ssize_t, write, (int fd, const void *data, size_t size), (fd, data, size))
 OVER_FILE(ssize_t, pwrite, (int fd, const void *data, size_t size, off_t at), (fd, data, size, at))
