@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
 from flagdata.schema import TRUTH_WINDOW
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
@@ -31,10 +31,14 @@ from sim.render import prior as priors
 from sim.render.prior import RenderPrior
 from sim.run import Recipe as Simulation
 from sim.run import load as load_simulation
-from sim.run.tables import Quantity, Table
+from sim.run.tables import SEED_LIMIT, Quantity, Table
 
 DATASETS = Shelf(folder="datasets", noun="data set")
 SIDES = ("train", "validation", "test")
+_SIZE_LIMIT = 16_384
+"""Most pixels of a side, and samples of a pixel."""
+SAMPLES_LIMIT = 10_000_000
+"""Most samples of a recording's anemometer."""
 _SIZES = ("width", "height", "raster_samples", "cycles_samples")
 
 
@@ -68,7 +72,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     sessions = _sessions(top.table("sessions")) if "sessions" in top else None
     recipe = DatasetRecipe(
         name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
-        seed=top.whole("seed", 0, least=0), renderer=renderer, simulation=_simulation(top.table("simulation"), folder),
+        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer, simulation=_simulation(top.table("simulation"), folder),
         prior=_prior(render), sessions=sessions,
         photos=None if photos is None else folder / photos, sides=_sides(top.table("sides"), sessions),
         camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),
@@ -108,7 +112,7 @@ def _prior(table: Table) -> RenderPrior:
     for key in _SIZES:
         spelled = key.replace("_", "-")
         if spelled in table:
-            changes[key] = float(table.whole(spelled, 1, least=1))
+            changes[key] = float(table.whole(spelled, 1, least=1, most=_SIZE_LIMIT))
     table.done()
     return priors.named(name).with_quantities(changes, source=table.where)
 
@@ -181,6 +185,12 @@ def _check(recipe: DatasetRecipe, *, where: str) -> None:
     if not recipe.licence:
         raise InputError("no licence", where=where, fix='say how the data may be used: licence = "CC-BY-4.0"')
     time, anemometer = recipe.simulation.time, recipe.anemometer
+    samples = anemometer.rate * (anemometer.before + time.settle + time.frames / time.rate)
+    if samples > SAMPLES_LIMIT:
+        raise LimitError(
+            f"an anemometer of {samples:.3g} samples a recording", where=where,
+            fix=f"have at most {SAMPLES_LIMIT}: lower its rate, or `before`",
+        )  # fmt: skip
     known = time.settle if changing(recipe.simulation) else anemometer.before
     if anemometer.truth is Truth.MEASURED and known < TRUTH_WINDOW:
         raise UsageError(
