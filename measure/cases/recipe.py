@@ -134,9 +134,6 @@ def parse_case(text: str, *, where: str) -> Case:
         specs += [
             ClipSpec(name=n, speed=table.number(n, nan, above=0), group=group, whole=n in whole) for n in table.names()
         ]
-    for name in whole:
-        if name not in {spec.name for spec in specs}:
-            raise UnknownNameError.of("clip", name, [spec.name for spec in specs], where=f"{where} [camera] whole")
     case = Case(
         name=top.text("name", where) or where,
         about=top.text("about", "") or "",
@@ -173,6 +170,9 @@ def parse_case(text: str, *, where: str) -> Case:
     )
     for table in (sheet, air, camera, clips, thresholds, declared, simulation, top):
         table.done()
+    for name in whole:
+        if name not in {spec.name for spec in specs}:
+            raise UnknownNameError.of("clip", name, [spec.name for spec in specs], where=f"{where} [camera] whole")
     if not any(clip.whole for clip in case.of(Group.HELD_OUT)):
         raise InputError(
             "no clip that is held out shows the whole sheet, and the report needs one", where=f"{where} [camera]",
