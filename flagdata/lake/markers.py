@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, InputError
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.meshes import write_array
+from flagdata.lake.meshes import check_format, read_part, store_errors, write_array
 from flagdata.provenance import canonical
 
 MARKERS_FORMAT = 1
@@ -100,30 +100,24 @@ def read_markers(path: Path) -> MarkerSequence:
 
     Raises:
         CorruptError: not such a store, damaged, or of a newer format.
+        LimitError: arrays or chunks larger than the limits of `flagdata.lake.meshes`.
     """
     import zarr
 
     restore = "run flagdata verify; ingest the table again or restore it from a copy"
-    try:
+    with store_errors(path, "the marker store is damaged"):
         group = zarr.open_group(path, mode="r", zarr_format=3)
-        head: Any = group.attrs.get(_HEAD)
-        if not isinstance(head, dict):
-            raise CorruptError("a Zarr store, but not of markers", where=str(path), fix="open it with zarr or xarray")
-        if head["format"] > MARKERS_FORMAT:
-            raise CorruptError(
-                f"its format {head['format']} is newer than this flagdata's, {MARKERS_FORMAT}",
-                where=str(path), fix="install the newer flagdata",
-            )  # fmt: skip
+        head = check_format(group.attrs.get(_HEAD), MARKERS_FORMAT, path, noun="markers")
         attributes: Any = group.attrs["attributes"]
         names: Any = group.attrs["names"]
-        time, positions, rest = (np.asarray(group[name][...]) for name in ("time", "positions", "rest"))  # type: ignore[index]
+        time, positions, rest = (
+            read_part(group, name, None, None, where=str(path)) for name in ("time", "positions", "rest")
+        )
         sequence = MarkerSequence(
             time=time, positions=positions, rest=rest, names=tuple(names), attributes=dict(attributes)
         )
-    except (InputError, KeyError, ValueError, TypeError, OSError, RuntimeError) as error:
-        raise CorruptError(f"the marker store is damaged: {error}", where=str(path), fix=restore) from error
-    if sequence.tracked != head["tracked"]:
+    if sequence.tracked != head.get("tracked"):
         raise CorruptError(
-            f"{sequence.tracked} positions, where {head['tracked']} were tracked", where=str(path), fix=restore
+            f"{sequence.tracked} positions, where {head.get('tracked')} were tracked", where=str(path), fix=restore
         )
     return sequence
