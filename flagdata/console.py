@@ -49,8 +49,8 @@ def is_text(text: str) -> bool:
 
 
 def say(text: str) -> None:
-    """A line for people, on stderr."""
-    click.echo(text, err=True)
+    """A line for people, on stderr; bytes of a file's name that are no UTF-8 are escaped."""
+    click.echo(text.encode(errors="backslashreplace").decode(), err=True)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

@@ -285,7 +285,7 @@ def store_errors(path: Path, what: str) -> Iterator[None]:
         raise
     except FlagdataError as error:
         raise CorruptError(f"{what}: {error.what}", where=str(path), fix=_RESTORE) from error
-    except Exception as error:  # noqa: BLE001  zarr, its codecs and its JSON each raise errors of their own kinds
+    except Exception as error:
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise CorruptError(f"{what}: {said[:300]}", where=str(path), fix=_RESTORE) from error
 

@@ -142,9 +142,7 @@ class ChecksummedWriter(Writer):
         self._tallies[channel] = _Tally(topic)
         return channel
 
-    def add_message(
-        self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0
-    ) -> None:
+    def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
         super().add_message(channel_id, log_time, data, publish_time, sequence)
         self._tallies[channel_id].add(_HEAD.pack(channel_id, sequence, log_time, publish_time), data)
 
@@ -161,4 +159,3 @@ class ChecksummedWriter(Writer):
         content = json.dumps(document, sort_keys=True)
         super().add_metadata(CHECKSUMS, {"content": content, "crc32": f"{zlib.crc32(content.encode()):08x}"})
         super().finish()
-

@@ -277,9 +277,7 @@ def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Mes
     )
 
 
-def _check_heads(
-    head: NDArray[np.void], kept: ChannelChecksums | None, topic: str, *, where: str
-) -> ChannelChecksums:
+def _check_heads(head: NDArray[np.void], kept: ChannelChecksums | None, topic: str, *, where: str) -> ChannelChecksums:
     """The channel's checksums, once its heads, in file order, agree with them."""
     if kept is None or kept.count != len(head):
         count = "no" if kept is None else str(kept.count)
@@ -290,9 +288,7 @@ def _check_heads(
     return kept
 
 
-def check_parts(
-    parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str
-) -> None:
+def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str) -> None:
     """Hold the payloads of consecutive messages from index `first` against their checksums, where there are any.
 
     Of a channel with one checksum, `parts` are all messages.

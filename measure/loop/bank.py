@@ -209,7 +209,9 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
         name for name, kind in kinds.items()
         if content[name].dtype.kind not in kind or content[name].shape[:1] != (segments,)
     ]  # fmt: skip
-    single = all(content[name].size == 1 and content[name].dtype.kind in "biuf" for name in ("duration", "anchors_told"))
+    single = all(
+        content[name].size == 1 and content[name].dtype.kind in "biuf" for name in ("duration", "anchors_told")
+    )
     if wrong or not segments or not single:
         raise CorruptError(
             f"its arrays do not fit one another: {', '.join(wrong) or 'recording, duration or anchors_told'}",

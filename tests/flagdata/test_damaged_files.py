@@ -30,7 +30,7 @@ from flagdata.record import Record, RecordWriter, salvage
 from flagdata.signals import Sensor, WindSeries
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from damage import QUICK, changed, damaged, damages, paths, wild  # noqa: E402
+from damage import QUICK, changed, damaged, damages, paths, wild
 
 START = 1_767_225_600_000_000_000
 GRID = np.stack([np.repeat(np.arange(3.0), 3), np.tile(np.arange(3.0), 3)], axis=1)

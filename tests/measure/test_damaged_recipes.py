@@ -32,7 +32,7 @@ from sim.render.prior import read as read_prior
 from sim.run.reading import parse as parse_scene
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from damage import QUICK, changed, damaged, damages, paths, wild  # noqa: E402
+from damage import QUICK, changed, damaged, damages, paths, wild
 
 CATALOGS = Path(__file__).parents[2] / "catalogs"
 SECONDS = 5.0
@@ -222,7 +222,7 @@ def arrays() -> dict[str, np.ndarray]:
     """The arrays of a batch of two segments, by their names; of other columns than this version's."""
     rows = np.zeros((2, 3))
     return {
-        **{name: rows for name in bank._SEGMENTS}, "recording": np.arange(2), "columns": np.array(["a", "b"]),
+        **dict.fromkeys(bank._SEGMENTS, rows), "recording": np.arange(2), "columns": np.array(["a", "b"]),
         "cloth": np.array(["x", "y"]), "duration": np.array(1.0), "anchors_told": np.array(True),
     }  # fmt: skip
 

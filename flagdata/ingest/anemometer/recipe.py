@@ -14,7 +14,6 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -393,5 +392,7 @@ class _Reader:
         if isinstance(value, int) and value < 1:
             raise InputError(f"column number {value}", where=where, fix="columns are counted from 1")
         if isinstance(value, int) and value > COLUMNS_LIMIT:
-            raise InputError(f"column number {str(value)[:20]}", where=where, fix=f"at most {COLUMNS_LIMIT} columns are read")
+            raise InputError(
+                f"column number {str(value)[:20]}", where=where, fix=f"at most {COLUMNS_LIMIT} columns are read"
+            )
         return value
