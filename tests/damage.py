@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 QUICK = settings(
-    max_examples=int(__import__("os").environ.get("EX","40")), deadline=None, derandomize="EX" not in __import__("os").environ,
+    max_examples=40, deadline=None, derandomize=True,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )  # fmt: skip
 

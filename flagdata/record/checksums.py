@@ -1,8 +1,8 @@
 """The checksums of a record: one for each frame, for each channel and for each metadata record.
 
 The object's hash says whether a whole file is as it was written; these say it of the part that is read, so that every
-reader can check what it uses. They are CRC-32 (ISO 3309, as in MCAP itself), kept in the metadata record "flagdata.checksums":
-`content` is a JSON document and `crc32` its own checksum in hexadecimal. The document maps each topic to
+reader can check what it uses. They are CRC-32 (ISO 3309, as in MCAP itself), kept in the metadata record
+"flagdata.checksums": `content` is a JSON document and `crc32` its own checksum in hexadecimal. It maps each topic to
 
     count      how many messages the channel has
     heads      over channel id, sequence number, log time and publish time of all its messages, in file order

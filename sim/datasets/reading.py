@@ -72,7 +72,8 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     sessions = _sessions(top.table("sessions")) if "sessions" in top else None
     recipe = DatasetRecipe(
         name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
-        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer, simulation=_simulation(top.table("simulation"), folder),
+        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer,
+        simulation=_simulation(top.table("simulation"), folder),
         prior=_prior(render), sessions=sessions,
         photos=None if photos is None else folder / photos, sides=_sides(top.table("sides"), sessions),
         camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),

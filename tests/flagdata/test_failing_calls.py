@@ -97,17 +97,18 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., dict
         [sys.executable, str(HERE / "failing_worker.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         env=environment,
     ) as server:  # fmt: skip
-        assert server.stdin is not None
-        assert server.stdout is not None
+        tasks, answers = server.stdin, server.stdout
+        assert tasks is not None
+        assert answers is not None
 
         def run(folder: Path, arguments: list[str], *, call: int, error: int, stays: bool) -> dict[str, Any]:
             task = {"arguments": arguments, "call": call, "error": error, "stays": stays, "folder": str(folder)}
-            server.stdin.write(json.dumps(task) + "\n")
-            server.stdin.flush()
-            return json.loads(server.stdout.readline())
+            tasks.write(json.dumps(task) + "\n")
+            tasks.flush()
+            return json.loads(answers.readline())
 
         yield run
-        server.stdin.close()
+        tasks.close()
 
 
 @pytest.mark.parametrize("name", COMMANDS)

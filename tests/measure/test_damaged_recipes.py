@@ -68,7 +68,7 @@ def experiment(text: str, folder: Path) -> object:
 
 
 def first(folder: str) -> str:
-    return sorted((CATALOGS / folder).glob("*.toml"))[0].read_text()
+    return min((CATALOGS / folder).glob("*.toml")).read_text()
 
 
 FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
