@@ -24,7 +24,7 @@ def run(task: dict[str, object], folder: Path) -> int:
         os.dup2(os.open(folder / name, os.O_CREAT | os.O_WRONLY | os.O_TRUNC), stream)
     counted = os.open(folder / "calls", os.O_CREAT | os.O_RDWR | os.O_TRUNC)
     os.ftruncate(counted, 8)
-    faulthandler.dump_traceback_later(30, exit=True)
+    faulthandler.dump_traceback_later(300, exit=True)
     code = 70
     library.failing_arm(ctypes.c_long(int(str(task["call"]))), int(str(task["error"])), int(bool(task["stays"])))
     try:
