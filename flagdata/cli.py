@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from importlib import import_module
 
 import click
 
-from flagdata.console import document, fail
-from flagdata.errors import FlagdataError, UnknownNameError, UsageError
+from flagdata.console import document, fail, foreseen
+from flagdata.errors import UnknownNameError, UsageError
 
 # verb → (where its click command is, one line of help shown without importing it)
 VERBS: dict[str, tuple[str, str]] = {
@@ -69,9 +70,20 @@ class LazyGroup(click.Group):
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--debug", is_flag=True, envvar="FLAGDATA_DEBUG", help="Show the traceback of an error; also FLAGDATA_DEBUG."
+)
 @click.version_option(package_name="flagdata")
-def root() -> None:
+@click.pass_context
+def root(context: click.Context, debug: bool) -> None:
     """Measure the physics of cloth in the wind from video and anemometer logs."""
+    context.call_on_close(lambda: _show_traceback() if debug else None)
+
+
+def _show_traceback() -> None:
+    """Of the error that ends the command, if one does."""
+    if sys.exc_info()[0] not in (None, SystemExit, click.exceptions.Exit):
+        traceback.print_exc()
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -79,8 +91,6 @@ def main(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     try:
         outcome = root.main(args=given, prog_name="flagdata", standalone_mode=False)
-    except FlagdataError as error:
-        sys.exit(fail(error, as_json="--json" in given))
     except click.ClickException as error:
         if "--json" in given:
             document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})
@@ -89,6 +99,8 @@ def main(arguments: list[str] | None = None) -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("flagdata: interrupted", err=True)
         sys.exit(1)
+    except Exception as error:  # noqa: BLE001  whatever it is, a user is told in one form
+        sys.exit(fail(foreseen(error), as_json="--json" in given))
     sys.exit(outcome if isinstance(outcome, int) else 0)  # an int is what a command gave to Context.exit
 
 

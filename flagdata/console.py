@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from flagdata.errors import FlagdataError
+from flagdata.errors import FlagdataError, LimitError, UnforeseenError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -30,12 +32,25 @@ def lake_option(command: F) -> F:
 
 def document(tag: str, content: Mapping[str, Any]) -> None:
     """Print one JSON document, tagged "flagdata.<tag>/1"."""
-    click.echo(json.dumps({"schema": f"flagdata.{tag}/1", **content}, indent=2, allow_nan=False, ensure_ascii=False))
+    tagged = {"schema": f"flagdata.{tag}/1", **content}
+    text = json.dumps(tagged, indent=2, allow_nan=False, ensure_ascii=False)
+    if not is_text(text):  # a file's name of bytes that are not UTF-8
+        text = json.dumps(tagged, indent=2, allow_nan=False)
+    click.echo(text)
+
+
+def is_text(text: str) -> bool:
+    """Whether it can be written as UTF-8; file names may not."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def say(text: str) -> None:
-    """A line for people, on stderr."""
-    click.echo(text, err=True)
+    """A line for people, on stderr; bytes of a file's name that are no UTF-8 are escaped."""
+    click.echo(text.encode(errors="backslashreplace").decode(), err=True)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -68,6 +83,38 @@ def progress(total: int | None, *, label: str, unit: str) -> Iterator[Callable[[
             bar.update(count)
 
         yield advance
+
+
+def foreseen(error: Exception) -> FlagdataError:
+    """What a user is told of any exception that reached the command line."""
+    if isinstance(error, FlagdataError):
+        return error
+    if isinstance(error, OSError) and error.errno is not None:
+        return FlagdataError(
+            f"the system refused: {error.strerror or error}", where=None if error.filename is None
+            else str(error.filename), fix="check that the file is there, its permissions and the space on the disk",
+        )  # fmt: skip
+    if isinstance(error, MemoryError):
+        return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")
+    frames = traceback.extract_tb(error.__traceback__)
+    places = [place for frame in frames if (place := _own_place(frame)) is not None]
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return UnforeseenError(
+        f"unforeseen error: {what[:300]}",
+        where=places[-1] if places else None,
+        fix="this is a defect of flagdata: please report it, with what --debug before the command's name says",
+    )
+
+
+_HOUSE = Path(__file__).resolve().parents[1]
+
+
+def _own_place(frame: traceback.FrameSummary) -> str | None:
+    """File and line within the packages of this project; `None` elsewhere."""
+    path = Path(frame.filename)
+    if not path.is_relative_to(_HOUSE) or "site-packages" in path.relative_to(_HOUSE).parts:
+        return None
+    return f"{path.relative_to(_HOUSE)}, line {frame.lineno}"
 
 
 def fail(error: FlagdataError, *, as_json: bool) -> int:

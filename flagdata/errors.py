@@ -83,6 +83,12 @@ class RefusedError(FlagdataError):
     exit_code = 3
 
 
+class UnforeseenError(FlagdataError):
+    """A defect of flagdata: an exception that nothing turned into one of these."""
+
+    kind = "unforeseen"
+
+
 class UsageError(FlagdataError):
     """Options or arguments that do not fit together."""
 

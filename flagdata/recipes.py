@@ -7,14 +7,19 @@ names the user's own file in its place.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from flagdata.errors import InputError, NotFoundError, UnknownNameError
+from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
 
 _SUFFIX = ".toml"
+SIZE_LIMIT = 64 << 20
+"""Largest recipe that is read [B]; a model's mesh is in its own."""
+NESTING_LIMIT = 100
+"""Most tables and lists within one another."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,9 +107,37 @@ def parsed(text: str, *, where: str) -> dict[str, Any]:
     """The tables of a recipe's text.
 
     Raises:
-        InputError: it is not TOML.
+        InputError: it is not TOML, or holds a whole number of thousands of digits.
+        LimitError: larger than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
     """
+    if len(text) > SIZE_LIMIT:
+        raise LimitError(f"a recipe of {len(text)} characters", where=where, fix=f"at most {SIZE_LIMIT} are read")
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        content = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, ValueError) as error:  # Python itself refuses numbers of very many digits
         raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
+    except RecursionError:
+        raise _nested(where) from None
+    _check_depth(content, where=where)
+    return content
+
+
+def _check_depth(content: Any, *, where: str) -> None:
+    level: list[Any] = [content]
+    for _ in range(NESTING_LIMIT):
+        level = [item for value in level for item in _inside(value)]
+        if not level:
+            return
+    raise _nested(where)
+
+
+def _inside(value: Any) -> Iterable[Any]:
+    if isinstance(value, dict):
+        return value.values()
+    return value if isinstance(value, list) else ()
+
+
+def _nested(where: str) -> LimitError:
+    return LimitError(
+        f"tables or lists more than {NESTING_LIMIT} deep", where=where, fix="no recipe needs more than a few levels"
+    )

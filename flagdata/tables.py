@@ -8,9 +8,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, TypeAlias, TypeVar
 
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError, LimitError, UnknownNameError
 
 E = TypeVar("E", bound=StrEnum)
+WHOLE_LIMIT = 1_000_000
+"""Most of anything that a recipe counts, where no other limit is named."""
+SEED_LIMIT = 2**63 - 1
+"""Largest seed."""
 
 
 class Scale(StrEnum):
@@ -67,7 +71,7 @@ class Table:
 
     def __init__(self, content: Any, *, where: str) -> None:
         if not isinstance(content, Mapping):
-            raise InputError(f"{content!r} is not a table", where=where, fix="write it as [table] with keys")
+            raise InputError(f"{_shown(content)} is not a table", where=where, fix="write it as [table] with keys")
         self._content = content
         self._asked: set[str] = set()
         self.where = where
@@ -101,15 +105,23 @@ class Table:
 
     def number(self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf) -> float:
         value = self._take(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if not _finite(value):
             raise self._wrong(key, value, "a finite number")
         self._bound(key, float(value), least=least, above=above)
         return float(value)
 
-    def whole(self, key: str, default: int, *, least: int) -> int:
+    def whole(self, key: str, default: int, *, least: int, most: int = WHOLE_LIMIT) -> int:
+        """A whole number.
+
+        Raises:
+            InputError: another value, or one below `least`.
+            LimitError: one above `most`.
+        """
         value = self._take(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise self._wrong(key, value, f"a whole number of at least {least}")
+        if value > most:
+            raise LimitError(f"{key} is {_shown(value)}", where=self.where, fix=f"give at most {most}")
         return value
 
     def value(self, key: str) -> Any:
@@ -137,9 +149,7 @@ class Table:
 
     def numbers(self, key: str) -> tuple[float, ...]:
         value = self._take(key, [])
-        if not isinstance(value, list) or not all(
-            isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item) for item in value
-        ):
+        if not isinstance(value, list) or not all(_finite(item) for item in value):
             raise self._wrong(key, value, "a list of finite numbers")
         return tuple(float(item) for item in value)
 
@@ -214,7 +224,7 @@ class Table:
             raise self._wrong(key, value, f"a number of at most {most:g}" if value > most else f"a number {lower}")
 
     def _wrong(self, key: str, value: Any, wanted: str) -> InputError:
-        return InputError(f"{key} is {value!r}", where=self.where, fix=f"give {wanted}")
+        return InputError(f"{key} is {_shown(value)}", where=self.where, fix=f"give {wanted}")
 
 
 def _index(value: Any) -> bool:
@@ -222,4 +232,16 @@ def _index(value: Any) -> bool:
 
 
 def _finite(value: Any) -> bool:
-    return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    try:
+        return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond any float
+        return False
+
+
+def _shown(value: Any) -> str:
+    """The value as the recipe has it; of a long one, its beginning."""
+    text = repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+
+
+_SHOWN = 60

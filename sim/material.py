@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -69,7 +70,7 @@ class Material:
     def _table(self, values: ArrayLike, shape: tuple[int, int], what: str) -> NDArray[np.float64]:
         try:
             table = np.array(values, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise self._error(f"{what} is not a table of numbers", f"give {shape[0]} rows of {shape[1]}") from error
         if table.shape != shape:
             raise self._error(f"{what} has shape {table.shape}", f"give {shape[0]} rows of {shape[1]}")
@@ -96,7 +97,7 @@ class Material:
         if missing:
             raise InputError(f"keys missing: {', '.join(missing)}", where=where, fix="add them")
         numbers = {key: content[key] for key in ("density", "damping") if key in content}
-        wrong = [key for key, value in numbers.items() if isinstance(value, bool) or not isinstance(value, int | float)]
+        wrong = [key for key, value in numbers.items() if not _is_number(value)]
         if wrong:
             raise InputError(f"{', '.join(wrong)} must be a number", where=where, fix="write it without quotes")
         return cls(
@@ -122,6 +123,10 @@ class Material:
     def thickened(self, factor: float) -> Material:
         """`factor` layers as one: density, stretching and bending multiplied together (ArcSim's `thicken`)."""
         return self.scaled(density=factor, stretching=factor, bending=factor)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def isotropic(

@@ -26,6 +26,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical, code_version, recipe_hash
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
+from flagdata.record.parent import open_parent
 from flagdata.schema import Kind
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS, iso
@@ -63,6 +64,7 @@ class Pair:
 
     Raises:
         UsageError: artifacts of other kinds.
+        CorruptError: a record that is not what was written, now or when its damaged part is read.
     """
 
     camera: Artifact
@@ -83,7 +85,7 @@ class Pair:
                     fix="flagdata align CAMERA WIND takes a camera artifact, then a wind artifact; see flagdata ls",
                 )
             artifacts.append(artifact)
-        records = [Record.open(lake.object_path(str(artifact.object))) for artifact in artifacts]
+        records = [open_parent(lake, str(artifact.object)) for artifact in artifacts]
         return cls(camera=artifacts[0], wind=artifacts[1], camera_record=records[0], wind_record=records[1])
 
     @property

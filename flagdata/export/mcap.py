@@ -19,13 +19,13 @@ from types import TracebackType
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from mcap.writer import CompressionType, Writer
 
 from flagdata.dataset.truth import HISTORY
 from flagdata.errors import CorruptError
 from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.record import Coding, messages
-from flagdata.record.container import Messages, open_file, read_exact, read_messages, read_summary
+from flagdata.record.checksums import ChecksummedWriter
+from flagdata.record.container import Messages, check_parts, open_file, read_exact, read_messages, read_summary
 from flagdata.record.video import is_key
 from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
@@ -73,6 +73,10 @@ class _Original:
             topic: read_messages(self._file, self.summary, topic, where=self._where)
             for topic in sorted(self.summary.channels)
         }
+        for topic, table in self.messages.items():
+            if table.checksum is not None:
+                parts = [self._read(topic, index) for index in range(len(table))]
+                check_parts(parts, table, topic, first=0, where=self._where)
 
     def __enter__(self) -> Self:
         return self
@@ -95,7 +99,17 @@ class _Original:
         raise CorruptError(f"no key frame up to frame {frame}", where=self._where, fix="run flagdata verify")
 
     def data(self, topic: str, index: int) -> bytes:
-        """The payload of one message."""
+        """The payload of one message.
+
+        Raises:
+            CorruptError: it has changed since it was written.
+        """
+        part = self._read(topic, index)
+        if self.messages[topic].checksums is not None:
+            check_parts([part], self.messages[topic], topic, first=index, where=self._where)
+        return part
+
+    def _read(self, topic: str, index: int) -> bytes:
         table = self.messages[topic]
         return read_exact(self._file, int(table.length[index]), int(table.offset[index]), where=self._where)
 
@@ -103,7 +117,7 @@ class _Original:
 def _cut(entry: Entry, original: _Original, target: Path) -> None:
     first = original.decodable_from(entry.first) if entry.record.coding is Coding.H264 else entry.first
     with target.open("xb") as sink:
-        writer = Writer(sink, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE, enable_data_crcs=True)
+        writer = ChecksummedWriter(sink, chunk_size=CHUNK_BYTES)
         writer.start(profile=PROFILE, library=f"flagdata format {entry.row['format_version']}")
         for name, values in entry.record.metadata.items():
             writer.add_metadata(name, dict(values))
@@ -144,7 +158,7 @@ def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tupl
         yield names[topic_of[k]], index_of[k]
 
 
-def _register(writer: Writer, original: _Original, topic: str) -> int:
+def _register(writer: ChecksummedWriter, original: _Original, topic: str) -> int:
     channel = original.summary.channels[topic]
     schema = original.summary.schemas.get(channel.schema_id)
     known = 0 if schema is None else writer.register_schema(schema.name, schema.encoding, schema.data)

@@ -35,7 +35,7 @@ from deltalake.exceptions import CommitFailedError, DeltaError
 from deltalake.transaction import AddAction, RemoveAction
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
-from flagdata.lake.durable import flush_file, flush_folder
+from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
@@ -166,7 +166,7 @@ class Catalog:
 
     @_one_at_a_time
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
-        """Publish `rows` as version `base + 1`; durable when it returns.
+        """Publish `rows` as version `base + 1`; durable when it returns, or a warning says that it may not be.
 
         Raises:
             Moved: `base` is no longer the newest version; nothing was published.
@@ -202,7 +202,10 @@ class Catalog:
             return
         version = self.head()
         table = self._writable(version)
-        table.create_checkpoint()
+        try:
+            table.create_checkpoint()
+        except DeltaError as error:
+            raise OSError(str(error)) from error
         flush_file(self._log / f"{version:020d}{_CHECKPOINT}")
         if (hint := self._log / _HINT).exists():
             flush_file(hint)
@@ -284,12 +287,14 @@ class Catalog:
                 commit_properties=_properties({**info, **self._hashes(version, path)}),
                 post_commithook_properties=_HOOKS,
             )
-        except CommitFailedError:
-            path.unlink()
-            raise Moved from None
-        except DeltaError as error:
-            raise OSError(str(error)) from error
-        self._flush_log(version)
+        except DeltaError as error:  # which may come after the entry was put
+            if not self._entries.adds(version, path.name):
+                if isinstance(error, CommitFailedError):
+                    path.unlink()
+                    raise Moved from None
+                raise OSError(str(error)) from error
+        with confirming(f"version {version}", self._entries.path(version)):
+            self._flush_log(version)
 
     def _hashes(self, version: int, path: Path) -> dict[str, str]:
         hashes = {FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1))}
@@ -309,6 +314,9 @@ class Catalog:
             if self._table is None or self._table.version() != version:
                 self._table = DeltaTable(self.path.as_uri(), version=version)
         except DeltaError as error:
+            if _SYSTEM_ERROR in str(error):
+                with disk_errors("reading the catalog", self._log):
+                    raise OSError(str(error).splitlines()[0]) from error
             self._entries.files()  # raises, where an entry is to blame
             first = str(error).splitlines()[0]  # without the Delta library's stack
             restore = "restore the folder from a copy"
@@ -368,6 +376,8 @@ class Catalog:
             )
         except CommitFailedError:
             raise Moved from None
+        except DeltaError as error:
+            raise OSError(str(error)) from error
         self._flush_log(version)
 
     def _flush_log(self, version: int) -> None:
@@ -378,6 +388,7 @@ class Catalog:
 
 _CHECKPOINT = ".checkpoint.parquet"
 _HINT = "_last_checkpoint"
+_SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _HOOKS = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
 
 

@@ -1,16 +1,23 @@
-"""Writing that survives a crash: flush file, then folder; put a file only if its name is free."""
+"""Writing that survives a crash: flush file, then folder; put a file only if its name is free.
+
+Once a name is public nothing takes it back: what the disk refuses after that is a warning (the logger "flagdata"),
+never an error, since who is told of an error believes that nothing was published.
+"""
 
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import re
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from flagdata.errors import FlagdataError
+
+_LOG = logging.getLogger("flagdata")
 
 
 def flush_file(path: Path) -> None:
@@ -31,19 +38,40 @@ def put_if_absent(path: Path, data: bytes) -> bool:
     """Create `path` with all of `data`, or leave what is there; False when the name was taken.
 
     The bytes are written and flushed beside it under another name, then linked: the name appears whole or not at all.
+
+    Raises:
+        OSError: what the disk refused; the name was not taken.
     """
     scratch = path.with_name(f".{uuid.uuid4().hex}")
     try:
         scratch.write_bytes(data)
         flush_file(scratch)
-        try:
-            os.link(scratch, path)
-        except FileExistsError:
-            return False
-    finally:
+        os.link(scratch, path)
+    except FileExistsError:
         scratch.unlink(missing_ok=True)
-    flush_folder(path.parent)
+        return False
+    except BaseException:
+        with suppress(OSError):  # what is left is a collection's
+            scratch.unlink(missing_ok=True)
+        raise
+    with confirming(f"the file {path.name}", path):
+        flush_folder(path.parent)
+    with confirming(f"the file {path.name}", path):
+        scratch.unlink(missing_ok=True)
     return True
+
+
+@contextmanager
+def confirming(what: str, where: Path) -> Iterator[None]:
+    """Work on `what` after it was published: what the disk refuses is a warning, since it stays published."""
+    try:
+        yield
+    except OSError as error:
+        _LOG.warning(
+            "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: %s\n  fix:   %s",
+            what, " ".join((error.strerror or str(error)).split()), error.filename or where,
+            "check the disk, then run flagdata doctor: until it confirms, a power cut may lose it",
+        )  # fmt: skip
 
 
 @contextmanager
@@ -71,7 +99,7 @@ _FIXES = {
     errno.ENOSPC: "free some space, or move the lake to a larger disk",
     errno.EDQUOT: "free some space, or ask for a larger quota",
     errno.EFBIG: "raise the file size limit (ulimit -f)",
-    errno.EACCES: "give yourself write permission on the lake's folder",
-    errno.EPERM: "give yourself write permission on the lake's folder",
+    errno.EACCES: "give yourself read and write permission on the lake's folder",
+    errno.EPERM: "give yourself read and write permission on the lake's folder",
     errno.EROFS: "mount the disk writable",
 }

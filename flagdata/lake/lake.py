@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import uuid
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import cast
@@ -28,6 +30,7 @@ from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
+_UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
 
 
 class Lake:
@@ -86,7 +89,8 @@ class Lake:
         lake = cls(_usable(path))
         marker = lake.path / _MARKER
         try:
-            content = json.loads(marker.read_text())
+            with _readable(marker):
+                content = json.loads(marker.read_text())
             version = int(content["format_version"])
         except (FileNotFoundError, NotADirectoryError):
             raise NotFoundError(
@@ -274,8 +278,29 @@ class Lake:
         return {e["commit"]: (e["version"], e["branch"]) for e in self.catalog.history() if "commit" in e}
 
 
+@contextmanager
+def _readable(marker: Path) -> Iterator[None]:
+    """What the system refuses, but that the marker is absent, is a clear error."""
+    try:
+        yield
+    except (FileNotFoundError, NotADirectoryError):
+        raise
+    except OSError:
+        with disk_errors("opening the lake", marker):
+            raise
+
+
 def _usable(path: Path | str) -> Path:
-    whole = Path(path).resolve()
+    try:
+        whole = Path(path).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
+        raise UsageError(f"not a path: {error}", where=repr(str(path)), fix="name another folder") from None
+    if _UNUSABLE.search(str(whole)):
+        raise UsageError(
+            "the path of a lake cannot have a backslash, or a byte that is not UTF-8",
+            where=str(whole).encode(errors="backslashreplace").decode(),
+            fix="rename the folder",
+        )
     if unquote(str(whole)) != str(whole):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
         raise UsageError(
             "the path of a lake cannot have a percent sign before two hexadecimal digits",

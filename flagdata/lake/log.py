@@ -102,6 +102,13 @@ class Log:
                 noted[version - 1] = previous
         return [self.path(v) for v in sorted(present & noted.keys()) if file_hash(self.path(v)) != noted[v]]
 
+    def adds(self, version: int, name: str) -> bool:
+        """Whether there is an entry of `version` and it adds the file `name`."""
+        try:
+            return name in self._content(version)[0]
+        except (OSError, CorruptError):
+            return False
+
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""
         try:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, InputError
-from flagdata.lake.meshes import write_array
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.meshes import check_format, read_part, store_errors, write_array
 from flagdata.provenance import canonical
 
 MARKERS_FORMAT = 1
@@ -74,22 +75,24 @@ def write_markers(path: Path, sequence: MarkerSequence) -> None:
 
     Raises:
         ConflictError: something is at `path` already.
+        FlagdataError: no space, no permission.
     """
     import zarr
 
     if path.exists():
         raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
-    group = zarr.open_group(path, mode="w-", zarr_format=3)
-    attributes = {
-        "Conventions": "CF-1.11",
-        _HEAD: {"format": MARKERS_FORMAT, "tracked": sequence.tracked},
-        "names": list(sequence.names),
-        "attributes": dict(sequence.attributes),
-    }
-    group.update_attributes(json.loads(canonical(attributes)))
-    write_array(group, "time", sequence.time, ("time",))
-    write_array(group, "positions", sequence.positions, ("time", "marker", "xyz"))
-    write_array(group, "rest", sequence.rest, ("marker", "uv"))
+    with disk_errors("writing markers", path):
+        group = zarr.open_group(path, mode="w-", zarr_format=3)
+        attributes = {
+            "Conventions": "CF-1.11",
+            _HEAD: {"format": MARKERS_FORMAT, "tracked": sequence.tracked},
+            "names": list(sequence.names),
+            "attributes": dict(sequence.attributes),
+        }
+        group.update_attributes(json.loads(canonical(attributes)))
+        write_array(group, "time", sequence.time, ("time",))
+        write_array(group, "positions", sequence.positions, ("time", "marker", "xyz"))
+        write_array(group, "rest", sequence.rest, ("marker", "uv"))
 
 
 def read_markers(path: Path) -> MarkerSequence:
@@ -97,30 +100,24 @@ def read_markers(path: Path) -> MarkerSequence:
 
     Raises:
         CorruptError: not such a store, damaged, or of a newer format.
+        LimitError: arrays or chunks larger than the limits of `flagdata.lake.meshes`.
     """
     import zarr
 
     restore = "run flagdata verify; ingest the table again or restore it from a copy"
-    try:
+    with store_errors(path, "the marker store is damaged"):
         group = zarr.open_group(path, mode="r", zarr_format=3)
-        head: Any = group.attrs.get(_HEAD)
-        if not isinstance(head, dict):
-            raise CorruptError("a Zarr store, but not of markers", where=str(path), fix="open it with zarr or xarray")
-        if head["format"] > MARKERS_FORMAT:
-            raise CorruptError(
-                f"its format {head['format']} is newer than this flagdata's, {MARKERS_FORMAT}",
-                where=str(path), fix="install the newer flagdata",
-            )  # fmt: skip
+        head = check_format(group.attrs.get(_HEAD), MARKERS_FORMAT, path, noun="markers")
         attributes: Any = group.attrs["attributes"]
         names: Any = group.attrs["names"]
-        time, positions, rest = (np.asarray(group[name][...]) for name in ("time", "positions", "rest"))  # type: ignore[index]
+        time, positions, rest = (
+            read_part(group, name, None, None, where=str(path)) for name in ("time", "positions", "rest")
+        )
         sequence = MarkerSequence(
             time=time, positions=positions, rest=rest, names=tuple(names), attributes=dict(attributes)
         )
-    except (InputError, KeyError, ValueError, TypeError, OSError, RuntimeError) as error:
-        raise CorruptError(f"the marker store is damaged: {error}", where=str(path), fix=restore) from error
-    if sequence.tracked != head["tracked"]:
+    if sequence.tracked != head.get("tracked"):
         raise CorruptError(
-            f"{sequence.tracked} positions, where {head['tracked']} were tracked", where=str(path), fix=restore
+            f"{sequence.tracked} positions, where {head.get('tracked')} were tracked", where=str(path), fix=restore
         )
     return sequence

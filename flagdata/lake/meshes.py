@@ -18,16 +18,19 @@ Zarr's defaults.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import ConflictError, CorruptError, InputError
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, LimitError
+from flagdata.lake.durable import disk_errors
 from flagdata.provenance import canonical
 from flagdata.schema import CHANNELS
 
@@ -36,6 +39,12 @@ if TYPE_CHECKING:
     import zarr
 
 MESHES_FORMAT = 1
+ARRAY_BYTES = 1 << 36
+"""Most bytes of an array that are read at once."""
+CHUNK_BYTES = 1 << 32
+"""Most bytes of a chunk or a shard."""
+CHUNKS = 1 << 22
+"""Most chunks of an array."""
 _CHUNK = 1 << 20  # B
 _CHUNKS_A_SHARD = 64
 _HEAD = "flagdata_meshes"
@@ -148,28 +157,30 @@ def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> Non
 
     Raises:
         ConflictError: something is at `path` already.
+        FlagdataError: no space, no permission.
     """
     import zarr
 
     if path.exists():
         raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
     ragged = isinstance(sequence, RaggedMeshSequence)
-    group = zarr.open_group(path, mode="w-", zarr_format=3)
-    attributes = {
-        "Conventions": "CF-1.11 UGRID-1.0",
-        _HEAD: {"format": MESHES_FORMAT, "layout": "ragged" if ragged else "fixed"},
-        "attributes": dict(sequence.attributes),
-    }
-    group.update_attributes(json.loads(canonical(attributes)))
-    write_array(group, "time", sequence.time, ("time",))
-    if ragged:
-        write_array(group, "positions", sequence.positions, ("vertex", "xyz"))
-        write_array(group, "vertex_offset", sequence.vertex_offset, ("edge",))
-        write_array(group, "face_offset", sequence.face_offset, ("edge",))
-    else:
-        write_array(group, "positions", sequence.positions, CHANNELS["positions"].dims)
-    write_array(group, "faces", sequence.faces, CHANNELS["faces"].dims)
-    write_array(group, "rest", sequence.rest, CHANNELS["rest"].dims)
+    with disk_errors("writing meshes", path):
+        group = zarr.open_group(path, mode="w-", zarr_format=3)
+        attributes = {
+            "Conventions": "CF-1.11 UGRID-1.0",
+            _HEAD: {"format": MESHES_FORMAT, "layout": "ragged" if ragged else "fixed"},
+            "attributes": dict(sequence.attributes),
+        }
+        group.update_attributes(json.loads(canonical(attributes)))
+        write_array(group, "time", sequence.time, ("time",))
+        if ragged:
+            write_array(group, "positions", sequence.positions, ("vertex", "xyz"))
+            write_array(group, "vertex_offset", sequence.vertex_offset, ("edge",))
+            write_array(group, "face_offset", sequence.face_offset, ("edge",))
+        else:
+            write_array(group, "positions", sequence.positions, CHANNELS["positions"].dims)
+        write_array(group, "faces", sequence.faces, CHANNELS["faces"].dims)
+        write_array(group, "rest", sequence.rest, CHANNELS["rest"].dims)
 
 
 def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> MeshSequence | RaggedMeshSequence:
@@ -177,33 +188,35 @@ def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> Mesh
 
     Raises:
         CorruptError: not such a store, damaged, or of a newer format.
+        LimitError: arrays or chunks larger than this module's limits.
         InputError: frames that it does not have.
     """
     group = _open(path)
     layout = _layout(group, path)
-    with _damage(path):
-        frames = group["time"].shape[0]  # type: ignore[union-attr]
+    with store_errors(path, _DAMAGED):
+        frames = int(group["time"].shape[0])  # type: ignore[union-attr]
     last = frames if count is None else first + count
     if not 0 <= first < last <= frames:
         raise InputError(f"frames {first} to {last} of {frames}", where=str(path), fix="ask for frames it has")
-    with _damage(path):
-        time = _part(group, "time", first, last)
+    with store_errors(path, _DAMAGED):
+        part = partial(read_part, group, where=str(path))
+        time = part("time", first, last)
         attributes: dict[str, Any] = dict(group.attrs["attributes"])  # type: ignore[arg-type]
         if layout == "fixed":
             return MeshSequence(
                 time=time,
-                positions=_part(group, "positions", first, last),
-                faces=_part(group, "faces", None, None),
-                rest=_part(group, "rest", None, None),
+                positions=part("positions", first, last),
+                faces=part("faces", None, None),
+                rest=part("rest", None, None),
                 attributes=attributes,
             )
-        vertices = _part(group, "vertex_offset", first, last + 1)
-        faces = _part(group, "face_offset", first, last + 1)
+        vertices = part("vertex_offset", first, last + 1)
+        faces = part("face_offset", first, last + 1)
         return RaggedMeshSequence(
             time=time,
-            positions=_part(group, "positions", vertices[0], vertices[-1]),
-            faces=_part(group, "faces", faces[0], faces[-1]),
-            rest=_part(group, "rest", vertices[0], vertices[-1]),
+            positions=part("positions", vertices[0], vertices[-1]),
+            faces=part("faces", faces[0], faces[-1]),
+            rest=part("rest", vertices[0], vertices[-1]),
             vertex_offset=vertices - vertices[0],
             face_offset=faces - faces[0],
             attributes=attributes,
@@ -219,44 +232,86 @@ def open_meshes(path: Path) -> xr.Dataset:
     import xarray as xr
 
     _layout(_open(path), path)
-    return xr.open_zarr(path, consolidated=False, chunks=None)
+    with store_errors(path, _DAMAGED):
+        return xr.open_zarr(path, consolidated=False, chunks=None)
 
 
 _RESTORE = "run flagdata verify; import the sequence again or restore it from a copy"
+_DAMAGED = "the mesh store is damaged"
 
 
 def _open(path: Path) -> zarr.Group:
     import zarr
 
-    try:
+    with store_errors(path, "not a Zarr store"):
         return zarr.open_group(path, mode="r", zarr_format=3)
-    except (FileNotFoundError, ValueError, KeyError) as error:
-        raise CorruptError(f"not a Zarr store: {error}", where=str(path), fix=_RESTORE) from None
 
 
-def _layout(group: zarr.Group, path: Path) -> str:
-    head: Any = group.attrs.get(_HEAD)
-    if not isinstance(head, dict) or head.get("layout") not in ("fixed", "ragged"):
-        raise CorruptError("a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray")
-    if head["format"] > MESHES_FORMAT:
+def check_format(head: Any, known: int, path: Path, *, noun: str) -> dict[str, Any]:
+    """The head of a store of meshes or markers in its attributes, of a format that is known.
+
+    Raises:
+        CorruptError: there is none, or it is of a newer format.
+    """
+    if not isinstance(head, dict) or not isinstance(head.get("format"), int):
+        raise CorruptError(f"a Zarr store, but not of {noun}", where=str(path), fix="open it with zarr or xarray")
+    if head["format"] > known:
         raise CorruptError(
-            f"its format {head['format']} is newer than this flagdata's, {MESHES_FORMAT}",
+            f"its format {head['format']} is newer than this flagdata's, {known}",
             where=str(path),
             fix="install the newer flagdata",
         )
+    return head
+
+
+def _layout(group: zarr.Group, path: Path) -> str:
+    with store_errors(path, "not a Zarr store"):
+        head = check_format(group.attrs.get(_HEAD), MESHES_FORMAT, path, noun="meshes")
+    if head.get("layout") not in ("fixed", "ragged"):
+        raise CorruptError("a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray")
     return head["layout"]
 
 
 @contextmanager
-def _damage(path: Path) -> Iterator[None]:
+def store_errors(path: Path, what: str) -> Iterator[None]:
+    """Whatever a damaged or foreign Zarr store makes its reader raise becomes one error.
+
+    Raises:
+        CorruptError: for any exception inside the block but a LimitError.
+    """
     try:
         yield
-    except (InputError, KeyError, ValueError, OSError, RuntimeError) as error:
-        raise CorruptError(f"the mesh store is damaged: {error}", where=str(path), fix=_RESTORE) from error
+    except (LimitError, CorruptError):
+        raise
+    except FlagdataError as error:
+        raise CorruptError(f"{what}: {error.what}", where=str(path), fix=_RESTORE) from error
+    except Exception as error:
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise CorruptError(f"{what}: {said[:300]}", where=str(path), fix=_RESTORE) from error
 
 
-def _part(group: zarr.Group, name: str, first: int | None, last: int | None) -> NDArray[Any]:
-    return np.asarray(group[name][first:last])  # type: ignore[index]
+def read_part(group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str) -> NDArray[Any]:
+    """Rows `first` to `last` of an array, once its size and its chunks are known to be within the limits.
+
+    Raises:
+        LimitError: more than `ARRAY_BYTES`, `CHUNK_BYTES` or `CHUNKS`.
+        KeyError, TypeError: there is no such array.
+    """
+    import zarr
+
+    array = group[name]
+    if not isinstance(array, zarr.Array):
+        raise TypeError(f"{name} is no array")
+    shape = (len(range(*slice(first, last).indices(array.shape[0]))), *array.shape[1:]) if array.ndim else ()
+    blocks = [array.chunks] if array.shards is None else [array.chunks, array.shards]
+    for what, size, most in (
+        ("bytes", math.prod(shape) * array.dtype.itemsize, ARRAY_BYTES),
+        ("bytes a chunk", max(math.prod(block) for block in blocks) * array.dtype.itemsize, CHUNK_BYTES),
+        ("chunks", math.prod(-(-side // part) for side, part in zip(array.shape, array.chunks, strict=True)), CHUNKS),
+    ):
+        if size > most:
+            raise LimitError(f"{name} has {size} {what}", where=where, fix=f"at most {most} are read")
+    return np.asarray(array[first:last])
 
 
 _ATTRIBUTES: dict[str, dict[str, Any]] = {

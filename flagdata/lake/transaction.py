@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from flagdata.errors import NotFoundError, UsageError
+from flagdata.errors import FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
@@ -86,11 +86,24 @@ class Transaction:
         lease = self._lease
         try:
             if kind is None:
-                with disk_errors("committing", self._lake.catalog.path):
-                    self.result = self._publish()
+                self._commit()
         finally:
             self._held = None
-            lease.close()
+            with suppress(OSError, FlagdataError):  # what is left is a collection's
+                lease.close()
+
+    def _commit(self) -> None:
+        """Publish; once that is done no error of the disk is one of this transaction.
+
+        Raises:
+            FlagdataError: no space, no permission; nothing was published.
+        """
+        with disk_errors("committing", self._lake.catalog.path):
+            try:
+                self.result = self._publish()
+            except OSError:
+                if self.result is None:
+                    raise
 
     def staging(self, suffix: str) -> Path:
         """A fresh path with `suffix` (".mcap", ".zarr", ".model"), nothing at it yet; removed with the transaction."""
@@ -180,7 +193,10 @@ class Transaction:
             }
             with self._lease.keeping_collectors_out():
                 version = self._lake.catalog.append(rows, base=version, info=info)
-            return CommitResult(version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing)
+                self.result = CommitResult(
+                    version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing
+                )
+            return self.result
 
         return persist(attempt, where=self._lake.catalog.path)
 

@@ -1,5 +1,6 @@
 """The MCAP container read by offset: the summary at its end, and where each message of a topic lies. No message is
-decoded here, and no offset is trusted before what it points at has been checked.
+decoded here, no offset is trusted before what it points at has been checked, and no payload is given out before its
+checksum is.
 
 Source: the MCAP specification, https://mcap.dev/spec.
 """
@@ -9,8 +10,8 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
@@ -23,6 +24,7 @@ from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metad
 from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError, InputError, NotFoundError
+from flagdata.record.checksums import CHECKSUMS, FIX, HEAD_BYTES, ChannelChecksums, Checksums, metadata_checksum
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = 9  # opcode, uint64 length
@@ -51,6 +53,8 @@ class Summary:
     """In file order."""
     attachments: tuple[AttachmentIndex, ...]
     metadata: tuple[MetadataIndex, ...]
+    checksums: Checksums | None
+    """`None` in a record that was written before there were any."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +64,16 @@ class Messages:
     Attributes:
         log_time, publish_time: [UTC ns].
         offset, length: of the message's data in the file [B].
+        checksums: (n,) uint32, of each message's data; `None` where the channel has one checksum, or none.
+        checksum: of the data of all messages in file order; `None` where each has its own, or there are none.
     """
 
     log_time: NDArray[np.int64]
     publish_time: NDArray[np.int64]
     offset: NDArray[np.int64]
     length: NDArray[np.int64]
+    checksums: NDArray[np.uint32] | None = None
+    checksum: int | None = None
 
     def __len__(self) -> int:
         return len(self.log_time)
@@ -118,7 +126,16 @@ def read_summary(file: int, *, where: str) -> Summary:
     body = read_exact(file, size - _TAIL - start, start, where=where)
     if zlib.crc32(tail[: _FOOTER.size - 4], zlib.crc32(body)) != checksum:
         raise CorruptError("the checksum of the record's summary is wrong", where=where, fix=_RECOVER)
-    return _summary(body, start, where=where)
+    return _with_checksums(file, _summary(body, start, where=where), where=where)
+
+
+def _with_checksums(file: int, summary: Summary, *, where: str) -> Summary:
+    for entry in summary.metadata:
+        if entry.name == CHECKSUMS:
+            record = _record_at(file, entry.offset, entry.length, Opcode.METADATA, where=where)
+            stored = parse(Metadata.read, record, where=where).metadata
+            return replace(summary, checksums=Checksums.parse(stored, where=where))
+    return summary
 
 
 def _summary(body: bytes, start: int, *, where: str) -> Summary:
@@ -155,6 +172,7 @@ def _summary(body: bytes, start: int, *, where: str) -> Summary:
         chunks=tuple(sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)),
         attachments=tuple(attachments),
         metadata=tuple(metadata),
+        checksums=None,
     )
 
 
@@ -204,7 +222,7 @@ def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Mes
     """Where each message of `topic` lies; every head is read and held against the index. None if the topic is absent.
 
     Raises:
-        CorruptError: an index that does not fit the messages.
+        CorruptError: an index that does not fit the messages, or heads that have changed since they were written.
         InputError: compressed chunks, whose messages have no place in the file.
     """
     channel = summary.channels.get(topic)
@@ -245,13 +263,71 @@ def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Mes
         raise CorruptError(
             f"message {bad} of {topic} is not where the index says", where=f"{where}, byte {place[bad]}", fix=_RECOVER
         )
+    kept = None
+    if summary.checksums is not None:
+        kept = _check_heads(head, summary.checksums.channels.get(topic), topic, where=where)
     order = np.argsort(time, kind="stable")
     return Messages(
         log_time=time[order],
         publish_time=head["publish"].astype(np.int64)[order],
         offset=(place + MESSAGE_HEAD)[order],
         length=length[order],
+        checksums=None if kept is None or kept.messages is None else kept.messages[order],
+        checksum=None if kept is None else kept.data,
     )
+
+
+def _check_heads(head: NDArray[np.void], kept: ChannelChecksums | None, topic: str, *, where: str) -> ChannelChecksums:
+    """The channel's checksums, once its heads, in file order, agree with them."""
+    if kept is None or kept.count != len(head):
+        count = "no" if kept is None else str(kept.count)
+        raise CorruptError(f"{topic} has {len(head)} messages, and {count} checksums", where=where, fix=FIX)
+    whole = np.frombuffer(head.tobytes(), dtype=np.uint8).reshape(len(head), MESSAGE_HEAD)
+    if zlib.crc32(np.ascontiguousarray(whole[:, MESSAGE_HEAD - HEAD_BYTES :]).tobytes()) != kept.heads:
+        raise CorruptError(f"the times of {topic} have changed since they were written", where=where, fix=FIX)
+    return kept
+
+
+def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str) -> None:
+    """Hold the payloads of consecutive messages from index `first` against their checksums, where there are any.
+
+    Of a channel with one checksum, `parts` are all messages.
+
+    Raises:
+        CorruptError: one that has changed since it was written.
+    """
+    if table.checksums is not None:
+        for index, part in enumerate(parts, start=first):
+            if zlib.crc32(part) != table.checksums[index]:
+                raise CorruptError(
+                    f"message {index} of {topic} has changed since it was written: its checksum is wrong",
+                    where=f"{where}, byte {table.offset[index]}", fix=FIX,
+                )  # fmt: skip
+    elif table.checksum is not None:
+        total = 0
+        for index in np.argsort(table.offset, kind="stable").tolist():
+            total = zlib.crc32(parts[index], total)
+        if total != table.checksum:
+            raise CorruptError(
+                f"{topic} has changed since it was written: its checksum is wrong",
+                where=f"{where}, bytes {table.offset.min()} to {(table.offset + table.length).max()}", fix=FIX,
+            )  # fmt: skip
+
+
+def check_chunk(file: int, chunk: ChunkIndex, *, where: str) -> None:
+    """Hold the records of an uncompressed chunk against the chunk's own checksum, where it has one.
+
+    Raises:
+        CorruptError: they have changed since they were written.
+    """
+    start = data_start(chunk)
+    head = read_exact(file, start - chunk.chunk_start_offset, chunk.chunk_start_offset, where=where)
+    (checksum,) = struct.unpack_from("<I", head, RECORD_HEAD + 24)  # after the two times and the size
+    if checksum and zlib.crc32(read_exact(file, chunk.compressed_size, start, where=where)) != checksum:
+        raise CorruptError(
+            "a chunk has changed since it was written: its checksum is wrong",
+            where=f"{where}, bytes {start} to {start + chunk.compressed_size}", fix=FIX,
+        )  # fmt: skip
 
 
 def _empty() -> NDArray[np.int64]:
@@ -272,15 +348,26 @@ def _message_index(
 
 
 def read_metadata(file: int, summary: Summary, *, where: str) -> dict[str, dict[str, str]]:
-    """All metadata records, by name.
+    """All metadata records but the checksums, by name.
 
     Raises:
-        CorruptError: not what the summary says.
+        CorruptError: not what the summary says, or changed since they were written.
     """
     found: dict[str, dict[str, str]] = {}
+    kept = None if summary.checksums is None else summary.checksums.metadata
     for entry in summary.metadata:
+        if entry.name == CHECKSUMS:
+            continue
         record = _record_at(file, entry.offset, entry.length, Opcode.METADATA, where=where)
-        found[entry.name] = parse(Metadata.read, record, where=where).metadata
+        content = parse(Metadata.read, record, where=where)
+        if kept is not None and (
+            content.name != entry.name or kept.get(entry.name) != metadata_checksum(content.metadata)
+        ):
+            raise CorruptError(
+                f"the metadata {entry.name!r} has changed since it was written: its checksum is wrong",
+                where=f"{where}, byte {entry.offset}", fix=FIX,
+            )  # fmt: skip
+        found[entry.name] = content.metadata
     return found
 
 

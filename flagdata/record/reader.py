@@ -1,4 +1,8 @@
-"""Reads a record: frames straight from their place in the file, wind, parameters, metadata and attachments."""
+"""Reads a record: frames straight from their place in the file, wind, parameters, metadata and attachments.
+
+Nothing is given out that has changed since it was written: frames, channels and metadata are held against the record's
+checksums; in a record without any, whole chunks against MCAP's own, once each.
+"""
 
 from __future__ import annotations
 
@@ -41,6 +45,7 @@ class Record:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._sound: set[int] = set()  # indices of the chunks that were checked
 
     @classmethod
     def open(cls, path: Path) -> Record:
@@ -55,7 +60,7 @@ class Record:
         return record
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"path": self.path}
+        return {"path": self.path, "_sound": set()}
 
     def __repr__(self) -> str:
         return f"Record({str(self.path)!r})"
@@ -74,6 +79,11 @@ class Record:
     def metadata(self) -> Mapping[str, Mapping[str, str]]:
         """The metadata records by name."""
         return container.read_metadata(self._file, self._summary, where=str(self.path))
+
+    @property
+    def has_checksums(self) -> bool:
+        """Whether frames, channels and metadata have checksums of their own; old records have those of chunks only."""
+        return self._summary.checksums is not None
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -157,9 +167,17 @@ class Record:
         return [bytes(picture) for picture in self._payloads(first, count)]
 
     def timestamps(self, first: int, count: int) -> NDArray[np.int64]:
-        """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages."""
+        """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages.
+
+        Raises:
+            NotFoundError: the record has no such frames.
+            CorruptError: a frame that cannot be decoded.
+        """
         kind = _CODINGS[self.coding]
-        decoded = [kind.FromString(bytes(part)) for part in self._read(self._frames, first, count)]
+        try:
+            decoded = [kind.FromString(bytes(part)) for part in self._read(TOPIC_IMAGE, self._frames, first, count)]
+        except DecodeError as error:
+            raise CorruptError(f"{TOPIC_IMAGE}: {error}", where=str(self.path), fix=_VERIFY) from None
         return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
 
     def wind(self) -> WindSeries | None:
@@ -250,9 +268,26 @@ class Record:
 
     def _payloads(self, first: int, count: int) -> list[memoryview]:
         field = messages.data_field(_CODINGS[self.coding])
-        return [messages.payload(part, field=field) for part in self._read(self._frames, first, count)]
+        parts = self._read(TOPIC_IMAGE, self._frames, first, count)
+        return [messages.payload(part, field=field) for part in parts]
 
-    def _read(self, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
+    def _read(self, topic: str, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
+        """The payloads of consecutive messages, checked; of any channel but that of the frames, all its messages."""
+        parts = self._parts(table, first, count)
+        if self.has_checksums:
+            container.check_parts(parts, table, topic, first=first, where=str(self.path))
+        else:
+            self._check_chunks(table.offset[first : first + count])
+        return parts
+
+    def _check_chunks(self, offsets: NDArray[np.int64]) -> None:
+        starts = np.array([chunk.chunk_start_offset for chunk in self._summary.chunks], dtype=np.int64)
+        for index in np.unique(np.searchsorted(starts, offsets, side="right") - 1).tolist():
+            if index not in self._sound:
+                container.check_chunk(self._file, self._summary.chunks[index], where=str(self.path))
+                self._sound.add(index)
+
+    def _parts(self, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
         if count < 1 or first < 0:
             raise UsageError(f"{count} frames from {first} were asked for", fix="ask for at least one, from 0 or later")
         if first + count > len(table):
@@ -279,7 +314,7 @@ class Record:
                 fix=f"write it as {kind.DESCRIPTOR.full_name}",
             )
         try:
-            return [kind.FromString(bytes(part)) for part in self._read(table, 0, len(table))]
+            return [kind.FromString(bytes(part)) for part in self._read(topic, table, 0, len(table))]
         except DecodeError as error:
             raise CorruptError(f"{topic}: {error}", where=str(self.path), fix=_VERIFY) from None
 

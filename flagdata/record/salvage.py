@@ -24,11 +24,11 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
-from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.record import messages
+from flagdata.record.checksums import CHECKSUMS, ChecksummedWriter
 from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, open_file, parse, read_summary
 from flagdata.record.metadata import SALVAGE
 from flagdata.record.output import Output
@@ -118,9 +118,7 @@ class _Copy:
         self._channels: dict[int, tuple[Channel, int]] = {}
         self._unknown = 0
         self._salvaged = 0
-        self._writer = Writer(
-            out, chunk_size=CHUNK_BYTES[Chunking.COMMITTED], compression=CompressionType.NONE, enable_data_crcs=True
-        )
+        self._writer = ChecksummedWriter(out, chunk_size=CHUNK_BYTES[Chunking.COMMITTED])
         self._writer.start(profile=PROFILE, library=library_name())
 
     def find(self, kind: str, severity: Severity, what: str, *, where: str | None = None, count: int = 1) -> None:
@@ -174,6 +172,8 @@ class _Copy:
         )
 
     def metadata(self, metadata: Metadata) -> None:
+        if metadata.name == CHECKSUMS:
+            return  # of what was there; what is written has its own
         self._salvaged += metadata.name.startswith(SALVAGE)
         self._writer.add_metadata(metadata.name, metadata.metadata)
 

@@ -14,13 +14,13 @@ from typing import Any, Self
 import numpy as np
 import simplejpeg
 from mcap.well_known import MessageEncoding, SchemaEncoding
-from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
 from flagdata.align.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.ingest.anemometer.averaging import average
 from flagdata.record import messages
+from flagdata.record.checksums import CHECKSUMS, ChecksummedWriter
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
 from flagdata.record.output import Output
 from flagdata.record.video import VideoEncoder, is_key
@@ -98,12 +98,7 @@ class RecordWriter:
         self._coding = coding
         self._video: VideoEncoder | None = None
         self._stream = Output(path)
-        self._writer = Writer(
-            self._stream,
-            chunk_size=CHUNK_BYTES[chunking],
-            compression=CompressionType.NONE,
-            enable_data_crcs=True,
-        )
+        self._writer = ChecksummedWriter(self._stream, chunk_size=CHUNK_BYTES[chunking])
         self._writer.start(profile=PROFILE, library=library_name())
         self._names: set[str] = set()
         self._channels: dict[str, int] = {}
@@ -241,7 +236,7 @@ class RecordWriter:
         return self._video.encode(image)
 
     def _metadata(self, name: str, values: Mapping[str, str]) -> None:
-        if name in self._names:
+        if name in self._names or name == CHECKSUMS:
             raise ConflictError(f"metadata {name!r} is there already", where=str(self.path), fix="write it once")
         self._names.add(name)
         self._writer.add_metadata(name, dict(values))

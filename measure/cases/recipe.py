@@ -10,13 +10,17 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import nan
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, LimitError, UnknownNameError
 from flagdata.recipes import Shelf, parsed
-from flagdata.tables import Table
+from flagdata.tables import SEED_LIMIT, Table
 from measure.cases.limit_cycle import StripRun
 from measure.cases.sheet import Sheet
 
 CASES = Shelf(folder="cases", noun="case")
+COLUMNS_LIMIT = 1000
+"""Most cells along the strip."""
+FRAMES_LIMIT = 1_000_000
+"""Most frames of a strip's simulation, those that settle included."""
 
 
 class Group(StrEnum):
@@ -124,7 +128,7 @@ def parse_case(text: str, *, where: str) -> Case:
     clips, thresholds, declared = top.table("clips"), top.table("thresholds"), top.table("declared")
     simulation = top.table("simulation")
     whole = camera.texts("whole")
-    specs = []
+    specs: list[ClipSpec] = []
     for group in Group:
         table = clips.table(group.value)
         specs += [
@@ -133,7 +137,7 @@ def parse_case(text: str, *, where: str) -> Case:
     case = Case(
         name=top.text("name", where) or where,
         about=top.text("about", "") or "",
-        seed=top.whole("seed", 1, least=0),
+        seed=top.whole("seed", 1, least=0, most=SEED_LIMIT),
         sheet=Sheet(
             length=sheet.number("length", nan, above=0),
             mass=sheet.number("mass", nan, above=0),
@@ -158,7 +162,7 @@ def parse_case(text: str, *, where: str) -> Case:
         pair_lifts=simulation.numbers("pair-lifts"),
         speeds=simulation.numbers("speeds"),
         run=StripRun(
-            columns=simulation.whole("columns", 24, least=4),
+            columns=simulation.whole("columns", 24, least=4, most=COLUMNS_LIMIT),
             stretching=simulation.number("stretching", 300.0, above=0),
             settle=simulation.number("settle", 1.0, least=0),
             duration=simulation.number("duration", 1.0, above=0),
@@ -166,4 +170,18 @@ def parse_case(text: str, *, where: str) -> Case:
     )
     for table in (sheet, air, camera, clips, thresholds, declared, simulation, top):
         table.done()
+    for name in whole:
+        if name not in {spec.name for spec in specs}:
+            raise UnknownNameError.of("clip", name, [spec.name for spec in specs], where=f"{where} [camera] whole")
+    if not any(clip.whole for clip in case.of(Group.HELD_OUT)):
+        raise InputError(
+            "no clip that is held out shows the whole sheet, and the report needs one", where=f"{where} [camera]",
+            fix="name in `whole` a clip of [clips.held-out]",
+        )  # fmt: skip
+    frames = case.run.rate * (case.run.settle + case.run.duration)
+    if frames > FRAMES_LIMIT:
+        raise LimitError(
+            f"a simulation of {frames:.3g} frames", where=f"{where} [simulation]",
+            fix=f"have at most {FRAMES_LIMIT}: shorten settle or duration",
+        )  # fmt: skip
     return case

@@ -20,13 +20,17 @@ from enum import StrEnum
 from math import lcm
 from typing import Any
 
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError, LimitError, UnknownNameError
 from flagdata.recipes import Shelf, parsed
 from flagdata.registry import Registry
 from flagdata.tables import Range, Table
 from sim import material
 
 CHALLENGES = Shelf(folder="challenges", noun="challenge")
+CELLS_LIMIT = 100_000
+"""Most cells of a mesh, and most markers."""
+TICKS_LIMIT = 10_000_000
+"""Most instants of a recording, at the rate that all its rates divide."""
 
 
 class Kind(StrEnum):
@@ -134,6 +138,14 @@ class ChallengeRecipe:
                 raise InputError(f"too few effects for sets of kind {kind.value}", where=self.title, fix="add some")
         if not sum(self.composition.values()) > 0:
             raise InputError("every share is zero", where=self.title, fix="give a share above 0")
+        cells = max(numerics.columns * numerics.rows for numerics in self.numerics.values())
+        ticks = (self.settle + self.duration) * self.ticks
+        for what, number, most in (
+            ("markers", self.marker_columns * self.marker_rows, CELLS_LIMIT), ("cells of a mesh", cells, CELLS_LIMIT),
+            ("instants of a recording, at the rate that all rates divide", ticks, TICKS_LIMIT),
+        ):  # fmt: skip
+            if number > most:
+                raise LimitError(f"{number:.3g} {what}", where=self.title, fix=f"have at most {most}")
 
     @property
     def ticks(self) -> int:

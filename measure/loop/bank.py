@@ -7,6 +7,7 @@ a design: an amortised null.
 from __future__ import annotations
 
 import math
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from io import BytesIO
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from flagdata.errors import CorruptError, NotFoundError, UsageError
+from flagdata.errors import CorruptError, LimitError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
 from measure.loop.columns import THETA, Calibration, Column, library, motions
@@ -36,6 +37,13 @@ WINDS = 4
 by the cloth, so that few cloths of many numerics say more than many of few."""
 _KEPT = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"}
 """What batches of older versions lack, some of it or all."""
+_SEGMENTS = (
+    "recording", "r", "response", "error", "marker_error", "lines", "speeds", "offsets", "noise", "period", "cloth",
+    "turned", "turning", "moment", "course", "course_curvature",
+)  # fmt: skip
+"""Arrays with a row for each segment."""
+FILE_LIMIT = 4 << 30
+"""Largest batch that is read, unpacked [B]."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
 Progress = Callable[[int], object]
 
@@ -177,6 +185,48 @@ def _file(folder: Path, index: int) -> Path:
     return folder / f"nulls-{index:04d}.npz"
 
 
+def _content(path: Path) -> Mapping[str, np.ndarray]:
+    """What a file of a bank holds, each of the batch's segments in all its arrays."""
+    rebuild = "delete it and build the bank again"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > FILE_LIMIT:
+            raise LimitError(f"a batch of nulls of {size} bytes", where=str(path), fix=f"at most {FILE_LIMIT} are read")
+        with np.load(path, allow_pickle=False) as stored:
+            content = {name: np.asarray(stored[name]) for name in stored.files}
+    except LimitError:
+        raise
+    except Exception as error:  # noqa: BLE001  zip, zlib and numpy each raise errors of their own kinds
+        raise CorruptError(f"not a batch of nulls: {error}", where=str(path), fix=rebuild) from None
+    if not set(content) >= {*_KEPT, *_SEGMENTS, "columns", "duration"}:
+        raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
+    if tuple(content["columns"].ravel().tolist()) != names():
+        raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
+    segments = content["recording"].size
+    kinds = {name: "U" if name == "cloth" else "biuf" for name in _SEGMENTS}
+    wrong = [
+        name for name, kind in kinds.items()
+        if content[name].dtype.kind not in kind or content[name].shape[:1] != (segments,)
+    ]  # fmt: skip
+    single = all(
+        content[name].size == 1 and content[name].dtype.kind in "biuf" for name in ("duration", "anchors_told")
+    )
+    if wrong or not segments or not single:
+        raise CorruptError(
+            f"its arrays do not fit one another: {', '.join(wrong) or 'recording, duration or anchors_told'}",
+            where=str(path), fix=rebuild,
+        )  # fmt: skip
+    return content
+
+
+def _number(path: Path) -> int:
+    number = path.stem.partition("-")[2]
+    if not number.isdecimal():
+        raise CorruptError("not a file of a bank", where=str(path), fix="move it out of the folder")
+    return int(number)
+
+
 def load(folder: Path, *, words: str) -> NullBank:
     """The bank of a folder.
 
@@ -193,15 +243,7 @@ def load(folder: Path, *, words: str) -> NullBank:
     told: set[bool] = set()
     count = 0
     for path in paths:
-        try:
-            with np.load(path) as stored:
-                content: Mapping[str, np.ndarray] = {name: stored[name] for name in stored.files}
-        except (OSError, ValueError, EOFError) as error:
-            raise CorruptError(
-                f"not a batch of nulls: {error}", where=str(path), fix="delete it and build again"
-            ) from error
-        if tuple(content["columns"]) != names() or not set(content) >= _KEPT:
-            raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
+        content = _content(path)
         own = Statistics(
             recording=content["recording"] + count, r=content["r"], response=content["response"],
             error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
@@ -211,7 +253,7 @@ def load(folder: Path, *, words: str) -> NullBank:
             ),
             course=Course(score=content["course"], curvature=content["course_curvature"]),
         )  # fmt: skip
-        numerics = np.full(len(own.r), int(path.stem.split("-")[1]))
+        numerics = np.full(len(own.r), _number(path))
         parts.append(
             Nulls(
                 statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics,

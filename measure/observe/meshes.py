@@ -67,6 +67,7 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, ma
             f"a {artifact.kind.value}, not a mesh sequence", where=f"artifact {artifact.id}",
             fix="name a mesh sequence; flagdata ls lists them",
         )  # fmt: skip
+    lake.objects.check(artifact.object)  # damage must not be measured
     sequence = read_meshes(lake.object_path(artifact.object))
     seen = from_sequence(sequence, name=name or artifact.name, markers=markers)
     first = sequence.frame(0).rest.astype(np.float64)

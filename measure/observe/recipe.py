@@ -20,9 +20,9 @@ All values are SI and radians. What a recording's own description says may be le
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from flagdata import timebase
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
@@ -31,6 +31,7 @@ from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
+from flagdata.recipes import Found, parsed
 from flagdata.schema import Kind
 from flagdata.tables import Table
 from measure.observe import markers, meshes, wind
@@ -126,10 +127,7 @@ def parse(path: Path) -> ExperimentRecipe:
     """
     if not path.is_file():
         raise NotFoundError("no such recipe file", where=str(path), fix="check the path")
-    try:
-        top = Table(tomllib.loads(path.read_text(encoding="utf-8")), where=str(path))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
+    top = Table(_parsed_file(path), where=str(path))
     folder = path.parent
     test = top.table("test")
     recipe = ExperimentRecipe(
@@ -231,10 +229,12 @@ def _material_file(path: Path) -> Material:
         return read_material(path)
     if not path.is_file():
         raise NotFoundError("no such material file", where=str(path), fix="check the path")
-    try:
-        return Material.from_mapping(tomllib.loads(path.read_text(encoding="utf-8")), name=path.stem)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=str(path), fix="correct the file") from None
+    return Material.from_mapping(_parsed_file(path), name=path.stem)
+
+
+def _parsed_file(path: Path) -> dict[str, Any]:
+    found = Found(name=path.stem, data=path.read_bytes(), folder=path.parent, where=str(path))
+    return parsed(found.text, where=str(path))
 
 
 def _recording(table: Table, folder: Path) -> RecordingSource:

@@ -16,7 +16,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.lake import Artifact, Lake
-from flagdata.record import Record
+from flagdata.record.parent import open_parent
 from flagdata.schema import UNUSABLE, Kind
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS, iso
@@ -118,7 +118,7 @@ def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tu
     where = f"artifact {artifact.id}"
     if artifact.kind not in (Kind.WIND, Kind.RECORDING) or artifact.object is None:
         raise InputError(f"a {artifact.kind.value} holds no wind", where=where, fix="name a wind or recording artifact")
-    series = Record.open(lake.object_path(artifact.object)).wind()
+    series = open_parent(lake, artifact.object).wind()
     if series is None:
         raise InputError("the record has no wind", where=where, fix="name a wind artifact")
     return track(series, placement, where=where)

@@ -20,11 +20,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
 from flagdata.record.writer import Coding
 from flagdata.schema import TRUTH_WINDOW
-from flagdata.tables import Quantity, Table
+from flagdata.tables import SEED_LIMIT, Quantity, Table
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from sim.effects.effect import FlowEffect, WindEffect
@@ -37,6 +37,10 @@ from sim.run import load as load_simulation
 
 DATASETS = Shelf(folder="datasets", noun="data set")
 SIDES = ("train", "validation", "test")
+_SIZE_LIMIT = 16_384
+"""Most pixels of a side, and samples of a pixel."""
+SAMPLES_LIMIT = 10_000_000
+"""Most samples of a recording's anemometer."""
 _SIZES = ("width", "height", "raster_samples", "cycles_samples")
 
 
@@ -70,7 +74,8 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     sessions = _sessions(top.table("sessions")) if "sessions" in top else None
     recipe = DatasetRecipe(
         name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
-        seed=top.whole("seed", 0, least=0), renderer=renderer, simulation=_simulation(top.table("simulation"), folder),
+        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer,
+        simulation=_simulation(top.table("simulation"), folder),
         prior=_prior(render), sessions=sessions,
         photos=None if photos is None else folder / photos, sides=_sides(top.table("sides"), sessions),
         camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),
@@ -110,7 +115,7 @@ def _prior(table: Table) -> RenderPrior:
     for key in _SIZES:
         spelled = key.replace("_", "-")
         if spelled in table:
-            changes[key] = float(table.whole(spelled, 1, least=1))
+            changes[key] = float(table.whole(spelled, 1, least=1, most=_SIZE_LIMIT))
     table.done()
     return priors.named(name).with_quantities(changes, source=table.where)
 
@@ -188,6 +193,12 @@ def _check(recipe: DatasetRecipe, *, where: str) -> None:
     if not recipe.licence:
         raise InputError("no licence", where=where, fix='say how the data may be used: licence = "CC-BY-4.0"')
     time, anemometer = recipe.simulation.time, recipe.anemometer
+    samples = anemometer.rate * (anemometer.before + time.settle + time.frames / time.rate)
+    if samples > SAMPLES_LIMIT:
+        raise LimitError(
+            f"an anemometer of {samples:.3g} samples a recording", where=where,
+            fix=f"have at most {SAMPLES_LIMIT}: lower its rate, or `before`",
+        )  # fmt: skip
     known = time.settle if changing(recipe.simulation) else anemometer.before
     if anemometer.truth is Truth.MEASURED and known < TRUTH_WINDOW:
         raise UsageError(

@@ -1,4 +1,8 @@
-"""Compiles kernels once for a machine and keeps them in the user's cache folder."""
+"""Compiles kernels once for a machine and keeps them in the user's cache folder.
+
+A library is code that this process will run, so it is loaded only if nobody but the user (or root) could have written
+it, the folder it lies in, or a folder above that it could be replaced through.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +12,14 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import subprocess
 import tempfile
 import warnings
 from importlib.resources import files
 from pathlib import Path
+
+from flagdata.errors import UsageError
 
 _FLAGS = (
     "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC", "-Wno-psabi",
@@ -48,6 +55,9 @@ def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.
     Args:
         sources: file names; the first is compiled and includes the others.
         without: what it means for the user that it is not there.
+
+    Raises:
+        UsageError: another user could have written the library, or a folder that it lies in.
     """
     path = compiler()
     if path is None:
@@ -74,9 +84,11 @@ def _built(path: str, package: str, names: tuple[str, ...]) -> Path:
     ).hexdigest()[:20]
     folder = cache_folder()
     target = folder / f"{Path(names[0]).stem}-{name}.so"
+    _make(folder)
+    check_owned(folder)
     if target.exists():
+        check_owned(target)
         return target
-    folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         code, made = Path(scratch) / names[0], Path(scratch) / "made.so"
         for part, text in sources.items():
@@ -84,6 +96,47 @@ def _built(path: str, package: str, names: tuple[str, ...]) -> Path:
         subprocess.run([path, *_FLAGS, "-o", str(made), str(code)], capture_output=True, check=True, text=True)
         made.replace(target)  # atomic: several processes may build at once
     return target
+
+
+def _make(folder: Path) -> None:
+    """The folder and those above it that are missing, for the user alone."""
+    for part in (*reversed(folder.parents), folder):
+        if not part.exists():
+            part.mkdir(mode=0o700, exist_ok=True)
+
+
+def check_owned(path: Path) -> None:
+    """Whether only this user and root could have written a library, or what lies in a folder.
+
+    Raises:
+        UsageError: another user owns it or may write to it, or owns or may write to a folder above it; in folders
+            above, a sticky bit keeps others from replacing what is not theirs.
+    """
+    whole = path.resolve()
+    for part in (whole, *whole.parents):
+        found = part.stat()
+        sticky = part != whole and part.is_dir() and bool(found.st_mode & stat.S_ISVTX)
+        foreign = found.st_uid not in (os.getuid(), 0)
+        writable = bool(found.st_mode & stat.S_IWOTH) or (
+            bool(found.st_mode & stat.S_IWGRP) and not _alone(found.st_gid)
+        )
+        if foreign or (writable and not sticky):
+            raise UsageError(
+                f"another user could have written the compiled kernels in {str(cache_folder())!r}", where=str(part),
+                fix="set FLAGDATA_CACHE to a folder that only you can write (chmod go-w), on a path of such folders",
+            )  # fmt: skip
+
+
+def _alone(group: int) -> bool:
+    """Whether the group is the user's own, with nobody else in it."""
+    import grp
+    import pwd
+
+    try:
+        user, found = pwd.getpwuid(os.getuid()).pw_name, grp.getgrgid(group)
+    except KeyError:
+        return False
+    return found.gr_name == user and set(found.gr_mem) <= {user}
 
 
 def _processor() -> bytes:

@@ -33,7 +33,7 @@ from typing import Any
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed
-from flagdata.tables import Quantity, Range, Table
+from flagdata.tables import SEED_LIMIT, Quantity, Range, Table
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
@@ -109,8 +109,9 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     bounds = given and given.limits
     limits = _limits(top.table("limits"), bounds, integrator) if bounds is not None or "limits" in top else None
     recipe = Recipe(
-        name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0),
-        count=top.whole("count", 1, least=1), batch=top.whole("batch", 16, least=1), precision=precision,
+        name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
+        count=top.whole("count", 1, least=1), batch=top.whole("batch", 16, least=1),
+        precision=precision,
         scene=scene, material=_material(top.table("material"), folder, scene), wind=_wind(top.table("wind"), scene),
         contact=contact, limits=limits, integrator=integrator, time=_time(top.table("time")),
         effects=_effects(top.table("effects")),

@@ -13,6 +13,7 @@ from typing import Any
 
 import torch
 
+from flagdata.errors import LimitError
 from flagdata.provenance import canonical, digest
 from flagdata.tables import Quantity, plain
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
@@ -24,6 +25,14 @@ from sim.limits import StrainLimits
 from sim.material import Material
 from sim.tables import Evaluation
 
+MEMBERS_LIMIT = 1_000_000
+"""Most members of a recipe, and of a batch."""
+FRAMES_LIMIT = 10_000_000
+"""Most frames of a member, those that settle included."""
+VERTICES_LIMIT = 1_000_000
+"""Most vertices of a cloth."""
+BATCH_BYTES_LIMIT = 64 << 30
+"""Most bytes of the positions that a batch keeps."""
 DTYPES: Mapping[str, torch.dtype] = {"float32": torch.float32, "float64": torch.float64}
 
 
@@ -94,6 +103,16 @@ class SceneSpec:
     given: GivenCloth | None = None
     content: str = ""
 
+    @property
+    def vertices(self) -> float:
+        """About how many the mesh will have; endless where one side is as good as none."""
+        if self.given is not None:
+            return len(self.given.rest)
+        if self.arcsim is not None:
+            return len(self.arcsim.scene.mesh.rest)
+        rows = max(1.0, self.columns * self.height / self.width) if self.width > 0 else math.inf
+        return (self.columns + 1) * (rows + 1)
+
 
 @dataclass(frozen=True, kw_only=True)
 class MaterialSpec:
@@ -155,6 +174,13 @@ class TimeSpec:
         """Frames that are not kept: as many as cover `settle`."""
         return math.ceil(self.settle * self.rate - 1e-9)
 
+    def __post_init__(self) -> None:
+        if not self.settle * self.rate + self.frames <= FRAMES_LIMIT:
+            raise LimitError(
+                f"{self.frames} frames after {self.settle:g} s at {self.rate:g} Hz", where="[time]",
+                fix=f"have at most {FRAMES_LIMIT} frames in all",
+            )  # fmt: skip
+
     @property
     def total(self) -> int:
         """Frames in all."""
@@ -181,6 +207,9 @@ class Recipe:
         limits: as of `sim.scene.Scene`.
         precision: of the arithmetic, a name of `DTYPES`.
         model: artifact of the lake that the recipe was read from; empty for none.
+
+    Raises:
+        LimitError: more than one of this module's limits.
     """
 
     name: str
@@ -198,6 +227,23 @@ class Recipe:
     time: TimeSpec
     effects: Mapping[str, EffectSpec]
     model: str = ""
+
+    def __post_init__(self) -> None:
+        for what, number in (("members", self.count), ("members a batch", self.batch)):
+            if number > MEMBERS_LIMIT:
+                raise LimitError(f"{number} {what}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}")
+        vertices = self.scene.vertices
+        if vertices > VERTICES_LIMIT:
+            raise LimitError(
+                f"a mesh of {vertices:.3g} vertices", where=f"{self.name} [scene]",
+                fix=f"have at most {VERTICES_LIMIT}: lower columns, or mind the ratio of width and height",
+            )  # fmt: skip
+        size = 12 * vertices * self.time.frames * min(self.batch, self.count)
+        if size > BATCH_BYTES_LIMIT:
+            raise LimitError(
+                f"a batch that keeps {size:.3g} bytes of positions", where=self.name,
+                fix=f"have at most {BATCH_BYTES_LIMIT}: fewer members a batch, frames or columns",
+            )  # fmt: skip
 
     @property
     def dtype(self) -> torch.dtype:

@@ -14,7 +14,7 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
@@ -33,6 +33,8 @@ T = TypeVar("T")
 SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "|": "|", "space": " "}
+COLUMNS_LIMIT = 10_000
+"""Highest number of a column."""
 MISSING = ("", "-", "--", "---", "nan", "na", "n/a", "null", "none", "***")
 """Spellings of "no value" that every recipe knows, lower-case."""
 
@@ -373,7 +375,8 @@ class _Reader:
         value = table.get(key, default)
         if value is default:
             return default
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not abs(value) <= sys.float_info.max:
             raise InputError(f"{key} = {value!r} is not a number", where=self.where, fix="give a finite number")
         return float(value)
 
@@ -388,4 +391,8 @@ class _Reader:
             raise InputError(f"column {value!r} is neither a name nor a number", where=where, fix="correct it")
         if isinstance(value, int) and value < 1:
             raise InputError(f"column number {value}", where=where, fix="columns are counted from 1")
+        if isinstance(value, int) and value > COLUMNS_LIMIT:
+            raise InputError(
+                f"column number {str(value)[:20]}", where=where, fix=f"at most {COLUMNS_LIMIT} columns are read"
+            )
         return value

@@ -8,7 +8,8 @@ position is empty, says that the marker was not tracked. Other columns are refus
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,7 @@ POSITIONS_LIMIT = 50_000_000
 _SAME = 1e-6  # of a marker's own u and v: differences that are no difference
 _MAGIC = b"PAR1"
 _DELIMITERS = (",", ";", "\t")
+_FOOTER_LIMIT = 1 << 24  # B, and entries, of a Parquet footer's parts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +121,8 @@ def _is_parquet(path: Path) -> bool:
 
 def _columns(path: Path) -> list[str]:
     if _is_parquet(path):
-        return list(pyarrow.parquet.read_schema(path).names)
+        with _table_errors(path):
+            return list(_parquet(path).schema_arrow.names)
     with path.open("rb") as stream:
         line = stream.readline(1 << 16).decode("utf-8-sig", "replace").strip()
     return [name.strip().strip('"') for name in line.split(_delimiter(line))]
@@ -151,7 +154,11 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
     wanted = pa.schema([(name, pa.string() if name in texts else pa.float64()) for name in names])
     try:
         if _is_parquet(path):
-            return pyarrow.parquet.read_table(path).select(names).cast(wanted)
+            with _table_errors(path):
+                file = _parquet(path)
+                table = pa.concat_tables(file.read_row_group(i, columns=names) for i in range(file.num_row_groups))
+                table.validate(full=True)  # text that is not UTF-8, for one
+                return table.select(names).cast(wanted)
         with path.open("rb") as stream:
             delimiter = _delimiter(stream.readline(1 << 16).decode("utf-8-sig", "replace"))
         return pyarrow.csv.read_csv(
@@ -166,6 +173,38 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
             f"not a table of numbers: {str(error).splitlines()[0]}", where=str(path),
             fix="write numbers with a decimal point, and leave cells empty that have none",
         ) from None  # fmt: skip
+
+
+def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
+    """A Parquet file whose pages' checksums are compared, where it has any.
+
+    Raises:
+        LimitError: it says that it unpacks to more than `SIZE_LIMIT`, or has more rows than `POSITIONS_LIMIT`.
+    """
+    file = pyarrow.parquet.ParquetFile(
+        path, page_checksum_verification=True, thrift_string_size_limit=_FOOTER_LIMIT,
+        thrift_container_size_limit=_FOOTER_LIMIT,
+    )  # fmt: skip
+    groups = [file.metadata.row_group(index) for index in range(file.num_row_groups)]
+    rows, size = sum(group.num_rows for group in groups), sum(group.total_byte_size for group in groups)
+    if rows > POSITIONS_LIMIT or size > SIZE_LIMIT:
+        raise LimitError(
+            f"a table of {rows} rows and {size} bytes unpacked", where=str(path),
+            fix=f"at most {POSITIONS_LIMIT} rows and {SIZE_LIMIT} bytes are read",
+        )  # fmt: skip
+    return file
+
+
+@contextmanager
+def _table_errors(path: Path) -> Iterator[None]:
+    """Whatever a damaged Parquet file makes its reader raise becomes one error."""
+    try:
+        yield
+    except (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError, KeyError) as error:
+        what = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(
+            f"the Parquet file cannot be read: {what}", where=str(path), fix="export the table again"
+        ) from None
 
 
 def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequence:

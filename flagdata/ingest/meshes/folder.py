@@ -35,6 +35,8 @@ def read_json(path: Path) -> dict[str, Any]:
     bare = re.sub(r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text)
     try:
         content = json.loads(bare)
+    except RecursionError:
+        raise InputError("lists or objects nested too deep", where=str(path), fix="correct the file") from None
     except ValueError as error:
         raise InputError(f"not JSON: {error}", where=str(path), fix="correct the file") from None
     if not isinstance(content, dict):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError, LimitError, UnknownNameError
 from measure.cases.kept import kept
 from measure.cases.recipe import Group, load_case, parse_case
 
@@ -24,6 +24,7 @@ density = 1.1
 true-rate = 1000.0
 column-scale = 1e-4
 row-scale = 1e-4
+whole = ["b"]
 [clips]
 fit = { a = 7.0 }
 held-out = { b = 8.0 }
@@ -51,6 +52,8 @@ def test_a_case_that_is_not_there_and_a_key_that_is_not_known_are_named() -> Non
         load_case("paper-flga")
     with pytest.raises(UnknownNameError, match="did you mean 'density'"):
         parse_case(TEXT.replace("[air]", "[air]\ndensty = 1.0"), where="small")
+    with pytest.raises(UnknownNameError, match="clip 'c'"):
+        parse_case(TEXT.replace('["b"]', '["b", "c"]'), where="small")
 
 
 @pytest.mark.parametrize(
@@ -60,11 +63,14 @@ def test_a_case_that_is_not_there_and_a_key_that_is_not_known_are_named() -> Non
         ("{ b = 8.0 }", "{ a = 8.0 }", "two groups"),
         ("mass = 0.08", "mass = -1", "above 0"),
         ("[air]", "[air", "not TOML"),
+        ('["b"]', '["a"]', "no clip that is held out shows the whole sheet"),
+        ("[simulation]", "[simulation]\nduration = 1e9", "frames"),
+        ("[simulation]", "[simulation]\ncolumns = 1000000000", "columns is 1000000000"),
     ],
 )
 def test_a_case_that_contradicts_itself_is_refused(before: str, after: str, what: str) -> None:
     assert parse_case(TEXT, where="small").name == "small"
-    with pytest.raises(InputError, match=what):
+    with pytest.raises((InputError, LimitError), match=what):
         parse_case(TEXT.replace(before, after), where="small")
 
 

@@ -1,0 +1,161 @@
+"""The checksums of a record: one for each frame, for each channel and for each metadata record.
+
+The object's hash says whether a whole file is as it was written; these say it of the part that is read, so that every
+reader can check what it uses. They are CRC-32 (ISO 3309, as in MCAP itself), kept in the metadata record
+"flagdata.checksums": `content` is a JSON document and `crc32` its own checksum in hexadecimal. It maps each topic to
+
+    count      how many messages the channel has
+    heads      over channel id, sequence number, log time and publish time of all its messages, in file order
+    data       over the payloads of all its messages, in file order; not of frames
+    messages   over the payload of each message, eight hexadecimal digits each, in file order; of frames only
+
+and each metadata record's name to the checksum of its content. Attachments and the summary have those of MCAP.
+Records that were written before there were checksums have none.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import IO, Any
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError
+from flagdata.schema import TOPIC_IMAGE
+
+CHECKSUMS = "flagdata.checksums"
+"""Name of the metadata record."""
+SCHEMA = "flagdata.checksums/1"
+FIX = "restore it from a copy, or ingest the source again; flagdata verify lists all that is damaged"
+_HEAD = struct.Struct("<HIQQ")
+HEAD_BYTES = _HEAD.size
+"""Bytes of a message's head that `heads` covers: all but the record's opcode and length."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelChecksums:
+    """The checksums of one channel.
+
+    Attributes:
+        count: messages of the channel.
+        heads: of their heads.
+        data: of their payloads together; `None` where each has its own.
+        messages: (count,) uint32, of each payload; `None` where they have one together.
+    """
+
+    count: int
+    heads: int
+    data: int | None
+    messages: NDArray[np.uint32] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checksums:
+    """All checksums of a record: channels by topic, metadata records by name."""
+
+    channels: Mapping[str, ChannelChecksums]
+    metadata: Mapping[str, int]
+
+    @classmethod
+    def parse(cls, stored: Mapping[str, str], *, where: str) -> Checksums:
+        """The checksums that a metadata record holds.
+
+        Raises:
+            CorruptError: they are damaged themselves.
+        """
+        try:
+            content = stored["content"].encode()
+            if zlib.crc32(content) != int(stored["crc32"], 16):
+                raise ValueError("their own checksum is wrong")
+            document = json.loads(content)
+            if document["schema"] != SCHEMA:
+                raise ValueError(f"they are of {document['schema']!r}, which this version does not know")
+            channels = {topic: _channel(entry) for topic, entry in document["channels"].items()}
+            metadata = {name: int(value) for name, value in document["metadata"].items()}
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise CorruptError(f"the record's checksums cannot be read: {error}", where=where, fix=FIX) from None
+        return cls(channels=channels, metadata=metadata)
+
+
+def _channel(entry: Mapping[str, Any]) -> ChannelChecksums:
+    messages = None
+    if "messages" in entry:
+        messages = np.frombuffer(bytes.fromhex(entry["messages"]), dtype=">u4").astype(np.uint32)
+        if len(messages) != entry["count"]:
+            raise ValueError(f"{len(messages)} checksums of {entry['count']} messages")
+    return ChannelChecksums(
+        count=int(entry["count"]), heads=int(entry["heads"]), data=entry.get("data"), messages=messages
+    )
+
+
+def metadata_checksum(values: Mapping[str, str]) -> int:
+    """Of the content of a metadata record."""
+    return zlib.crc32(json.dumps(values, sort_keys=True, ensure_ascii=True).encode())
+
+
+class _Tally:
+    """The checksums of a channel that is being written."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self._count = self._heads = self._data = 0
+        self._messages: list[int] | None = [] if topic == TOPIC_IMAGE else None
+
+    def add(self, head: bytes, data: bytes) -> None:
+        self._count += 1
+        self._heads = zlib.crc32(head, self._heads)
+        if self._messages is None:
+            self._data = zlib.crc32(data, self._data)
+        else:
+            self._messages.append(zlib.crc32(data))
+
+    def as_dict(self) -> dict[str, Any]:
+        entry: dict[str, Any] = {"count": self._count, "heads": self._heads}
+        if self._messages is None:
+            return {**entry, "data": self._data}
+        return {**entry, "messages": np.array(self._messages, dtype=">u4").tobytes().hex()}
+
+
+class ChecksummedWriter(Writer):
+    """MCAP's writer, with plain chunks and the checksums of all that it wrote as its last metadata record.
+
+    Args:
+        output: the open file.
+        chunk_size: bytes after which a chunk is closed.
+    """
+
+    def __init__(self, output: IO[bytes], *, chunk_size: int) -> None:
+        super().__init__(output, chunk_size=chunk_size, compression=CompressionType.NONE, enable_data_crcs=True)
+        self._tallies: dict[int, _Tally] = {}
+        self._metadata: dict[str, int] = {}
+
+    def register_channel(
+        self, topic: str, message_encoding: str, schema_id: int, metadata: dict[str, str] | None = None
+    ) -> int:
+        channel = super().register_channel(topic, message_encoding, schema_id, metadata or {})
+        self._tallies[channel] = _Tally(topic)
+        return channel
+
+    def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
+        super().add_message(channel_id, log_time, data, publish_time, sequence)
+        self._tallies[channel_id].add(_HEAD.pack(channel_id, sequence, log_time, publish_time), data)
+
+    def add_metadata(self, name: str, data: dict[str, str]) -> None:
+        super().add_metadata(name, data)
+        self._metadata[name] = metadata_checksum(data)
+
+    def finish(self) -> None:
+        document = {
+            "schema": SCHEMA,
+            "channels": {tally.topic: tally.as_dict() for tally in self._tallies.values()},
+            "metadata": self._metadata,
+        }
+        content = json.dumps(document, sort_keys=True)
+        super().add_metadata(CHECKSUMS, {"content": content, "crc32": f"{zlib.crc32(content.encode()):08x}"})
+        super().finish()

@@ -1,0 +1,102 @@
+"""A lake that one may not read, and folders that cannot hold one: what, where and the fix, never a traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from flagdata.cli import main
+from flagdata.errors import UsageError
+from flagdata.lake import Artifact, Lake
+
+NOBODY = 65534
+COMMANDS = (["ls"], ["doctor"], ["verify"], ["tag", "v1"], ["log"])
+# One process that imports everything, and a child of it for each command, which may not read what is closed.
+_AS_NOBODY = """
+import json, os, sys, zoneinfo
+import flagdata.commands.lake, flagdata.commands.upkeep, flagdata.lake.health, tqdm, xml
+from flagdata.cli import main
+for arguments in json.loads(sys.argv[1]):
+    child = os.fork()
+    if child == 0:
+        os.dup2(1, 2)
+        if os.getuid() == 0:
+            os.setgroups([])
+            os.setgid({nobody})
+            os.setuid({nobody})
+        main(arguments)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    print("code", code, arguments[0], flush=True)
+"""
+
+
+@pytest.fixture
+def forbidden(lake: Lake, put_text: Callable[..., Artifact]) -> Path:
+    put_text(lake, "a")
+    for folder in (lake.path, *lake.path.parents):
+        if folder.owner() == Path.home().owner() and str(folder).startswith("/tmp/"):
+            folder.chmod(folder.stat().st_mode | 0o755)
+    return lake.path
+
+
+def as_nobody(commands: Sequence[list[str]]) -> dict[str, tuple[int, str]]:
+    """Command → its exit code and all it said."""
+    code = _AS_NOBODY.format(nobody=NOBODY)
+    ended = subprocess.run(
+        [sys.executable, "-c", code, json.dumps(commands)], capture_output=True, text=True, timeout=120, check=True
+    )
+    found: dict[str, tuple[int, str]] = {}
+    said: list[str] = []
+    for line in ended.stdout.splitlines():
+        if line.startswith("code "):
+            _, number, name = line.split()
+            found[name] = (int(number), "\n".join(said))
+            said = []
+        else:
+            said.append(line)
+    return found
+
+
+@pytest.mark.parametrize("part", ["lake.json", "catalog/_delta_log", "refs/tags", "mcap"])
+def test_each_command_says_what_may_not_be_read(forbidden: Path, part: str) -> None:
+    closed = forbidden / part
+    before = closed.stat().st_mode
+    closed.chmod(0)
+    try:
+        ended = as_nobody([[*arguments, "--lake", str(forbidden)] for arguments in COMMANDS])
+    finally:
+        closed.chmod(before)
+    assert set(ended) == {arguments[0] for arguments in COMMANDS}
+    for name, (code, said) in ended.items():
+        assert "Traceback" not in said, (name, said)
+        assert "unforeseen" not in said, (name, said)
+        assert code == 0 or "fix:" in said, (name, code, said)
+    assert any(code for code, _ in ended.values())
+
+
+@pytest.mark.parametrize("name", ["a\\b", os.fsdecode(b"a\xff"), "a\udc80b"])
+def test_a_folder_that_the_catalog_cannot_work_in_is_refused_by_name(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(UsageError, match="backslash, or a byte that is not UTF-8"):
+        Lake.create(tmp_path / name)
+    for more in ([], ["--json"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["init", str(tmp_path / name), *more])
+        assert ended.value.code == 2
+        assert "rename the folder" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_path_that_is_none_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    for path in (tmp_path / "loop" / "lake", f"{tmp_path}/a\0b"):
+        with pytest.raises((UsageError, Exception)) as refused:
+            Lake.create(path)
+        assert refused.type.__module__ == "flagdata.errors"
