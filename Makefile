@@ -1,4 +1,5 @@
-# Everything a fresh Debian machine with Python 3.11 needs: `make demo` and `make test` create the environment they use.
+# Everything a fresh Debian machine with Python 3.11 needs: `make demo` and `make test` create the environments they use.
+# What only the system's administrator can install (venv, a C++ compiler, Blender's libraries): `make system`.
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
@@ -7,13 +8,34 @@ OUT ?= out
 # Without an NVIDIA driver the CPU build of torch is installed first; a looser range would pull in CUDA packages.
 TORCH := torch==2.13.0
 
-.PHONY: demo test lint bench validate clean
+# The renderers cycles and workbench run in an environment of their own, about 1 GB, of Python 3.11 whatever $(PYTHON) is.
+BLENDER_VENV := .venv-blender
+BLENDER_STAMP := $(BLENDER_VENV)/.installed
+BLENDER := $(CURDIR)/$(BLENDER_VENV)/bin/python
+
+# The oldest dependencies that pyproject.toml admits.
+OLDEST_VENV := .venv-oldest
+OLDEST_STAMP := $(OLDEST_VENV)/.installed
+
+SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
+SYSTEM := python3.11-venv g++ git libegl1 libgl1 libice6 libsm6 libx11-6 libxcb1 libxext6 libxfixes3 libxi6 \
+  libxkbcommon0 libxrender1
+
+.PHONY: demo test test-oldest blender system lint bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
 
-test: lint
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+test: lint $(BLENDER_STAMP)
+	FLAGDATA_BLENDER=$(BLENDER) $(BIN)/python -m pytest -n 2 --dist loadfile
+
+test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP)
+	FLAGDATA_BLENDER=$(BLENDER) $(OLDEST_VENV)/bin/python -m pytest -n 2 --dist loadfile
+
+blender: $(BLENDER_STAMP)
+
+system:
+	$(SUDO) apt-get install --yes --no-install-recommends $(SYSTEM)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -27,11 +49,23 @@ validate: $(STAMP)
 	$(BIN)/python -m tests.validation --out docs/results
 
 $(STAMP): pyproject.toml constraints.txt
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
-	command -v nvidia-smi >/dev/null || $(BIN)/python -m pip install --quiet $(TORCH)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
-	touch $(STAMP)
+	$(call environment,$(VENV),constraints.txt)
+
+$(OLDEST_STAMP): pyproject.toml constraints-oldest.txt
+	$(call environment,$(OLDEST_VENV),constraints-oldest.txt)
+
+$(BLENDER_STAMP): sim/blender/environment.py | $(STAMP)
+	$(BIN)/flagdata blender-setup --folder $(BLENDER_VENV)
+	touch $@
+
+# An environment (its folder, its constraints) with the package and what its tests need.
+define environment
+$(PYTHON) -m venv $(1)
+$(1)/bin/python -m pip install --quiet --upgrade pip
+command -v nvidia-smi >/dev/null || $(1)/bin/python -m pip install --quiet --constraint $(2) $(TORCH)
+$(1)/bin/python -m pip install --quiet --constraint $(2) --editable '.[dev]'
+touch $(1)/.installed
+endef
 
 clean:
-	rm -rf $(VENV) $(OUT) build *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(OLDEST_VENV) $(OUT) build *.egg-info

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntFlag, StrEnum
+from typing import Any
 
 import pyarrow as pa
 
@@ -108,6 +109,14 @@ class SampleFlag(IntFlag):
     """The time stamp was repaired or interpolated (see the report)."""
     ALIASED = 64
     """A frequency at the Nyquist limit of the frames it was found in: it may be another one."""
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        """Count as a plain integer beside an array, which then keeps its type of 16 bits.
+
+        NumPy 2 takes a subclass of int for a 64-bit value, and refuses to put the result back into the array.
+        """
+        plain = [int(value) if isinstance(value, SampleFlag) else value for value in inputs]
+        return getattr(ufunc, method)(*plain, **options)
 
 
 UNUSABLE = SampleFlag.STALE | SampleFlag.OUT_OF_RANGE | SampleFlag.MISSING | SampleFlag.SENSOR_FAULT

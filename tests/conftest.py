@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from flagdata.errors import NotFoundError
+from sim.blender import environment
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -17,3 +21,22 @@ def reference_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"reference data absent: no folder {folder} (set FLAGDATA_REFERENCE)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def blender() -> Iterator[environment.Environment]:
+    """Blender's environment: FLAGDATA_BLENDER, `.venv-blender` as `make test` makes it, or the user's.
+
+    One that is there and does not work is an error, not a reason to skip.
+    """
+    made = environment.interpreter(REPOSITORY / ".venv-blender")
+    with pytest.MonkeyPatch.context() as patch:
+        if environment.SETTING not in os.environ and made.exists():
+            patch.setenv(environment.SETTING, str(made))
+        try:
+            python = environment.find()
+        except NotFoundError as error:
+            if environment.SETTING in os.environ:
+                raise
+            pytest.skip(f"{error.what}: make .venv-blender")
+        yield environment.check(python)

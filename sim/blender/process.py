@@ -7,18 +7,18 @@ recipes or torch; it gets resolved scenes and meshes, and gives pictures back (`
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import os
 import selectors
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.errors import FlagdataError
+from sim.blender.environment import check, find
 from sim.blender.protocol import Message, decode, encode
 
 START_TIMEOUT = 120.0  # s; importing Blender from a cold disk
@@ -26,7 +26,17 @@ EXIT_TIMEOUT = 10.0  # s
 _CHUNK = 1 << 20
 _LOG_TAIL = 2000  # characters of the worker's own output that an error quotes
 
-WORKER = (sys.executable, "-m", "sim.blender.worker")
+_LAUNCH = Path(__file__).with_name("launch.py")
+
+
+def blender_worker() -> tuple[str, ...]:
+    """How the worker is started: by the Python of Blender's environment, isolated from this one's settings.
+
+    Raises:
+        NotFoundError: Blender is not installed.
+        BlenderError: it is, and cannot be used.
+    """
+    return (str(check(find()).python), "-I", str(_LAUNCH))
 
 
 class RenderError(FlagdataError):
@@ -43,15 +53,15 @@ class WorkerProcess:
     """A worker that answers requests one after another; a context manager.
 
     Args:
-        command: how it is started.
+        command: how it is started; by default `blender_worker`, looked for when the worker is first needed.
         attempts: how often a request is tried, each time by a fresh worker, before it is given up.
 
     Attributes:
         restarts: workers that were lost so far.
     """
 
-    def __init__(self, command: Sequence[str] = WORKER, *, attempts: int = 3) -> None:
-        self._command = tuple(command)
+    def __init__(self, command: Sequence[str] | None = None, *, attempts: int = 3) -> None:
+        self._command = None if command is None else tuple(command)
         self._attempts = attempts
         self._process: subprocess.Popen[bytes] | None = None
         self._log: IO[bytes] | None = None
@@ -79,7 +89,7 @@ class WorkerProcess:
 
         Raises:
             RenderError: the worker refused a message, or was lost as often as `attempts` at the same one.
-            NotFoundError: Blender is not installed.
+            NotFoundError, BlenderError: Blender is not installed, or cannot be used.
         """
         answers: list[Message] = []
         failures = 0
@@ -118,14 +128,10 @@ class WorkerProcess:
         self._forget()
 
     def _start(self) -> None:
-        if self._command == WORKER and importlib.util.find_spec("bpy") is None:
-            raise NotFoundError(
-                "Blender is not installed", where="renderer cycles",
-                fix="install it with pip install 'flagdata[render]', or take the renderer raster",
-            )  # fmt: skip
+        command = blender_worker() if self._command is None else self._command
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 — as long as the process
         self._process = subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, bufsize=0
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, bufsize=0
         )
         for pipe in (self._process.stdin, self._process.stdout):
             os.set_blocking(_pipe(pipe).fileno(), False)

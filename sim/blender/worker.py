@@ -1,7 +1,8 @@
-"""The Blender worker: `python -m sim.blender.worker`, spoken to over its standard pipes.
+"""The Blender worker, spoken to over its standard pipes; `launch.py` starts it in Blender's own environment.
 
 One scene is kept for as long as the process lives; a "scene" message sets its camera, light and textures, a "frame"
-message swaps the meshes in place and is answered by the picture. It imports Blender, and neither torch nor the lake.
+message swaps the meshes in place and is answered by the picture. It needs nothing but Blender, NumPy and the standard
+library.
 
 Messages, and their answers:
 
@@ -246,7 +247,3 @@ def main() -> None:
     serve(import_module("bpy"), 0, sink)
     sys.stderr.flush()
     os._exit(0)  # Blender's own clean-up may hang
-
-
-if __name__ == "__main__":
-    main()

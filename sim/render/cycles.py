@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.assets import Assets
-from sim.blender.process import WORKER, WorkerProcess
+from sim.blender.process import WorkerProcess
 from sim.blender.protocol import Message
 from sim.render.camera import Camera
 from sim.render.develop import develop, plate
@@ -43,12 +43,12 @@ class Cycles:
     Args:
         assets: that textures and backgrounds are taken from.
         threads: of Blender.
-        command: how the worker is started.
+        command: how the worker is started; by default in Blender's own environment.
     """
 
     ENGINE: ClassVar[str] = "CYCLES"
 
-    def __init__(self, assets: Assets, *, threads: int = 1, command: Sequence[str] = WORKER) -> None:
+    def __init__(self, assets: Assets, *, threads: int = 1, command: Sequence[str] | None = None) -> None:
         self._assets = assets
         self._threads = threads
         self.worker = WorkerProcess(command)
@@ -69,7 +69,7 @@ class Cycles:
         """As `sim.render.Renderer`.
 
         Raises:
-            NotFoundError: Blender is not installed.
+            NotFoundError, BlenderError: Blender is not installed, or cannot be used.
             RenderError: Blender refused the scene, or crashed or hung at the same frame three times.
         """
         placed = stage(meshes, parameters)

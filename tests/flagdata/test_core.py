@@ -32,6 +32,15 @@ def test_error_kinds_are_distinct_and_errors_survive_a_process_boundary() -> Non
     assert error.as_dict() == {"kind": "refused", "what": "a", "where": "b", "fix": "c"}
 
 
+def test_a_sample_flag_leaves_an_array_of_flags_its_sixteen_bits() -> None:
+    flags = np.zeros(3, dtype=np.uint16)
+    flags[1:] |= schema.SampleFlag.STALE
+    flags[2:] |= schema.SampleFlag.MISSING
+    assert (flags | schema.SampleFlag.OK).dtype == (flags & schema.UNUSABLE).dtype == np.uint16
+    assert flags.tolist() == [0, 1, 9]
+    assert (schema.SampleFlag.MISSING & flags).tolist() == [0, 0, 8]
+
+
 def test_an_unknown_name_suggests_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'drag'"):
         raise UnknownNameError.of("effect", "drga", ["drag", "lift"])

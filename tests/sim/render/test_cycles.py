@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,20 +12,19 @@ import torch
 
 from flagdata.errors import NotFoundError
 from sim.assets import Assets
-from sim.blender import process
+from sim.blender.environment import SETTING, Environment
 from sim.render import RENDERERS, Meshes, RenderParameters
 from sim.render.cycles import Cycles, Workbench
 from sim.render.develop import plate, to_linear
 from sim.render.prior import named
 
-needs_blender = pytest.mark.skipif(
-    importlib.util.find_spec("bpy") is None, reason="Blender is not installed: pip install -e '.[render]'"
-)
+needs_blender = pytest.mark.usefixtures("blender")
 SIZE = 96
 
 
 @pytest.fixture(scope="module")
-def cycles() -> Iterator[Cycles]:
+def cycles(blender: Environment) -> Iterator[Cycles]:
+    assert blender.blender.startswith("4.5.")
     with Cycles(Assets()) as renderer:
         yield renderer
 
@@ -121,9 +120,10 @@ def test_workbench_sees_the_same_silhouette() -> None:
     assert float((seen.float() - plain.float()).abs().mean()) > 1
 
 
-def test_without_blender_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(NotFoundError, match=r"flagdata\[render\]"):
+def test_without_blender_the_error_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv(SETTING, raising=False)
+    monkeypatch.setenv("FLAGDATA_CACHE", str(tmp_path))
+    with pytest.raises(NotFoundError, match="flagdata blender-setup"):
         Cycles(Assets()).render(flag(), zeta(1))
 
 

@@ -1,0 +1,53 @@
+"""`flagdata blender-setup`: Blender's own environment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flagdata.console import document, json_option, say
+
+
+@click.command("blender-setup")
+@click.option(
+    "--folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    help="Where the environment is made; by default the folder blender of flagdata's cache.",
+)  # fmt: skip
+@click.option("--python", metavar="PYTHON", help="A Python 3.11 to make it with; by default one that is found.")
+@click.option("--check", "only_check", is_flag=True, help="Only say which environment is used, and whether it works.")
+@json_option
+def blender_setup(folder: Path | None, python: str | None, only_check: bool, as_json: bool) -> None:
+    """Make the environment that the renderers cycles and workbench run in.
+
+    Blender's module needs Python 3.11 and NumPy 1. It gets a virtual environment of its own, so that flagdata's is free
+    of both. About 1 GB is downloaded and kept; pip's own settings apply. The command may be repeated: it completes what
+    is there.
+
+    The environment in the default folder is found without further settings. For one elsewhere, set the variable
+    FLAGDATA_BLENDER to the path of its Python.
+
+    \b
+      flagdata blender-setup
+      flagdata blender-setup --check
+      flagdata blender-setup --folder .venv-blender --python python3.11
+    """
+    from flagdata.errors import UsageError
+    from sim.blender import environment
+
+    if only_check and (folder or python):
+        raise UsageError(
+            "--check looks at the environment that is used", where="flagdata blender-setup",
+            fix="leave out --folder and --python",
+        )  # fmt: skip
+    if only_check:
+        made = environment.check(environment.find())
+    else:
+        made = environment.create(folder or environment.default_folder(), python=python, say=say)
+    content = {"python": str(made.python), "blender": made.blender, "numpy": made.numpy}
+    if as_json:
+        document("blender", {**content, "python_version": made.python_version})
+        return
+    click.echo(f"Blender {made.blender}, Python {made.python_version}, NumPy {made.numpy}: {made.python}")
+    if folder:
+        say(f"set {environment.SETTING}={made.python.absolute()} to have it used")

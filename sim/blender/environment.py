@@ -1,0 +1,210 @@
+"""Blender's own environment: where it is, how it is made, and whether the worker can use it.
+
+Blender's module binds whoever imports it to one version of Python and to NumPy 1. It is therefore installed apart, in a
+virtual environment that holds nothing else, and flagdata's own environment knows of it only by the path of its Python.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flagdata.errors import FlagdataError, InputError, NotFoundError
+from sim.kernel.build import cache_folder
+
+SETTING = "FLAGDATA_BLENDER"
+SERIES = "4.5"
+"""The last series of Blender with long-term support whose module exists for `PYTHON`."""
+REQUIREMENT = "bpy==4.5.15"
+PYTHON = (3, 11)
+"""The only version of Python that the module is built for."""
+
+_CHECK_TIMEOUT = 120.0  # s; importing Blender from a cold disk
+_TAIL = 2000  # characters of a failed command's output that an error quotes
+_PROBE = """
+import json, os, platform, numpy, bpy
+found = {"blender": bpy.app.version_string, "python": platform.python_version(), "numpy": numpy.__version__}
+print("\\n" + json.dumps(found), flush=True)
+os._exit(0)
+"""
+"""Ends without Blender's own clean-up, which may hang."""
+_MISSING_LIBRARY = re.compile(r"(lib[\w+-]+\.so[.\d]*): cannot open shared object file")
+_DEBIAN = {
+    "libX11.so.6": "libx11-6", "libXrender.so.1": "libxrender1", "libXfixes.so.3": "libxfixes3",
+    "libXi.so.6": "libxi6", "libXext.so.6": "libxext6", "libxkbcommon.so.0": "libxkbcommon0",
+    "libSM.so.6": "libsm6", "libICE.so.6": "libice6", "libGL.so.1": "libgl1", "libEGL.so.1": "libegl1",
+    "libxcb.so.1": "libxcb1",
+}  # fmt: skip
+"""The Debian package of each shared library that the module is linked to and does not bring along."""
+
+DEBIAN_PACKAGES = tuple(sorted(set(_DEBIAN.values())))
+
+
+class BlenderError(FlagdataError):
+    """Blender's environment is there, and the worker cannot use it."""
+
+    kind = "blender-unusable"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Environment:
+    """An environment of Blender that works.
+
+    Attributes:
+        python: the path of its interpreter.
+        blender, python_version, numpy: the versions in it.
+    """
+
+    python: Path
+    blender: str
+    python_version: str
+    numpy: str
+
+
+def default_folder() -> Path:
+    """Where `flagdata blender-setup` makes the environment: `blender` in flagdata's cache folder."""
+    return cache_folder() / "blender"
+
+
+def interpreter(folder: Path) -> Path:
+    """The Python of a virtual environment."""
+    return folder / "Scripts" / "python.exe" if os.name == "nt" else folder / "bin" / "python"
+
+
+def find() -> Path:
+    """The Python of Blender's environment: FLAGDATA_BLENDER, or that in the default folder.
+
+    Raises:
+        NotFoundError: there is none.
+    """
+    if chosen := os.environ.get(SETTING):
+        if not Path(chosen).is_file():
+            raise NotFoundError(
+                f"there is no Python at {chosen}", where=SETTING,
+                fix="set it to the Python of Blender's environment, or unset it and run flagdata blender-setup",
+            )  # fmt: skip
+        return Path(chosen)
+    python = interpreter(default_folder())
+    if not python.is_file():
+        raise NotFoundError(
+            "Blender is not installed", where=str(default_folder()),
+            fix=f"make its environment with flagdata blender-setup, name one with {SETTING}, or take the renderer "
+            "raster",
+        )  # fmt: skip
+    return python
+
+
+@functools.cache
+def check(python: Path) -> Environment:
+    """Import Blender with this Python, in a process of its own, and ask for its version.
+
+    Raises:
+        BlenderError: it cannot be imported, or it is of another series than `SERIES`.
+    """
+    try:
+        done = subprocess.run(
+            (str(python), "-I", "-c", _PROBE), capture_output=True, text=True, timeout=_CHECK_TIMEOUT, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise BlenderError(
+            f"Blender could not be imported within {_CHECK_TIMEOUT:g} s", where=str(python),
+            fix="try again on a machine that is less busy, or make the environment anew with flagdata blender-setup",
+        ) from None  # fmt: skip
+    except OSError as error:
+        raise BlenderError(
+            f"this Python cannot be run: {error.strerror}", where=str(python), fix="run flagdata blender-setup"
+        ) from None
+    if done.returncode:
+        raise _not_importable(python, done.stderr)
+    found = json.loads(done.stdout.splitlines()[-1])
+    if not found["blender"].startswith(f"{SERIES}."):
+        raise BlenderError(
+            f"this is Blender {found['blender']}, and the worker is written for {SERIES}", where=str(python),
+            fix=f"run flagdata blender-setup, or name an environment with {REQUIREMENT} with {SETTING}",
+        )  # fmt: skip
+    return Environment(python=python, blender=found["blender"], python_version=found["python"], numpy=found["numpy"])
+
+
+def create(folder: Path, *, python: str | None = None, say: Callable[[str], None]) -> Environment:
+    """Make Blender's environment, or complete the one that is in the folder.
+
+    Nothing but the folder is changed. pip's own settings (its index, its cache) apply.
+
+    Args:
+        folder: an empty or absent folder, or a virtual environment.
+        python: an interpreter of Python 3.11; by default the running one, or `python3.11` of the search path.
+        say: called with a sentence before each step that takes long.
+
+    Raises:
+        InputError: the folder holds something else.
+        NotFoundError: there is no Python 3.11.
+        BlenderError: a step failed, or the module cannot be imported.
+    """
+    target = interpreter(folder)
+    if folder.exists() and not (folder / "pyvenv.cfg").is_file() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError("this is no virtual environment", where=str(folder), fix="name a folder that is not there yet")
+    base = _python_for_blender(python)
+    say(f"making an environment in {folder}")
+    _run(
+        (base, "-m", "venv", str(folder)), folder,
+        fix="install Python's venv (Debian: apt-get install python3.11-venv)",
+    )  # fmt: skip
+    say(f"installing {REQUIREMENT}, about 1 GB on disk")
+    _run(
+        (str(target), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", REQUIREMENT), folder,
+        fix="see what pip said above: the index that pip is set to must offer this version for Python "
+        f"{_dotted(PYTHON)}; delete the folder if it is of another Python",
+    )  # fmt: skip
+    check.cache_clear()
+    return check(target)
+
+
+def _python_for_blender(named: str | None) -> str:
+    """The path of a Python of version `PYTHON`."""
+    for candidate in (named,) if named else (sys.executable, f"python{_dotted(PYTHON)}", "python3"):
+        path = shutil.which(candidate)
+        if path and _version(path) == PYTHON:
+            return path
+    raise NotFoundError(
+        f"{named or 'the running Python'} is not Python {_dotted(PYTHON)}, the only version that Blender {SERIES} "
+        "is built for" + ("" if named else f", and the search path has no python{_dotted(PYTHON)}"),
+        where="flagdata blender-setup", fix=f"install Python {_dotted(PYTHON)} and name it with --python",
+    )  # fmt: skip
+
+
+def _version(python: str) -> tuple[int, ...] | None:
+    """Major and minor version; None where it does not run."""
+    command = (python, "-I", "-c", "import sys; print(*sys.version_info[:2])")
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return tuple(int(part) for part in done.stdout.split()) if done.returncode == 0 else None
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(str(part) for part in version)
+
+
+def _run(command: Sequence[str], folder: Path, *, fix: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = (done.stdout + done.stderr).strip()[-_TAIL:]
+        raise BlenderError(f"{' '.join(command[1:4])} failed: {said}", where=str(folder), fix=fix)
+
+
+def _not_importable(python: Path, said: str) -> BlenderError:
+    """The error for a module that does not import, by the last line of what Python said."""
+    reason = said.strip().splitlines()[-1] if said.strip() else "it said nothing"
+    library = _MISSING_LIBRARY.search(reason)
+    fix = "run flagdata blender-setup, which installs it"
+    if library:
+        fix = f"install the library {library[1]} of the system"
+        if library[1] in _DEBIAN:
+            fix += f"; Debian: apt-get install {' '.join(DEBIAN_PACKAGES)}"
+    return BlenderError(f"Blender cannot be imported: {reason}", where=str(python), fix=fix)
