@@ -31,7 +31,9 @@ def of_wind(
     )
 
 
-def posterior(*, clips: int, draws: int, wide: float, shift: float, targets: int, seed: int, group: int = 1) -> Predictions:
+def posterior(
+    *, clips: int, draws: int, wide: float, shift: float, targets: int, seed: int, group: int = 1
+) -> Predictions:
     """θ ~ N(0, 1) seen with noise of variance 1: the posterior is N(x / 2, 1/2). Draws are of N(x / 2 + shift σ, (wide σ)²)
     with σ² = 1/2, so wide = 1 and shift = 0 is exact. Clips come `group` to a sequence, with θ of their own."""
     random = generator(seed)

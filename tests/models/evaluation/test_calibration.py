@@ -114,7 +114,9 @@ def test_tarp_agrees_with_quadrature_where_it_is_off(wide: float, shift: float) 
     nearer = draws.cdf(r + distance) - draws.cdf(r - distance)
     found = tarp((made,), resamples_of(made), generator=generator(10), levels=(0.1, 0.3, 0.5, 0.7, 0.9))
     expected = [float((nearer < point.level).mean()) for point in found]
-    assert [point.share.value for point in found] == pytest.approx(expected, abs=NOISE + 0.01)  # 0.01: quadrature, 60³ cells
+    assert [point.share.value for point in found] == pytest.approx(
+        expected, abs=NOISE + 0.01
+    )  # 0.01: quadrature, 60³ cells
     assert max(abs(value - point.level) for value, point in zip(expected, found, strict=True)) > 0.1
 
 
@@ -122,6 +124,8 @@ def test_a_model_without_samples_and_a_target_that_never_changes_are_refused() -
     without = of_wind([1.0, 2.0], [1.0, 2.0])
     with pytest.raises(InputError, match="gives no samples"):
         coverage((without,), "wind_speed", resamples_of(without))
-    constant = dataclasses.replace(posterior(clips=5, draws=3, wide=1, shift=0, targets=1, seed=1), truth=np.ones((5, 1)))
+    constant = dataclasses.replace(
+        posterior(clips=5, draws=3, wide=1, shift=0, targets=1, seed=1), truth=np.ones((5, 1))
+    )
     with pytest.raises(InputError, match="wind_speed is the same in all clips"):
         tarp((constant,), resamples_of(constant), generator=generator(1))

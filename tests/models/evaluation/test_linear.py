@@ -67,11 +67,11 @@ def test_r_is_that_of_the_predictions_made() -> None:
     assert found.pearson[0].value == pytest.approx(expected.statistic, rel=1e-6)
 
 
-@pytest.mark.parametrize(("clips", "dimension", "kept"), [(20, 512, 9), (200, 16, 16), (90, 512, 44)])
+@pytest.mark.parametrize(("clips", "dimension", "kept"), [(20, 512, 10), (200, 16, 16), (60, 512, 34)])
 def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_and_it_says_so(
     clips: int, dimension: int, kept: int
 ) -> None:
-    """Of 19 clips that train a fold 9 components and the mean leave 9 degrees of freedom for the errors."""
+    """Of 19 clips that train a fold the mean takes one degree of freedom, and three fifths of 18 are 10."""
     random = generator(7)
     found = bouman(
         random.normal(size=(clips, dimension)), {"density": random.uniform(1, 2, clips)},
@@ -81,6 +81,18 @@ def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_
     (finding,) = found.findings
     assert finding.kind == "fewer-components"
     assert f"{kept} principal components are kept, not 50" in finding.what
+
+
+def test_ninety_clips_keep_the_papers_fifty_components() -> None:
+    random = generator(8)
+    found = bouman(
+        random.normal(size=(90, 512)),
+        {"density": random.uniform(1, 2, 90)},
+        group=np.arange(90),
+        generator=generator(1),
+    )
+    assert found.components == 50
+    assert found.findings == ()
 
 
 @pytest.mark.parametrize(

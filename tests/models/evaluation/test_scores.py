@@ -66,7 +66,9 @@ def test_the_interval_of_a_mean_over_independent_clips_is_the_gaussian_one() -> 
     sample's own deviation is known to 1/√800 = 4 %."""
     errors = stats.norm.ppf((np.arange(400) + 0.5) / 400)
     resamples = Resamples.of(np.arange(400), generator=generator(1), draws=20_000)
-    found = estimate(SCORES["bias"].values(of_wind(np.zeros(400), errors), "wind_speed", resamples), clips=400, groups=400)
+    found = estimate(
+        SCORES["bias"].values(of_wind(np.zeros(400), errors), "wind_speed", resamples), clips=400, groups=400
+    )
     half = stats.norm.ppf((1 + LEVEL) / 2) * errors.std() / 20
     assert found.value == pytest.approx(0, abs=1e-12)
     assert [found.low, found.high] == pytest.approx([-half, half], rel=0.04)

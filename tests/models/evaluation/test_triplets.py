@@ -43,7 +43,8 @@ def test_a_tie_counts_half_and_a_perfect_embedding_has_one() -> None:
     group = np.array([1, 1, 2, 2])
     resamples = Resamples.of(group, generator=generator(1), draws=2)
     triplets = draw(group, seed=3, count=50)
-    for points, expected in (([[0], [0], [0], [0]], 0.5), ([[0], [1], [5], [6]], 1.0), ([[0], [9], [1], [8]], 0.0)):
+    crossed = [[0, 0], [1, 1], [0, 1], [1, 0]]
+    for points, expected in (([[0], [0], [0], [0]], 0.5), ([[0], [1], [5], [6]], 1.0), (crossed, 0.0)):
         embedding = np.array(points, dtype=np.float32)
         assert accuracy_values(embedding, triplets, resamples)[0] == expected
         assert all_accuracy_values(embedding, resamples)[0] == expected
