@@ -85,12 +85,8 @@ def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_
 
 def test_ninety_clips_keep_the_papers_fifty_components() -> None:
     random = generator(8)
-    found = bouman(
-        random.normal(size=(90, 512)),
-        {"density": random.uniform(1, 2, 90)},
-        group=np.arange(90),
-        generator=generator(1),
-    )
+    density = random.uniform(1, 2, 90)
+    found = bouman(random.normal(size=(90, 512)), {"density": density}, group=np.arange(90), generator=generator(1))
     assert found.components == 50
     assert found.findings == ()
 
