@@ -173,7 +173,7 @@ def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Res
         _row(own, resamples, run=number, runs=1, values=found, spread={}, bound=_bound(found), speed=own.milliseconds)
         for number, (own, found) in enumerate(zip(runs, values, strict=True), start=1)
     )
-    spread = {}
+    spread: dict[str, tuple[float, float]] = {}
     if len(runs) > 1:
         spread = {name: _ends([float(found[name][0]) for found in values]) for name in values[0]}
     bounds = [row.bound for row in single if row.bound is not None]
