@@ -79,7 +79,7 @@ class Resamples:
         labels, index = np.unique(group, return_inverse=True)
         size = len(labels)
         drawn = generator.multinomial(size, np.full(size, 1 / size), size=draws)
-        return cls(index=index.astype(np.int64), counts=np.vstack([np.ones((1, size)), drawn]))
+        return cls(index=index.astype(np.int64), counts=np.vstack([np.ones((1, size)), drawn.astype(np.float64)]))
 
     @property
     def groups(self) -> int:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from models.evaluation import paper
 from models.evaluation.calibration import CURVE, LEVELS, Coverage
@@ -24,7 +27,7 @@ _MARKERS = "osD^vPX<>h"
 _THEME = {_INK: "--ink", _QUIET: "--quiet", _RULE: "--rule"} | {
     colour: f"--series-{place}" for place, colour in enumerate(_SERIES)
 }
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "svg.fonttype": "none", "svg.hashsalt": "flagdata", "font.size": 9, "text.color": _INK, "axes.edgecolor": _QUIET,
     "axes.labelcolor": _INK, "xtick.color": _QUIET, "ytick.color": _QUIET, "axes.spines.top": False,
     "axes.spines.right": False, "axes.grid": True, "grid.color": _RULE, "grid.linewidth": 0.6, "axes.axisbelow": True,
@@ -56,10 +59,18 @@ def _legend(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
 
 
-def _look(labels: Iterable[str]) -> dict[str, dict[str, str]]:
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """How a model is drawn in a chart."""
+
+    colour: str
+    marker: str
+
+
+def _look(labels: Iterable[str]) -> dict[str, Look]:
     """A colour and a marker for each label."""
     return {
-        label: {"color": _SERIES[i % len(_SERIES)], "marker": _MARKERS[(i + i // len(_SERIES)) % len(_MARKERS)]}
+        label: Look(colour=_SERIES[i % len(_SERIES)], marker=_MARKERS[(i + i // len(_SERIES)) % len(_MARKERS)])
         for i, label in enumerate(dict.fromkeys(labels))
     }
 
@@ -70,11 +81,11 @@ def _interval_line(
     value: Sequence[float],
     ends: Sequence[tuple[float, float]],
     label: str,
-    look: dict[str, str],
+    look: Look,
 ) -> None:
     low, high = np.array(ends, dtype=float).T
-    axes.fill_between(x, low, high, color=look["color"], alpha=0.13, linewidth=0)
-    axes.plot(x, value, label=label, markersize=3.5, linewidth=1.3, **look)
+    axes.fill_between(x, low, high, color=look.colour, alpha=0.13, linewidth=0)
+    axes.plot(x, value, label=label, markersize=3.5, linewidth=1.3, color=look.colour, marker=look.marker)
 
 
 def error_against_wind(errors: Sequence[WindError]) -> Markup:
@@ -121,14 +132,21 @@ def calibration(curves: Sequence[Calibration], expected: Sequence[Expected]) -> 
         return _svg(figure, "calibration")
 
 
-def _coverage(axes: Axes, label: str, curve: tuple[Coverage, ...], look: dict[str, str]) -> None:
+def _coverage(axes: Axes, label: str, curve: tuple[Coverage, ...], look: Look) -> None:
     x = [point.level for point in curve]
     value = [point.share.value for point in curve]
     ends = np.array([(point.share.low, point.share.high) for point in curve])
-    axes.fill_between(x, ends[:, 0], ends[:, 1], color=look["color"], alpha=0.13, linewidth=0)
-    axes.plot(x, value, label=label, linewidth=1.3, color=look["color"])
+    axes.fill_between(x, ends[:, 0], ends[:, 1], color=look.colour, alpha=0.13, linewidth=0)
+    axes.plot(x, value, label=label, linewidth=1.3, color=look.colour)
     table = [i for i, level in enumerate(x) if level in LEVELS and level in CURVE]
-    axes.plot([x[i] for i in table], [value[i] for i in table], linestyle="none", markersize=3.5, **look)
+    axes.plot(
+        [x[i] for i in table],
+        [value[i] for i in table],
+        linestyle="none",
+        markersize=3.5,
+        color=look.colour,
+        marker=look.marker,
+    )
 
 
 def ranks(curves: Sequence[Calibration]) -> Markup:
@@ -145,7 +163,7 @@ def ranks(curves: Sequence[Calibration]) -> Markup:
             for axes, one in zip(line, own, strict=False):
                 edges = np.linspace(0, 1, len(one.ranks.share) + 1)
                 axes.axhspan(one.ranks.low, one.ranks.high, color=_QUIET, alpha=0.18, linewidth=0)
-                axes.stairs(one.ranks.share, edges, color=look[label]["color"], linewidth=1.4)
+                axes.stairs(one.ranks.share, edges, color=look[label].colour, linewidth=1.4)
                 axes.set(title=f"{label}: {one.target}", xlim=(0, 1), ylim=(0, top))
             line[0].set_ylabel("share of clips")
             for axes in line[len(own) :]:
@@ -170,7 +188,7 @@ def learning(points: Sequence[LearningPoint]) -> Markup:
             (axes.yaxis, _round_ticks(points)),
         ):
             axis.set_ticks(ticks, [f"{tick:,g}" for tick in ticks])
-            axis.set_minor_locator(mpl.ticker.NullLocator())
+            axis.set_minor_locator(NullLocator())
         _legend(figure, axes)
         return _svg(figure, "learning")
 

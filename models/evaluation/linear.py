@@ -100,7 +100,7 @@ def bouman(
 def _admissible(
     embedding: NDArray[np.floating], group: NDArray[np.int64], components: int
 ) -> tuple[int, tuple[Finding, ...]]:
-    """Components that leave at least as many degrees of freedom for the errors as they take."""
+    """At most three fifths of a fold's degrees of freedom, which admits the paper's 50 components of 90 clips."""
     clips, dimension = embedding.shape
     size = np.unique(group, return_counts=True)[1]
     if clips < 4 or len(size) < 3:
@@ -111,7 +111,7 @@ def _admissible(
     if components < 1:
         raise InputError(f"{components} components", where="components", fix="give at least 1")
     training = clips - int(size.max())
-    most = max(1, min(dimension, (training - 1) // 2))
+    most = max(1, min(dimension, 3 * (training - 1) // 5))
     if components <= most:
         return components, ()
     reason = f"the embedding has {dimension} dimensions" if most == dimension else f"{training} clips train a fold"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -143,11 +144,11 @@ def load(path: Path) -> Predictions:
     """
     fix = "write it with models.evaluation.predictions.save, or copy it again"
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as source, np.load(source, allow_pickle=False) as archive:
             content = {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise NotFoundError("no such file", where=str(path), fix="check the path") from None
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError, AttributeError, TypeError) as cause:
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, AttributeError, TypeError) as cause:
         raise InputError(f"cannot be read as predictions: {cause}", where=str(path), fix=fix) from None
     tag = str(content.pop("schema", "none"))
     if tag != SCHEMA:

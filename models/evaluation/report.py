@@ -46,7 +46,7 @@ class Picture:
 def write(found: Evaluation, folder: Path, *, name: str = "evaluation") -> tuple[Path, Path, Path]:
     """Write NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
-    written = tuple(folder / f"{name}{suffix}" for suffix in (".html", ".json", ".md"))
+    written = (folder / f"{name}.html", folder / f"{name}.json", folder / f"{name}.md")
     document = json.dumps(as_document(found), indent=2, allow_nan=False, ensure_ascii=False)
     for path, text in zip(written, (page(found), document + "\n", markdown(found)), strict=True):
         path.write_text(text, encoding="utf-8")

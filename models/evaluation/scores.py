@@ -48,7 +48,7 @@ class Score:
 
 def _errors(truth: Array, mean: Array) -> Array:
     error = mean - truth
-    return np.column_stack([np.ones_like(error), error, error**2, np.abs(error) <= TOLERANCE])
+    return np.column_stack([np.ones_like(error), error, error**2, (np.abs(error) <= TOLERANCE).astype(np.float64)])
 
 
 def _moments(truth: Array, mean: Array) -> Array:

@@ -169,16 +169,17 @@ def mean_values(runs: Sequence[Values]) -> Values:
 
 def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Resamples) -> tuple[Row, ...]:
     """The model's row and, below it, its runs' if there are several."""
+    first = runs[0]
     single = tuple(
         _row(own, resamples, run=number, runs=1, values=found, spread={}, bound=_bound(found), speed=own.milliseconds)
         for number, (own, found) in enumerate(zip(runs, values, strict=True), start=1)
     )
-    spread = {}
+    spread: dict[str, tuple[float, float]] = {}
     if len(runs) > 1:
         spread = {name: _ends([float(found[name][0]) for found in values]) for name in values[0]}
     bounds = [row.bound for row in single if row.bound is not None]
     whole = _row(
-        runs[0], resamples, run=None, runs=len(runs), values=mean_values(values), spread=spread,
+        first, resamples, run=None, runs=len(runs), values=mean_values(values), spread=spread,
         bound=float(np.mean(bounds)) if bounds else None, speed=float(np.mean([own.milliseconds for own in runs])),
     )  # fmt: skip
     notes = "; ".join(dict.fromkeys(own.note for own in runs if own.note))

@@ -34,8 +34,11 @@ def of_wind(
 def posterior(
     *, clips: int, draws: int, wide: float, shift: float, targets: int, seed: int, group: int = 1
 ) -> Predictions:
-    """θ ~ N(0, 1) seen with noise of variance 1: the posterior is N(x / 2, 1/2). Draws are of N(x / 2 + shift σ, (wide σ)²)
-    with σ² = 1/2, so wide = 1 and shift = 0 is exact. Clips come `group` to a sequence, with θ of their own."""
+    """θ ~ N(0, 1) seen with noise of variance 1: the posterior is N(x / 2, σ²) with σ² = 1/2.
+
+    Draws are of N(x / 2 + shift σ, (wide σ)²), so wide = 1 and shift = 0 is exact. Each clip has its own θ; `group`
+    of them are said to be of one sequence.
+    """
     random = generator(seed)
     truth = random.normal(size=(clips, targets))
     mean = (truth + random.normal(size=truth.shape)) / 2 + shift * np.sqrt(0.5)
