@@ -1,4 +1,4 @@
-"""Whether a clip lies outside what a model was trained on, by the distance of its summary, at a stated false-alarm rate.
+"""Whether a clip lies outside what a model was trained on: the distance of its summary, at a stated false-alarm rate.
 
 The distance is Mahalanobis's with the covariance of Ledoit and Wolf (Journal of Multivariate Analysis 88, 2004). Its
 threshold is conformal (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005; Laxhammar and Falkman,

@@ -53,9 +53,7 @@ class Ridge:
         return cls(**{field.name: np.asarray(arrays[field.name]) for field in fields(cls)})
 
 
-def fit_ridge(
-    features: NDArray[np.floating], targets: NDArray[np.floating], *, group: NDArray[np.integer]
-) -> Ridge:
+def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, group: NDArray[np.integer]) -> Ridge:
     """Fit a ridge to clips, for each target with the penalty of least squared error on sequences left out.
 
     Sequences are dealt out to `FOLDS` folds in the order of their numbers: clips of one sequence are in one fold, since

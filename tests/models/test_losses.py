@@ -77,9 +77,7 @@ def test_the_regression_loss_counts_errors_in_deviations_of_the_training_set() -
     prediction = torch.tensor([[1.0, 2.0], [1.0, 1.0]])
     loss = regression_loss(prediction, target, standardisation=standardisation())
     assert loss.item() == pytest.approx(1.25, rel=1e-5)
-    weighed = regression_loss(
-        prediction, target, standardisation=standardisation(), weights=torch.tensor([3.0, 1.0])
-    )
+    weighed = regression_loss(prediction, target, standardisation=standardisation(), weights=torch.tensor([3.0, 1.0]))
     assert weighed.item() == pytest.approx((3 * 0.5 + 2) / 4, rel=1e-5)
 
 
@@ -107,9 +105,7 @@ def test_gradients_of_the_regression_loss_agree_with_finite_differences() -> Non
 
 def test_the_likelihood_is_of_standardised_targets() -> None:
     """A standard normal mixture at one deviation from the mean: ½ log 2π + ½, in one dimension."""
-    mixture = Mixture(
-        log_weight=torch.zeros(2, 1), location=torch.zeros(2, 1, 1), factor=torch.ones(2, 1, 1, 1)
-    )
+    mixture = Mixture(log_weight=torch.zeros(2, 1), location=torch.zeros(2, 1, 1), factor=torch.ones(2, 1, 1, 1))
     scale = Standardisation(mean=torch.tensor([5.0]), deviation=torch.tensor([2.0]))
     loss = negative_log_likelihood(mixture, torch.tensor([[7.0], [3.0]]), standardisation=scale)
     assert loss.item() == pytest.approx(0.5 * 1.8378771 + 0.5, rel=1e-6)
@@ -122,6 +118,4 @@ def test_unfit_targets_are_errors() -> None:
     with pytest.raises(InputError, match=r"give \(n, 2\)"):
         regression_loss(torch.zeros(3, 1), torch.zeros(3, 2), standardisation=scale)
     with pytest.raises(InputError, match="none negative"):
-        regression_loss(
-            torch.zeros(3, 2), torch.zeros(3, 2), standardisation=scale, weights=torch.tensor([1.0, -1.0])
-        )
+        regression_loss(torch.zeros(3, 2), torch.zeros(3, 2), standardisation=scale, weights=torch.tensor([1.0, -1.0]))
