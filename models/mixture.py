@@ -88,7 +88,7 @@ class Mixture:
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
     def rescaled(self, *, scale: Tensor, shift: Tensor) -> Mixture:
-        """Return the mixture of scale · y + shift, both (t,), scale above 0: from standardised targets to their units."""
+        """Return the mixture of scale · y + shift, scale (t,) above 0 and shift (t,)."""
         return Mixture(
             log_weight=self.log_weight,
             location=self.location * scale + shift,
