@@ -67,9 +67,10 @@ class Familiarity:
         values, vectors = np.linalg.eigh(covariance)
         if values[0] <= 0:
             raise InputError("all training summaries are equal", fix="train the network, or give more clips")
+        deviations: NDArray[np.float64] = np.sqrt(values)
         cloud = cls(
             centre=np.asarray(training, dtype=np.float64).mean(axis=0),
-            whitening=vectors.T / np.sqrt(values)[:, None],
+            whitening=np.diag(1 / deviations) @ vectors.T,
             reference=np.zeros(0),
         )
         reference = np.sort(cloud.distance(validation))
