@@ -117,12 +117,12 @@ class Yang(nn.Module):
 
     Yang, Liang and Lin, Learning-based Cloth Material Recovery from Video, ICCV 2017: a convolutional network and an
     LSTM, by their own account inspired by the LRCN of Donahue et al. (CVPR 2015), whose CNN is like AlexNet and whose
-    LSTM reads its sixth layer with 256 units; they classify materials. Their own widths could not be looked up. It
-    has 44,666,688 parameters; Runia et al. state none for it. Other than there: widths of the convolutions by
-    Krizhevsky (One weird trick, 2014) in one tower, one channel, batch normalisation in place of local response
-    normalisation and of dropout (random initial weights then learn at the common learning rate, and training draws no
-    random numbers), random initial weights, and a regression of wind and material in place of classes. Images of
-    112×112 have a last map of 2×2, which the grid of 6×6
+    LSTM reads its sixth layer with 256 units; they classify materials. Their own widths could not be looked up. It has
+    44,666,688 parameters; Runia et al. state none for it. Other than there:
+    widths of the convolutions by Krizhevsky (One weird trick, 2014) in one tower,
+    one channel, batch normalisation in place of local response normalisation and of dropout (random initial weights
+    then learn at the common learning rate, and training draws no random numbers), random initial weights, and a
+    regression of wind and material in place of classes. Images of 112×112 have a last map of 2×2, which the grid of 6×6
     repeats: the published size is kept, not the published detail.
 
     Args:

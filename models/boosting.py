@@ -119,7 +119,7 @@ def fit_boosting(
             learning_rate=rate,
             max_iter=rounds,
             max_leaf_nodes=leaves,
-            early_stopping=False,
+            early_stopping=False,  # pyright: ignore[reportArgumentType]  (its default is a string)
             random_state=seed,
         ).fit(x, target)
 

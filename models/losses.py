@@ -14,8 +14,7 @@ from models.mixture import Mixture
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Standardisation:
-    """Means and standard deviations of targets over the training set, by which losses of several targets are
-    comparable.
+    """Means and standard deviations of targets over the training set, which make their losses comparable.
 
     Attributes:
         mean: (targets,), in the targets' own units.

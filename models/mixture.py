@@ -1,7 +1,6 @@
 """A distribution for each clip: a mixture of Gaussians with full covariances, and the head that predicts it.
 
-Bishop, Mixture Density Networks, 1994; full covariances by Cholesky factors, as in Williams, Neural Computation 8,
-1996.
+Bishop, Mixture Density Networks, 1994; full covariances by Cholesky factors after Williams, Neural Computation 8, 1996.
 """
 
 from __future__ import annotations
@@ -89,8 +88,7 @@ class Mixture:
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
     def rescaled(self, *, scale: Tensor, shift: Tensor) -> Mixture:
-        """Return the mixture of scale · y + shift, both (t,) with scale above 0: standardised targets to their
-        units."""
+        """Return the mixture of scale · y + shift, scale (t,) above 0 and shift (t,)."""
         return Mixture(
             log_weight=self.log_weight,
             location=self.location * scale + shift,

@@ -1,5 +1,4 @@
-"""What every network of clips offers: the input it takes, whether it is recurrent, and an embedding of stated
-length."""
+"""What every network of clips offers: the input it takes, whether it is recurrent, an embedding of stated length."""
 
 from __future__ import annotations
 

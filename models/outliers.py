@@ -1,5 +1,4 @@
-"""Whether a clip lies outside what a model was trained on, by the distance of its summary, at a stated false-alarm
-rate.
+"""Whether a clip lies outside what a model was trained on: the distance of its summary, at a stated false-alarm rate.
 
 The distance is Mahalanobis's with the covariance of Ledoit and Wolf (Journal of Multivariate Analysis 88, 2004). Its
 threshold is conformal (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005; Laxhammar and Falkman,
@@ -68,9 +67,10 @@ class Familiarity:
         values, vectors = np.linalg.eigh(covariance)
         if values[0] <= 0:
             raise InputError("all training summaries are equal", fix="train the network, or give more clips")
+        deviations: NDArray[np.float64] = np.sqrt(values)
         cloud = cls(
             centre=np.asarray(training, dtype=np.float64).mean(axis=0),
-            whitening=vectors.T / np.sqrt(values)[:, None],
+            whitening=np.diag(1 / deviations) @ vectors.T,
             reference=np.zeros(0),
         )
         reference = np.sort(cloud.distance(validation))

@@ -22,8 +22,8 @@ def table(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def boosting() -> Boosting:
-    x, y = table(1, 2000)
-    return fit_boosting(x, y, seed=3, rounds=40, rate=0.2, leaves=6, levels=LEVELS)
+    x, y = table(1, 6000)
+    return fit_boosting(x, y, seed=3, rounds=40, rate=0.2, leaves=4, levels=LEVELS)
 
 
 def test_the_mean_is_that_of_the_law(boosting: Boosting) -> None:
