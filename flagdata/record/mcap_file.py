@@ -1,4 +1,4 @@
-"""An MCAP file as it is written: single messages, whole blocks of them, and attachments that never lie in memory at once.
+"""An MCAP file as it is written: single messages, whole blocks of them, and attachments that come in pieces.
 
 Source: MCAP format specification, version 0. The bytes are those that `mcap.writer.Writer` of the mcap library writes
 for the same calls without compression, which is tested; that one takes its messages one by one, and 1.7 million of them

@@ -1,7 +1,8 @@
 """Wind samples and their means as protobuf messages in bulk: arrays in, rows of bytes out.
 
 The bytes are those of `messages.WindSample` and `messages.WindMean` serialised one by one in order of field numbers,
-which is tested. Source: Protocol Buffers, Encoding: tag = number << 3 | wire type, base-128 varints, doubles as 8 bytes.
+which is tested. Source: Protocol Buffers, Encoding: tag = number << 3 | wire type, base-128 varints, doubles as
+8 bytes.
 """
 
 from __future__ import annotations
@@ -120,4 +121,4 @@ def _varint(values: NDArray[np.int64]) -> Payloads:
     groups = unsigned[:, None] >> (7 * np.arange(width, dtype=np.uint64))
     more = (groups >> 7) > 0
     used = np.hstack([np.ones((len(values), 1), dtype=bool), more[:, :-1]])
-    return Payloads(data=(groups & 0x7F).astype(np.uint8) | (more.astype(np.uint8) << 7), used=used)
+    return Payloads(data=((groups & 0x7F) | (more.astype(np.uint64) << np.uint64(7))).astype(np.uint8), used=used)
