@@ -51,7 +51,9 @@ class Columns:
         """These rows and then `rows`, all in the `order` of indices given (n,)."""
         more = [pa.array([row[i] for row in rows], pa.string()) for i in range(len(self.cells))]
         return Columns(
-            cells=[pa.concat_arrays([own, new]).take(pa.array(order)) for own, new in zip(self.cells, more, strict=True)]
+            cells=[
+                pa.concat_arrays([own, new]).take(pa.array(order)) for own, new in zip(self.cells, more, strict=True)
+            ]
         )
 
 
@@ -83,29 +85,31 @@ class Lines:
         start: (n,) where each begins.
         end: (n,) where each ends, before its line end.
         regular: (n,) see the module's text.
+        shape: of regular lines.
     """
 
     data: bytes
     start: NDArray[np.int64]
     end: NDArray[np.int64]
     regular: NDArray[np.bool_]
+    shape: Shape
 
     def text(self, index: int, encoding: str) -> str:
         """A line as text."""
         return self.data[self.start[index] : self.end[index]].decode(encoding)
 
-    def columns(self, shape: Shape, count: int) -> Columns:
+    def columns(self, count: int) -> Columns:
         """The first `count` columns of the regular lines."""
         from pyarrow import csv
 
         kept = self._kept()
-        names = [str(i) for i in range(shape.cells)]
+        names = [str(i) for i in range(self.shape.cells)]
         if not kept:
             return Columns(cells=[pa.array([], pa.string()) for _ in range(count)])
         table = csv.read_csv(
             pa.BufferReader(kept),
             read_options=csv.ReadOptions(use_threads=False, block_size=len(kept) + 1, column_names=names),
-            parse_options=csv.ParseOptions(delimiter=chr(shape.delimiter), ignore_empty_lines=False),
+            parse_options=csv.ParseOptions(delimiter=chr(self.shape.delimiter), ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(
                 check_utf8=False, column_types=dict.fromkeys(names[:count], pa.string()),
                 include_columns=names[:count], strings_can_be_null=False, quoted_strings_can_be_null=False,
@@ -138,14 +142,17 @@ def shape_of(line: bytes, *, delimiter: str, named: int | None, comment: str | N
 
 
 def lines_of(data: bytes, shape: Shape) -> Lines | None:
-    """The lines of a block that ends with a line end or with the file; `None` where a CR alone ends some of them."""
+    """The lines of a block that ends with a line end or with the file; `None` where that takes a closer look.
+
+    It does where a CR alone ends a line, and where Arrow would take a cell's first character for a byte-order mark.
+    """
     byte = np.frombuffer(data, dtype=np.uint8)
     feeds = np.flatnonzero(byte == _LF)
     if len(byte) and byte[-1] != _LF:
         feeds = np.append(feeds, len(byte))
     start = np.concatenate(([0], feeds[:-1] + 1)).astype(np.int64) if len(feeds) else np.zeros(0, dtype=np.int64)
     returned = (byte[np.maximum(feeds - 1, 0)] == _CR) & (feeds > start)
-    if data.count(_CR) != int(returned.sum()) or data.startswith(codecs.BOM_UTF8):
+    if data.count(_CR) != int(returned.sum()) or codecs.BOM_UTF8 in data:
         return None
     end = feeds - returned
     marks = np.flatnonzero(byte == shape.delimiter)
@@ -159,7 +166,7 @@ def lines_of(data: bytes, shape: Shape) -> Lines | None:
     quotes = np.flatnonzero(byte == _QUOTE)
     if len(quotes):
         regular &= ~_misquoted(byte, feeds, quotes, marks, on, shape.delimiter)
-    return Lines(data=data, start=start, end=end, regular=regular)
+    return Lines(data=data, start=start, end=end, regular=regular, shape=shape)
 
 
 def _with(

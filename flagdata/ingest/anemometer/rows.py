@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +111,7 @@ class RowReader:
                     yield where, good
                 first += len(texts)
                 continue
-            where, found = self._of_lines(lines, shape, first, width, encoding)
+            where, found = self._of_lines(lines, first, width, encoding)
             if len(where):
                 yield where, found
             first += len(lines.start)
@@ -129,14 +130,12 @@ class RowReader:
             ascii_only=self._source.encoding == "latin-1",
         )  # fmt: skip
 
-    def _of_lines(
-        self, lines: Lines, shape: Shape, first: int, width: int, encoding: str
-    ) -> tuple[NDArray[np.int64], Columns]:
+    def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[NDArray[np.int64], Columns]:
         """Rows of a block whose first line has the number `first`."""
         number = first + np.arange(len(lines.start), dtype=np.int64)
-        lines.regular[number < self.first_line] = False
+        lines = replace(lines, regular=lines.regular & (number >= self.first_line))
         regular, others = number[lines.regular], number[~lines.regular]
-        found = lines.columns(shape, width)
+        found = lines.columns(width)
         before = self._last_malformed
         texts = [lines.text(at, encoding) for at in (others - first).tolist()]
         where, good = self._sorted(others.tolist(), texts, width)

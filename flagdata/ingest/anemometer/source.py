@@ -88,7 +88,7 @@ class TextFile:
                 yield first, lines
                 first += len(lines)
 
-    def raw_blocks(self, size: int = 4 << 20) -> Iterator[bytes]:
+    def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
         """The file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a line."""
         with self.path.open("rb") as stream:
             rest = b""

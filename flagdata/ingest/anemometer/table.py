@@ -129,7 +129,9 @@ class _Clock:
     def instants(
         self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str
     ) -> tuple[Instants, tuple[Finding, ...]]:
+        """The instants and what was found; the blocks are let go."""
         wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
+        self.ns, self.utc = [], []
         return instants(wall, utc, line=line, zone_name=zone_name, where=where)
 
 
@@ -211,9 +213,11 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
     )
     for line, block in rows.blocks(gathered.width()):
         gathered.add(line, block, recipe)
+    pa.default_memory_pool().release_unused()  # the text of the last blocks
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
     order = gathered.clock.order()
     line = gathered.line()[order]
+    gathered.lines = [line]
     if order.step == -1:
         text = "the newest row comes first: read from the end"
         findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))
