@@ -138,6 +138,7 @@ def toa5(path: Path) -> None:
         text = f".{part:03d}".rstrip("0").rstrip(".") if part else ""
         record = i if i < 300 else i + 7
         x = '"NAN"' if i % 50 == 3 else f"{rng.normal(4, 1):.5f}"
+        z = "-7999" if i % 90 == 5 else "0.01"
         lines.append(f'"2021-05-14 00:00:{whole:02d}{text}",{record},{x},{rng.normal():.5f},{z},{i % 64}')
     lines[100] = lines[100][:20]
     lines[200] = lines[200].replace(",", ";")
