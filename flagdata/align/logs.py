@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.align.clock import ClockModel, Segment
-from flagdata.align.drift import FEWEST_PARTS, PART, ClockLine, line_through
 from flagdata.align.declared import QUARTZ, stamp_sigma
+from flagdata.align.drift import FEWEST_PARTS, PART, ClockLine, line_through
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import long_run_variance
@@ -273,9 +273,7 @@ def _whole(
         spread.append(0.0 if near is None else float(np.std(near.speed)) * math.sqrt(len(near.time)))
     reasons: list[str] = []
     for hour in np.argsort(spread)[::-1][:_TRIES].tolist():
-        found = _part(
-            motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator
-        )
+        found = _part(motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator)
         if found is not None and found.accepted:
             return found
         if found is not None and not reasons:
