@@ -2,9 +2,9 @@
 
 The offset is found as that between a film and a log is (`lag`), with the faster log in the place of the motion: first
 over the hour in which the slower log varies most, then over parts of ten minutes all along, through which a weighted
-line gives offset and drift (`drift`). A sensor that follows the wind late would shift the offset, and, since it is later
-in light wind, the drift too; where its distance constant is stated, the other log is passed through the same lag, so
-that both follow alike.
+line gives offset and drift (`drift`). A sensor that follows the wind late would shift the offset, and, since it is
+later in light wind, the drift too; where its distance constant is stated, the other log is passed through the same lag,
+so that both follow alike.
 
 The gain is the slope of the sensor's minute means on the reference's, on the common clock, by least squares about their
 means: a minute's noise and resolution vanish beside what the wind varies by from minute to minute, and what each sensor
@@ -40,6 +40,7 @@ GAIN_PERIOD = 60.0  # s
 _REACH = 30.0  # s searched either side of the first offset, at least
 _FASTEST = 3e-4  # s/s, beyond which no logger's clock parts from another
 _PART_SIGMA = 1.0  # s; a part known worse than this says nothing
+_PART_SURROGATES = 50  # the first offset is known by then; those of a part keep out what agrees by accident
 _TRIES = 3  # hours looked at before the logs are taken for unrelated
 
 Progress = Callable[[int], object]
@@ -294,7 +295,7 @@ def _line(
     duration = float(motion.time[-1] - motion.time[0]) / NANOSECONDS
     reach = max(_REACH, 4 * whole.sigma + _FASTEST * duration)
     near = replace(search, centre=whole.offset, window=min(reach, search.window), sigma=_PART_SIGMA)
-    near = replace(near, sigma=math.hypot(_PART_SIGMA, near.stamp_sigma))
+    near = replace(near, sigma=math.hypot(_PART_SIGMA, near.stamp_sigma), surrogates=_PART_SURROGATES)
     count = int(duration / PART)
     edges = np.linspace(float(motion.time[0]), float(motion.time[-1]) + 1, count + 1).astype(np.int64)
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PARTS)).round().astype(np.int64)) if count else []
@@ -329,5 +330,5 @@ def _model(
 def _refused(names: tuple[str, str], reasons: list[str]) -> RefusedError:
     return RefusedError(
         f"no offset can be told: {'; '.join(reasons)}", where=f"{names[0]} and {names[1]}",
-        fix="check that both logs are of one wind and their zones; search around another offset by --centre and --search",
+        fix="check that both logs are of one wind, and their zones; search around another offset: --centre, --search",
     )  # fmt: skip

@@ -76,8 +76,9 @@ def _clock_options(command: F) -> F:
 @_clock_options
 def align(
     first: str, second: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
-    search: float | None, window: float | None, response: float | None, response_sigma: float | None, max_sigma: float | None,
-    name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None, as_json: bool, lake_path: str,
+    search: float | None, window: float | None, response: float | None, response_sigma: float | None,
+    max_sigma: float | None, name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None,
+    as_json: bool, lake_path: str,
 ) -> None:  # fmt: skip
     """Put the artifacts CAMERA and WIND on one clock: a recording and its clips, in one commit.
 
@@ -112,8 +113,9 @@ def align(
 @_clock_options
 def realign(
     recording: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
-    search: float | None, window: float | None, response: float | None, response_sigma: float | None, max_sigma: float | None,
-    name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None, as_json: bool, lake_path: str,
+    search: float | None, window: float | None, response: float | None, response_sigma: float | None,
+    max_sigma: float | None, name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None,
+    as_json: bool, lake_path: str,
 ) -> None:  # fmt: skip
     """Write RECORDING anew with another clock model, from the same camera and wind artifacts.
 

@@ -86,11 +86,12 @@ def sentence(found: LogClock) -> str:
 
     (segment,), gain = found.model.segments, found.gain
     half = NINETY * segment.sigma_offset
+    low, high = segment.offset - half, segment.offset + half
     digits = max(2, 1 - math.floor(math.log10(segment.sigma_offset)))
     parts = len(found.line.parts)
     return (
-        f"offset {segment.offset:+.{digits}f} s [{segment.offset - half:.{digits}f}, {segment.offset + half:.{digits}f}]"
-        f" 90 %, drift {1e6 * segment.drift:+.2f} ± {1e6 * segment.sigma_drift:.2f} ppm"
+        f"offset {segment.offset:+.{digits}f} s [{low:.{digits}f}, {high:.{digits}f}] 90 %"
+        f", drift {1e6 * segment.drift:+.2f} ± {1e6 * segment.sigma_drift:.2f} ppm"
         f"{f', n = {parts} parts of ten minutes' if parts else ' (not measured: too few parts)'}; "
         f"gain {gain.gain:.4f} ± {gain.sigma:.4f}, zero {gain.zero:+.3f} ± {gain.sigma_zero:.3f} m/s, "
         f"n = {gain.count} minutes"

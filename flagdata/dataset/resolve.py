@@ -20,7 +20,7 @@ from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.query import Request, Selection
 from flagdata.record import Record
-from flagdata.schema import Kind
+from flagdata.schema import TRUTH_WINDOW, Kind
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
 
