@@ -62,8 +62,8 @@ class Source:
             NotFoundError: no such ref, or no clip matches.
             RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
             UnknownNameError: no such column or side.
-            UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where none
-                is named, or a seed that is no whole number.
+            UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
+                none is named, or a seed that is no whole number.
         """
         if not isinstance(seed, int):
             raise UsageError(f"the seed {seed!r}", where="seed", fix="give a whole number")

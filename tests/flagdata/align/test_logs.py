@@ -197,7 +197,8 @@ def test_the_command_writes_the_sensors_log_on_the_references_clock_in_one_commi
     assert artifact.clock_offset == pytest.approx(two.offset, abs=0.15)
     record = Record.open(lake.object_path(str(artifact.object)))
     written, own = record.wind(), Record.open(lake.object_path(str(lake.artifact(cup).object))).wind()
-    assert written is not None and own is not None
+    assert written is not None
+    assert own is not None
     np.testing.assert_array_equal(record.device_wind_times, own.time)
     assert written.time[0] - own.time[0] == pytest.approx(two.offset * SECOND, abs=0.15 * SECOND)
     np.testing.assert_array_equal(written.channels["wind_speed"], own.channels["wind_speed"])
