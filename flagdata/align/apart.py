@@ -13,7 +13,7 @@ _NEAR = 120.0  # s about a whole quarter
 
 
 def by_spans(film: tuple[int, int], log: tuple[int, int], *, names: tuple[str, str]) -> Finding | None:
-    """A warning where film and log, as they are stamped, lie `HOURS_APART` or more from each other; else `None`.
+    """A warning where film and log (or two logs), as stamped, lie `HOURS_APART` or more from each other; else `None`.
 
     Args:
         film, log: first and last instant of each, on its own clock [UTC ns].
@@ -27,8 +27,8 @@ def by_spans(film: tuple[int, int], log: tuple[int, int], *, names: tuple[str, s
         kind="clocks-hours-apart",
         severity=Severity.WARNING,
         what=f"{names[0]} is stamped {iso(film[0])} to {iso(film[1])}, and {names[1]} {iso(log[0])} to {iso(log[1])}: "
-        f"{'the log begins' if before > after else 'the log ends'} {_length(gap)} "
-        f"{'after the film' if before > after else 'before it'}",
+        f"{names[1]} {'begins' if before > after else 'ends'} {_length(gap)} "
+        f"{'after' if before > after else 'before'} {names[0]}",
         value=gap if before > after else -gap,
         fix="if they were made together, ingest the one anew whose --zone, --start or --date is wrong, or search "
         "around the difference: --centre SECONDS",

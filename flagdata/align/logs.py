@@ -172,15 +172,14 @@ def _spacing(series: WindSeries) -> float:
 
 
 def _alike(slow: WindSeries, fast: WindSeries) -> tuple[WindSeries, WindSeries]:
-    """Both logs late by the lags of both sensors, where these are stated; none is left for `wind_bins` to allow for."""
+    """Both logs late by the slower one's lag, where it is stated and the faster has none, so that none is left to allow
+    for; else as they are."""
     lags = [series.sensor.distance_constant for series in (slow, fast)]
     if any(lag is None for lag in lags) or _spacing(fast) > SHORTEST / 2:
         return slow, fast
-    late = fast
-    if (lag := slow.sensor.distance_constant or 0.0) > 0:
-        late = _lagged(fast, lag)
     if (lags[1] or 0.0) > 0:
-        return slow, late  # a slow log cannot be passed through a lag between its samples: `lead` allows for that one
+        return slow, fast  # a slow log cannot be passed through a lag between its samples: `lead` allows for both
+    late = _lagged(fast, lags[0]) if lags[0] else fast
     at_once = [replace(series, sensor=replace(series.sensor, distance_constant=0.0)) for series in (slow, late)]
     return at_once[0], at_once[1]
 

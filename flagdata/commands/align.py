@@ -190,7 +190,8 @@ def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
 
     if pair.wind.start is None or pair.wind.end is None:
         return
-    shift = round((options.offset or 0.0) * NANOSECONDS)
+    centre = options.search.centre if options.search is not None else 0.0
+    shift = round((options.offset or centre) * NANOSECONDS)
     start, end = pair.span
     found = by_spans(
         (start + shift, end + shift), (pair.wind.start, pair.wind.end), names=(pair.camera.name, pair.wind.name)

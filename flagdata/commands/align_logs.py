@@ -35,6 +35,7 @@ def align_logs(
     from flagdata.align.windpair import WindPair, find_aligned, make_aligned
     from flagdata.errors import UsageError
     from flagdata.rng import stream
+    from flagdata.timebase import NANOSECONDS
 
     if options.by is not Method.ESTIMATE:
         raise UsageError(f"two logs aligned by {options.by}", where="--by", fix="leave --by out: they are compared")
@@ -50,8 +51,11 @@ def align_logs(
         say("this log is aligned already; nothing was written")
         _report(present, None, created=False, as_json=as_json)
         return
-    spans = [(int(series.time[0]), int(series.time[-1])) for series in (pair.sensor_series, pair.reference_series)]
-    apart = by_spans(spans[0], spans[1], names=(pair.sensor.name, pair.reference.name))
+    shift = round(search.centre * NANOSECONDS)
+    own, other = pair.sensor_series.time, pair.reference_series.time
+    apart = by_spans(
+        (int(own[0]) + shift, int(own[-1]) + shift), (int(other[0]), int(other[-1])), names=(pair.sensor.name, pair.reference.name),
+    )  # fmt: skip
     if apart is not None:
         say(f"warning: {apart.what}; {apart.fix}")
     with progress(None, label="comparing", unit="part") as advance:
