@@ -54,7 +54,8 @@ def align_logs(
     shift = round(search.centre * NANOSECONDS)
     own, other = pair.sensor_series.time, pair.reference_series.time
     apart = by_spans(
-        (int(own[0]) + shift, int(own[-1]) + shift), (int(other[0]), int(other[-1])), names=(pair.sensor.name, pair.reference.name),
+        (int(own[0]) + shift, int(own[-1]) + shift), (int(other[0]), int(other[-1])),
+        names=(pair.sensor.name, pair.reference.name),
     )  # fmt: skip
     if apart is not None:
         say(f"warning: {apart.what}; {apart.fix}")
