@@ -1,7 +1,7 @@
 """A wind that somebody states instead of measuring it: a tunnel's constant speed, known to a σ, all along a film.
 
 It becomes a wind artifact on the film's own clock, so that everything behind it (recordings, clips, their σ) goes as
-with a log: one sample a second of the stated speed, of an instrument whose accuracy is the stated σ. The quality flag
+with a log: a sample a second, or sixty in a shorter window, of the stated speed, of an instrument whose accuracy is the stated σ. The quality flag
 "wind-declared" goes with it into the recording and its clips.
 """
 
@@ -27,6 +27,7 @@ from flagdata.timebase import NANOSECONDS, iso
 
 REPORT_SCHEMA = "flagdata.declared-wind-report/1"
 DECLARED = "wind-declared"
+_SAMPLES = 60  # in a window, at least, so that it is covered but for the last sixtieth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +54,10 @@ class ConstantWind:
         """What the artifact's identity depends on, beside the film."""
         return {"declare": {"wind": self.speed, "sigma": self.sigma}}
 
-    def series(self, start: int, end: int) -> WindSeries:
-        """Samples on whole seconds from `start` to `end` and beyond [UTC ns]."""
-        first, last = start // NANOSECONDS, -(-end // NANOSECONDS)
-        time = np.arange(first, last + 1, dtype=np.int64) * NANOSECONDS
+    def series(self, start: int, end: int, *, period: float) -> WindSeries:
+        """Samples every `period` [s] from `start` to `end` and beyond [UTC ns]."""
+        step = round(period * NANOSECONDS)
+        time = np.arange(start // step, -(-end // step) + 1, dtype=np.int64) * step
         return WindSeries(
             time=time,
             channels={"wind_speed": np.full(len(time), self.speed)},
@@ -86,7 +87,8 @@ def declared_wind(
         if list(row["parents"]) == [camera.id]:
             return Artifact.from_row(row)
     before, after = round((window + 1) * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
-    series = wind.series(camera.start - before, camera.end + after)
+    period = min(1.0, window / _SAMPLES)
+    series = wind.series(camera.start - before, camera.end + after, period=period)
     stated = Finding(
         kind=DECLARED, severity=Severity.WARNING, value=wind.speed,
         what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s all along",
@@ -107,7 +109,7 @@ def declared_wind(
         artifact = Artifact(
             kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),
             parents=(camera.id,), recipe=recipe, session=session or camera.session, day=iso(start)[:10], start=start,
-            end=end, rate=1.0, quality=quality_flags((stated,)),
+            end=end, rate=1 / period, quality=quality_flags((stated,)),
             report=json.dumps(report, allow_nan=False, ensure_ascii=False), branch=branch,
         )  # fmt: skip
         transaction.add(artifact)

@@ -152,7 +152,7 @@ def test_logs_of_different_days_are_refused_as_not_overlapping() -> None:
 
 def test_gain_is_the_slope_of_minute_means() -> None:
     time = START + np.arange(3600, dtype=np.int64) * SECOND
-    speed = 5 + np.sin(np.arange(3600) / 400)
+    speed = 5.0 + np.sin(np.arange(3600.0) / 400)
     model = ClockModel.identity("b", "a", start=START, end=int(time[-1]) + 1, sigma=0.1)
     sensor = Sensor(name="made")
     flags = np.zeros(3600, dtype=np.uint16)
