@@ -69,7 +69,7 @@ class LagBins:
         if not np.any(near):
             raise InputError(
                 "the wind log and the film do not overlap at any offset searched",
-                fix="check start times and zones, or give --centre and a wider --window",
+                fix="check start times and zones, or give --centre and a wider --search",
             )
         time, speed = wind.time[near], wind.speed[near]
         index = np.rint((time - time[0]) / period).astype(np.int64)

@@ -80,7 +80,7 @@ def clock_line(
     )
     if len(parts) < FEWEST_PARTS:
         return alone
-    return _line(parts, whole)
+    return line_through(parts, whole)
 
 
 def _chunks(motion: MotionSeries, count: int) -> list[MotionSeries]:
@@ -94,7 +94,8 @@ def _chunks(motion: MotionSeries, count: int) -> list[MotionSeries]:
     return chunks
 
 
-def _line(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLine:
+def line_through(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLine:
+    """The weighted line of `clock_line` through the offsets of three parts or more; `whole` lends its common σ."""
     at = np.array([(part.at - whole.at) / NANOSECONDS for part in parts])
     offset = np.array([part.offset for part in parts])
     sigma = np.array([part.sigma_statistical for part in parts])

@@ -76,7 +76,7 @@ class ClockOptions:
             )
         if self.search is not None and self.by is not Method.ESTIMATE:
             raise UsageError(
-                f"alignment by {self.by} searches nothing", where="--window", fix="leave the search's options out"
+                f"alignment by {self.by} searches nothing", where="--search", fix="leave the search's options out"
             )
 
     def recipe(self) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import theilslopes
 
 from flagdata.align.clock import NINETY, ClockModel, Segment
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
@@ -169,6 +168,8 @@ def _line(time: Series, late: Series, quantum: float) -> _Line:
     origin = float(np.mean(when))
     drift, sigma_drift = 0.0, PRIOR_DRIFT
     if len(when) > 2 * _SIDE:
+        from scipy.stats import theilslopes  # only now: it takes longer to load than most logs to read
+
         slope, _, low, high = np.asarray(theilslopes(least, when, 0.6827), dtype=np.float64).tolist()
         rounding = quantum / math.sqrt(len(when)) / float(np.std(when))
         measured = math.hypot((high - low) / 2, rounding)

@@ -8,6 +8,7 @@ record's metadata and into the catalog with its σ.
 from __future__ import annotations
 
 import json
+import math
 import mimetypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.align.apart import by_offset
 from flagdata.align.clock import ClockModel
 from flagdata.align.motion import MotionSeries, motion_energy
 from flagdata.dataset.clips import clip_rows
@@ -27,15 +29,16 @@ from flagdata.provenance import canonical, code_version, recipe_hash
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
 from flagdata.record.parent import open_parent
-from flagdata.schema import Kind
+from flagdata.schema import TRUTH_WINDOW, Kind
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 
 Progress = Callable[[int], object]
 REPORT_SCHEMA = "flagdata.align-report/1"
 CURVE = "alignment.json"
-MARGIN_BEFORE = 600.0  # s of wind kept before the first frame: ground truth looks back
+MARGIN_BEFORE = 600.0  # s of wind kept before the first frame, or the ground truth's window: it looks back
 MARGIN_AFTER = 60.0  # s
+LONGEST_WINDOW = 86_400.0  # s, of the ground truth
 _FRAMES_AT_ONCE = 64
 
 
@@ -138,6 +141,25 @@ class RecordingResult:
     created: bool
 
 
+def truth_recipe(window: float) -> dict[str, Any]:
+    """What the window of the ground truth [s] adds to a recording's recipe: nothing where it is the usual one.
+
+    Raises:
+        UsageError: no length of time, or one beyond a day.
+    """
+    if not (math.isfinite(window) and 0 < window <= LONGEST_WINDOW):
+        raise UsageError(
+            f"a ground truth over {window:g} s", where="--window",
+            fix=f"give a length of time above zero, {LONGEST_WINDOW:g} s at most",
+        )  # fmt: skip
+    return {} if window == TRUTH_WINDOW else {"truth": {"window": window}}
+
+
+def truth_window(recipe: Mapping[str, Any]) -> float:
+    """The window of the ground truth [s] of a recording's clips, by its recipe."""
+    return float(recipe.get("truth", {}).get("window", TRUTH_WINDOW))
+
+
 def session_of(pair: Pair, *, named: str | None) -> str | None:
     """The session of a recording: the one named, else the one its parents agree on; `None` where neither names one.
 
@@ -207,13 +229,15 @@ def make_recording(
     chosen = session_of(pair, named=session)
     clock = alignment.clock
     frames = clock.to_common(pair.camera_record.device_frame_times)
-    wind = _near(pair.series(), int(frames[0]), int(frames[-1]), where=pair.wind.id)
+    window = truth_window(alignment.recipe)
+    before = max(MARGIN_BEFORE, window)
+    wind = _near(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
     with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         _write(staged, pair, alignment, frames, wind, progress=progress)
         recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=chosen)
         transaction.add(replace(recording, branch=branch))
-        clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording)
+        clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=window)
         for clip in clips:
             transaction.add(clip)
     committed = transaction.result
@@ -223,9 +247,9 @@ def make_recording(
     )
 
 
-def _near(series: WindSeries, start: int, end: int, *, where: str) -> WindSeries:
-    """The samples from `MARGIN_BEFORE` before the film to `MARGIN_AFTER` after it."""
-    low, high = start - round(MARGIN_BEFORE * NANOSECONDS), end + round(MARGIN_AFTER * NANOSECONDS)
+def _near(series: WindSeries, start: int, end: int, *, before: float, where: str) -> WindSeries:
+    """The samples from `before` [s] before the film to `MARGIN_AFTER` after it."""
+    low, high = start - round(before * NANOSECONDS), end + round(MARGIN_AFTER * NANOSECONDS)
     near = (series.time >= low) & (series.time <= high)
     if not np.any(near):
         raise InputError(
@@ -295,7 +319,9 @@ def _artifact(
     device = pair.camera_record.device_frame_times
     middle = int(device[0] + (device[-1] - device[0]) // 2)
     start, end = int(frames[0]), int(frames[-1])
-    own = quality_flags(alignment.findings)
+    apart = by_offset(float(clock.to_common(middle) - middle) / NANOSECONDS, names=(pair.camera.name, pair.wind.name))
+    findings = (*alignment.findings, *((apart,) if apart is not None else ()))
+    own = quality_flags(findings)
     report = {
         "schema": REPORT_SCHEMA,
         "kind": Kind.RECORDING.value,
@@ -303,7 +329,7 @@ def _artifact(
         "start": iso(start),
         "end": iso(end),
         **alignment.details,
-        "findings": [finding.as_dict() for finding in alignment.findings],
+        "findings": [finding.as_dict() for finding in findings],
     }
     return Artifact(
         kind=Kind.RECORDING,

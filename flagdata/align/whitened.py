@@ -90,7 +90,7 @@ class Whitened:
         gain = covariance / variance
         psi = np.where(valid, (centred_y - gain * centred_x) * (dx - np.mean(dx[valid])), 0.0)
         curvature = gain * float(np.var(dx[valid]))
-        sigma = math.sqrt(_long_run_variance(psi, n) / n) / curvature if curvature > 0 else math.inf
+        sigma = math.sqrt(long_run_variance(psi, n) / n) / curvature if curvature > 0 else math.inf
         correlation = covariance / math.sqrt(variance * float(np.mean(centred_y[valid] ** 2)))
         return Peak(offset=self._vertex(score, best), sigma=sigma, correlation=correlation, bins=n)
 
@@ -222,7 +222,7 @@ def _slope(samples: Series) -> Series:
     return out
 
 
-def _long_run_variance(psi: Series, count: int) -> float:
+def long_run_variance(psi: Series, count: int) -> float:
     """Newey and West (1987): Σ over lags of the autocovariances of `count` samples with Bartlett's weights."""
     reach = math.ceil(count ** (1 / 3))
     total = float(psi @ psi)

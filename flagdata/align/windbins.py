@@ -41,8 +41,8 @@ class WindBins:
     sigma: float
 
 
-def wind_bins(series: WindSeries) -> WindBins:
-    """Bins of 1 s, or of the time between samples where that is longer.
+def wind_bins(series: WindSeries, *, shortest: float = SHORTEST) -> WindBins:
+    """Bins of `shortest` [s], or of the time between samples where that is longer.
 
     A sample's air precedes its stamp by the sum of two times. Half the sensor's averaging, where its recipe states it;
     else anything from 0 (a reading of the instant) to half the time between samples. And ℓ/U, the lag of a rotating
@@ -70,7 +70,7 @@ def wind_bins(series: WindSeries) -> WindBins:
             f"wind samples come every {spacing:.0f} s, too rarely to see gusts",
             fix="align by stamps or by a given offset",
         )
-    period = max(SHORTEST, round(spacing, 2))
+    period = max(shortest, round(spacing, 2))
     length = round(period * NANOSECONDS)
     shift = _mid_bin_shift(time, length) if spacing > period / 4 else 0
     means = average(replace(series, time=series.time - shift), period)
@@ -81,12 +81,12 @@ def wind_bins(series: WindSeries) -> WindBins:
     origin = int(shifted[0])
     stamps = np.add.reduceat((shifted - origin).astype(np.float64), starts) / counts
     middles = (means.time - origin).astype(np.float64) - length / 2
-    lead, sigma = _lead(series.sensor, spacing, float(np.mean(series.channels["wind_speed"][usable])))
-    move = float(np.median(stamps - middles)) - lead * NANOSECONDS
+    early, sigma = lead(series.sensor, spacing, float(np.mean(series.channels["wind_speed"][usable])))
+    move = float(np.median(stamps - middles)) - early * NANOSECONDS
     return WindBins(average=replace(means, time=means.time + shift + round(move)), sigma=sigma)
 
 
-def _lead(sensor: Sensor, spacing: float, speed: float) -> tuple[float, float]:
+def lead(sensor: Sensor, spacing: float, speed: float) -> tuple[float, float]:
     """By how much a sample's air precedes its stamp, and its standard uncertainty [s]."""
     rectangle = 1 / math.sqrt(12)
     if sensor.averaging is not None:

@@ -1,4 +1,4 @@
-"""`flagdata align` and `flagdata realign`: a camera and an anemometer on one clock."""
+"""`flagdata align` and `flagdata realign`: a camera and an anemometer, or two anemometers, on one clock."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from flagdata.commands.durations import DURATION
 from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
     from flagdata.align.methods import ClockOptions, Outcome
@@ -36,7 +38,14 @@ def _clock_options(command: F) -> F:
             click.option(
                 "--centre", type=float, metavar="S", help="Offset around which to search; 0 if the stamps are near."
             ),
-            click.option("--window", type=float, metavar="S", help="Search this far either side; 120 by default."),
+            click.option(
+                "--search", type=float, metavar="S", help="Search this far either side of it; 120 by default."
+            ),
+            click.option(
+                "--window", type=DURATION, metavar="TIME",
+                help="Average the wind over this long before a clip's end for its ground truth, e.g. 10s or 2min; "
+                "60s by default.",
+            ),
             click.option(
                 "--response", type=float, metavar="S",
                 help="By how much the flag's motion follows the wind at the anemometer; 0.3 by default.",
@@ -62,26 +71,39 @@ def _clock_options(command: F) -> F:
 
 
 @click.command()
-@click.argument("camera")
-@click.argument("wind")
+@click.argument("first", metavar="CAMERA|REFERENCE")
+@click.argument("second", metavar="WIND|SENSOR")
 @_clock_options
 def align(
-    camera: str, wind: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
-    window: float | None, response: float | None, response_sigma: float | None, max_sigma: float | None,
-    name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None, as_json: bool, lake_path: str,
+    first: str, second: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
+    search: float | None, window: float | None, response: float | None, response_sigma: float | None,
+    max_sigma: float | None, name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None,
+    as_json: bool, lake_path: str,
 ) -> None:  # fmt: skip
     """Put the artifacts CAMERA and WIND on one clock: a recording and its clips, in one commit.
 
-    An estimate that is not certain is refused (exit 3) and nothing is committed.
+    Of two wind artifacts, REFERENCE and SENSOR, the second is written anew on the first one's clock; offset, drift and
+    gain are reported. An estimate that is not certain is refused (exit 3) and nothing is committed.
     """
-    from flagdata.align.recording import Pair
+    from flagdata.align.recording import Pair, truth_recipe
     from flagdata.lake import Lake
+    from flagdata.schema import TRUTH_WINDOW, Kind
 
-    options = _options(by, offset, offset_sigma, centre, window, response, response_sigma, max_sigma)
+    options = _options(by, offset, offset_sigma, centre, search, response, response_sigma, max_sigma)
     lake = Lake.open(lake_path)
-    pair = Pair.of(lake, camera, wind, at=branch)
+    if {lake.artifact(which, at=branch).kind for which in (first, second)} == {Kind.WIND}:
+        from flagdata.commands.align_logs import align_logs
+
+        unused = {"--window": window, "--response": response, "--response-sigma": response_sigma, "--plot": plot}
+        align_logs(
+            lake, first, second, options, unused=tuple(o for o, value in unused.items() if value is not None),
+            name=name, session=session, branch=branch, dry_run=dry_run, as_json=as_json,
+        )  # fmt: skip
+        return
+    pair = Pair.of(lake, first, second, at=branch)
+    recipe = {**options.recipe(), **truth_recipe(TRUTH_WINDOW if window is None else window)}
     _run(
-        lake, pair, options, recipe=options.recipe(), name=name, session=session, branch=branch, dry_run=dry_run,
+        lake, pair, options, recipe=recipe, name=name, session=session, branch=branch, dry_run=dry_run,
         plot=plot, as_json=as_json,
     )  # fmt: skip
 
@@ -91,21 +113,24 @@ def align(
 @_clock_options
 def realign(
     recording: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
-    window: float | None, response: float | None, response_sigma: float | None, max_sigma: float | None,
-    name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None, as_json: bool, lake_path: str,
+    search: float | None, window: float | None, response: float | None, response_sigma: float | None,
+    max_sigma: float | None, name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None,
+    as_json: bool, lake_path: str,
 ) -> None:  # fmt: skip
     """Write RECORDING anew with another clock model, from the same camera and wind artifacts.
 
-    The old recording and its clips stay until `flagdata withdraw` takes them off the branch; tags keep them.
+    The window of the ground truth stays what it was unless --window says otherwise. The old recording and its clips
+    stay until `flagdata withdraw` takes them off the branch; tags keep them.
     """
-    from flagdata.align.recording import Pair, parents_of
+    from flagdata.align.recording import Pair, parents_of, truth_recipe, truth_window
     from flagdata.lake import Lake
 
-    options = _options(by, offset, offset_sigma, centre, window, response, response_sigma, max_sigma)
+    options = _options(by, offset, offset_sigma, centre, search, response, response_sigma, max_sigma)
     lake = Lake.open(lake_path)
     old, parents = parents_of(lake, recording, at=branch)
     pair = Pair.of(lake, *parents, at=branch)
-    recipe = {**options.recipe(), "supersedes": old.id}
+    kept = truth_window(old.recipe) if window is None else window
+    recipe = {**options.recipe(), **truth_recipe(kept), "supersedes": old.id}
     _run(
         lake, pair, options, recipe=recipe, name=name or old.name, session=session or old.session, branch=branch,
         dry_run=dry_run, plot=plot, as_json=as_json,
@@ -141,6 +166,7 @@ def _run(
     from flagdata.align.recording import find_recording, make_recording, session_of
 
     session_of(pair, named=session)  # refused before the long part
+    _warn_of_clocks(pair, options)
     present = None if dry_run or plot else find_recording(lake, pair, recipe, name=name, session=session, branch=branch)
     if present is not None:
         say("this recording is there already; nothing was written")
@@ -156,6 +182,22 @@ def _run(
             lake, pair, outcome.alignment, name=name, session=session, branch=branch, progress=advance
         )
     _report(made, outcome, as_json=as_json)
+
+
+def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
+    """Say so where film and log are stamped hours apart."""
+    from flagdata.align.apart import by_spans
+
+    if pair.wind.start is None or pair.wind.end is None:
+        return
+    centre = options.search.centre if options.search is not None else 0.0
+    shift = round((options.offset or centre) * NANOSECONDS)
+    start, end = pair.span
+    found = by_spans(
+        (start + shift, end + shift), (pair.wind.start, pair.wind.end), names=(pair.camera.name, pair.wind.name)
+    )
+    if found is not None:
+        say(f"warning: {found.what}; {found.fix}")
 
 
 def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:

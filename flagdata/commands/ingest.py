@@ -36,7 +36,7 @@ from flagdata.errors import UsageError
 @click.option("--name", help="What people call the artifact; the file's name by default.")
 @click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
-@click.option("--start", metavar="TIME", help="Camera: instant of the first frame, ISO 8601.")
+@click.option("--start", metavar="TIME", help="Camera: instant of the first frame, ISO 8601, or unknown.")
 @click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(

@@ -67,12 +67,16 @@ def camera_options(
     """
     from flagdata import timebase
     from flagdata.ingest.camera import CameraOptions, parse_crop
+    from flagdata.ingest.camera.start import UNKNOWN
     from flagdata.ingest.store import CameraIngest
     from flagdata.record import Coding
 
     try:
         place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
-        instant = timebase.parse(start, default=place, where="--start") if start is not None else None
+        instant = None
+        if start is not None:
+            unknown = start.strip().lower() == "unknown"
+            instant = UNKNOWN if unknown else timebase.parse(start, default=place, where="--start")
     except TimeError as error:
         raise UsageError(error.what, where=error.where, fix=error.fix) from None
     options = CameraOptions(

@@ -48,18 +48,21 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
         yield from range(first, last - frames + 1, frames)
 
 
-def clip_rows(record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES) -> list[Artifact]:
-    """The clips of a recording, in order, with the mean wind over the minute before each one's end.
+def clip_rows(
+    record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES, window: float = TRUTH_WINDOW
+) -> list[Artifact]:
+    """The clips of a recording, in order, with the mean wind over the window before each one's end.
 
-    A clip whose minute is thin, stale or empty is kept as a row: its numbers say so, and `pairs` refuses it by its
+    A clip whose window is thin, stale or empty is kept as a row: its numbers say so, and `pairs` refuses it by its
     tolerance. A simulated record states its wind as the truth parameter "wind_speed" [m/s]; that is then exact.
 
     Args:
         record: frames, wind and truth on the common clock.
         recording: the artifact of the record; its identity, session, seed, clock model and object are passed on.
+        window: of the ground truth [s]; it stands in each clip's recipe.
 
     Raises:
-        UsageError, InputError: see `runs`.
+        UsageError, InputError: see `runs`; a window that is no length of time.
     """
     times = record.frame_times
     series = truth_series(record)
@@ -73,12 +76,13 @@ def clip_rows(record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES)
         sigma = float(clock.sigma(record.device_frame_times[last])) if clock else recording.clock_sigma
         if sigma is None and recording.seed is not None:
             sigma = 0.0  # a simulation has one clock
-        truth = clip_truth(series, end, known=known.get(TRUTH_SPEED), clock_sigma=sigma, window=TRUTH_WINDOW)
+        truth = clip_truth(series, end, known=known.get(TRUTH_SPEED), clock_sigma=sigma, window=window)
         start = int(times[first])
         rows.append(
             _row(
                 recording, truth,
-                first=first, frames=frames, start=start, end=end, clock_sigma=sigma, parameters=parameters,
+                first=first, frames=frames, window=window, start=start, end=end, clock_sigma=sigma,
+                parameters=parameters,
             )
         )  # fmt: skip
     return rows
@@ -114,6 +118,7 @@ def _row(
     *,
     first: int,
     frames: int,
+    window: float,
     start: int,
     end: int,
     clock_sigma: float | None,
@@ -127,7 +132,7 @@ def _row(
         object=recording.object,
         object_bytes=recording.object_bytes,
         parents=(recording.id,),
-        recipe={"frames": frames, "window": TRUTH_WINDOW},
+        recipe={"frames": frames, "window": window},
         seed=recording.seed,
         recording=recording.id,
         session=recording.session,

@@ -20,7 +20,7 @@ from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.query import Request, Selection
 from flagdata.record import Record
-from flagdata.schema import Kind
+from flagdata.schema import TRUTH_WINDOW, Kind
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
 
@@ -71,11 +71,11 @@ def resolve(
     at: str | None,
     split: str | None,
     split_by: HashedSplit | ExplicitSplit,
-    window: float,
+    window: float | None,
     tolerance: Tolerance,
 ) -> Resolved:
     """Pairs of `lake` at one version; arguments as in `Source.pairs`, which see for what it raises."""
-    if not (math.isfinite(window) and window > 0):
+    if window is not None and not (math.isfinite(window) and window > 0):
         raise UsageError(f"a window of {window} s", fix="give a length above zero")
     catalog = lake.table(lake.view(at))
     clips = _clips(catalog, where, COLUMNS)
@@ -94,7 +94,8 @@ def resolve(
                 where=where,
                 fix="record more days and sessions, or give an ExplicitSplit",
             )
-    table = _with_window(lake, table, _windows(clips, table), window)
+    windows = _windows(clips, table)
+    table = _with_window(lake, table, windows, _common(windows) if window is None else window)
     refused = judge(table, tolerance, superseded=superseded(catalog, set(table.recording.tolist())))
     kept = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
     if not kept.any():
@@ -149,6 +150,21 @@ def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:
         for artifact, text in zip(clips["artifact"].to_pylist(), clips["recipe"].to_pylist(), strict=True)
     }
     return np.array([by_artifact[str(artifact)] for artifact in table.artifact], dtype=np.float64)
+
+
+def _common(windows: NDArray[np.float64]) -> float:
+    """The one window of all pairs [s]; the usual one where no recipe states any.
+
+    Raises:
+        UsageError: several.
+    """
+    found = np.unique(windows[np.isfinite(windows)])
+    if len(found) > 1:
+        raise UsageError(
+            f"the clips have ground truths over {', '.join(f'{window:g}' for window in found)} s",
+            where="window", fix="name one: window=SECONDS; the others are then computed anew from the records' wind",
+        )  # fmt: skip
+    return float(found[0]) if len(found) else TRUTH_WINDOW
 
 
 def _with_window(lake: Lake, table: PairTable, windows: NDArray[np.float64], window: float) -> PairTable:

@@ -11,7 +11,6 @@ from flagdata.dataset.splits import ExplicitSplit, HashedSplit
 from flagdata.dataset.tolerance import Tolerance
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
-from flagdata.schema import TRUTH_WINDOW
 
 
 class Source:
@@ -40,7 +39,7 @@ class Source:
         at: str | None = None,
         split: str | None = None,
         split_by: HashedSplit | ExplicitSplit | None = None,
-        window: float = TRUTH_WINDOW,
+        window: float | None = None,
         tolerance: Tolerance | None = None,
         seed: int = 0,
         cache: DecodedCache | None = None,
@@ -54,7 +53,7 @@ class Source:
             split_by: how sides are made; `None` is `HashedSplit()`. Sides are decided over all clips of the version,
                 before `where`, so that two filters never put one session, day or seed on two sides.
             window: length of the mean that is the ground truth [s]; other than the catalog's it is computed anew from
-                the records' wind.
+                the records' wind. `None` is the catalog's, which must then be one for all clips.
             tolerance: bounds beyond which a pair is refused; `None` is `Tolerance()`.
             seed: of the shuffled order.
             cache: where decoded clips are kept; `None` decodes each time.
@@ -63,7 +62,8 @@ class Source:
             NotFoundError: no such ref, or no clip matches.
             RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
             UnknownNameError: no such column or side.
-            UsageError: a filter that is not SQL, a window that is no length of time, or a seed that is no whole number.
+            UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
+                none is named, or a seed that is no whole number.
         """
         if not isinstance(seed, int):
             raise UsageError(f"the seed {seed!r}", where="seed", fix="give a whole number")

@@ -79,7 +79,9 @@ class Entry:
         if not self.count:
             return -(2**63), 2**63 - 1
         times = self.frame_times
-        return int(times[0]) - round(TRUTH_WINDOW * NANOSECONDS), int(times[-1])
+        recipe = json.loads(self.row["recipe"]) if self.row.get("recipe") else {}
+        window = recipe.get("window", recipe.get("truth", {}).get("window", TRUTH_WINDOW))
+        return int(times[0]) - round(window * NANOSECONDS), int(times[-1])
 
     def images(self, size: int = 64) -> Iterator[NDArray[np.uint8]]:
         """The frames decoded, in order, as arrays (at most `size`, height, width) gray."""

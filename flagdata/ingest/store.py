@@ -205,7 +205,7 @@ def ingest_wind(
         with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
             record.wind(log.series)
             if path.stat().st_size <= ATTACHMENT_LIMIT:
-                record.attach(source.name, path.read_bytes(), media_type="text/plain", log_time=int(time[0]))
+                record.attach_file(source.name, path, media_type="text/plain", log_time=int(time[0]))
             else:
                 findings = (*findings, _not_attached(path))
             if options.wind.recipe is not None:

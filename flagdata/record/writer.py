@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import gzip
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -19,10 +18,12 @@ from numpy.typing import NDArray
 from flagdata.align.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.ingest.anemometer.averaging import average
-from flagdata.record import messages
-from flagdata.record.checksums import CHECKSUMS, ChecksummedWriter
+from flagdata.record import messages, wind_messages
+from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
+from flagdata.record.mcap_file import MessageBlock
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
 from flagdata.record.output import Output
+from flagdata.record.packing import packed, pieces_of
 from flagdata.record.video import VideoEncoder, is_key
 from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindSeries
@@ -35,6 +36,7 @@ ATTACHMENT_LIMIT = 256 << 20
 COMPRESS_ATTACHMENTS_ABOVE = 64 << 10
 GZIP_SUFFIX = "+gzip"  # of the media type of an attachment that was packed here (RFC 8460, section 6.5)
 MEAN_PERIOD = 1.0  # s, of the derived means on schema.TOPIC_WIND_1HZ
+_ROWS_AT_ONCE = 16_384  # samples made into bytes together
 
 
 class Chunking(StrEnum):
@@ -98,8 +100,9 @@ class RecordWriter:
         self._coding = coding
         self._video: VideoEncoder | None = None
         self._stream = Output(path)
-        self._writer = ChecksummedWriter(self._stream, chunk_size=CHUNK_BYTES[chunking])
-        self._writer.start(profile=PROFILE, library=library_name())
+        self._writer = ChecksummedFile(
+            self._stream, chunk_size=CHUNK_BYTES[chunking], profile=PROFILE, library=library_name()
+        )
         self._names: set[str] = set()
         self._channels: dict[str, int] = {}
         self._sequences: dict[str, int] = {}
@@ -161,18 +164,10 @@ class RecordWriter:
             common = clock.to_common(series.time)
             self._metadata(CLOCK + "/" + clock.device, {"model": clock.to_json()})
         aligned = replace(series, time=common)
-        columns = [
-            (messages.WIND_FIELDS[name][0], np.asarray(values, dtype=np.float64).tolist())
-            for name, values in sorted(series.channels.items())
-        ]
-        hosts = None if series.host_time is None else series.host_time.tolist()
-        flags = series.flags.tolist()
-        for i, (log_time, publish_time) in enumerate(zip(common.tolist(), series.time.tolist(), strict=True)):
-            sample = messages.WindSample(flags=flags[i], **{name: values[i] for name, values in columns})
-            messages.set_timestamp(sample.timestamp, log_time)
-            if hosts is not None:
-                messages.set_timestamp(sample.host_time, hosts[i])
-            self._message(TOPIC_WIND, sample, log_time=log_time, publish_time=publish_time)
+        for first in range(0, len(series), _ROWS_AT_ONCE):
+            rows = slice(first, first + _ROWS_AT_ONCE)
+            payloads = wind_messages.samples(series, common, rows)
+            self._messages(TOPIC_WIND, messages.WindSample, payloads, common[rows], series.time[rows])
         if "wind_speed" in series.channels:
             self._means(aligned)
 
@@ -201,20 +196,38 @@ class RecordWriter:
             ConflictError: the name is taken.
             LimitError: more than 256 MiB.
         """
-        if len(data) > ATTACHMENT_LIMIT:
-            raise LimitError(
-                f"attachment of {len(data)} bytes", where=name, fix=f"attach at most {ATTACHMENT_LIMIT} bytes"
-            )
+        self._check_attachment(name, len(data), media_type)
+        self._attach(name, lambda: [data], len(data), media_type=media_type, log_time=log_time)
+
+    def attach_file(self, name: str, path: Path, *, media_type: str, log_time: int) -> None:
+        """Attach the content of a file as `attach` does, without holding it in memory.
+
+        Raises:
+            ConflictError, LimitError: as `attach`.
+            InputError: it cannot be read, or changed while it was.
+        """
+        size = self._check_attachment(name, path.stat().st_size, media_type)
+        self._attach(name, lambda: pieces_of(path, size), size, media_type=media_type, log_time=log_time)
+
+    def _check_attachment(self, name: str, size: int, media_type: str) -> int:
+        """The size, if such an attachment may be added; its name is taken from now on."""
+        if size > ATTACHMENT_LIMIT:
+            raise LimitError(f"attachment of {size} bytes", where=name, fix=f"attach at most {ATTACHMENT_LIMIT} bytes")
         if f"attachment {name}" in self._names:
             raise ConflictError(f"attachment {name!r} is there already", where=str(self.path), fix="rename it")
         self._names.add(f"attachment {name}")
         if media_type.endswith(GZIP_SUFFIX):
             raise InputError(f"media type {media_type!r} is kept for what is packed here", fix="use application/gzip")
-        if len(data) > COMPRESS_ATTACHMENTS_ABOVE:
-            packed = gzip.compress(data, mtime=0)
-            if len(packed) < len(data):
-                name, data, media_type = f"{name}.gz", packed, media_type + GZIP_SUFFIX
-        self._writer.add_attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data)
+        return size
+
+    def _attach(
+        self, name: str, read: Callable[[], Iterable[bytes]], size: int, *, media_type: str, log_time: int
+    ) -> None:
+        kept = packed(read(), size) if size > COMPRESS_ATTACHMENTS_ABOVE else None
+        if kept is not None:
+            size, name, media_type = sum(map(len, kept)), f"{name}.gz", media_type + GZIP_SUFFIX
+        data = read() if kept is None else kept
+        self._writer.add_attachment(log_time=log_time, name=name, media_type=media_type, data=data, size=size)
 
     def _jpeg(self, image: NDArray[np.uint8] | bytes) -> bytes:
         if not isinstance(image, bytes):
@@ -243,14 +256,7 @@ class RecordWriter:
 
     def _means(self, aligned: WindSeries) -> None:
         means = average(aligned, MEAN_PERIOD)
-        rows = zip(
-            means.time.tolist(), means.speed.tolist(), means.sigma.tolist(), means.direction.tolist(),
-            means.count.tolist(), strict=True,
-        )  # fmt: skip
-        for time, speed, sigma, direction, count in rows:
-            mean = messages.WindMean(speed=speed, sigma=sigma, direction=direction, count=count, period=means.period)
-            messages.set_timestamp(mean.timestamp, time)
-            self._message(TOPIC_WIND_1HZ, mean, log_time=time, publish_time=time)
+        self._messages(TOPIC_WIND_1HZ, messages.WindMean, wind_messages.means(means), means.time, means.time)
 
     def _check_order(self, log_time: int, publish_time: int) -> None:
         if self._last_frame is not None and (log_time <= self._last_frame[0] or publish_time <= self._last_frame[1]):
@@ -263,31 +269,61 @@ class RecordWriter:
         self._last_frame = (log_time, publish_time)
 
     def _message(self, topic: str, message: Any, *, log_time: int, publish_time: int) -> None:
-        if min(log_time, publish_time) < 0:
-            raise TimeError(
-                "an instant before 1970, which MCAP cannot hold", where=f"{self.path}, {topic}",
-                fix="set the device's start time",
-            )  # fmt: skip
-        if topic not in self._channels:
-            schema = self._writer.register_schema(
-                name=message.DESCRIPTOR.full_name,
-                encoding=SchemaEncoding.Protobuf,
-                data=messages.descriptor_set(type(message)),
-            )
-            self._channels[topic] = self._writer.register_channel(
-                topic=topic, message_encoding=MessageEncoding.Protobuf, schema_id=schema
-            )
-            self._sequences[topic] = 0
+        channel = self._channel(topic, type(message), min(log_time, publish_time))
         if self._chunking is Chunking.LIVE:
             self._flush_each_second(log_time)
         self._writer.add_message(
-            channel_id=self._channels[topic],
+            channel_id=channel,
             log_time=log_time,
             data=message.SerializeToString(deterministic=True),
             publish_time=publish_time,
             sequence=self._sequences[topic],
         )
         self._sequences[topic] += 1
+
+    def _messages(
+        self,
+        topic: str,
+        kind: Any,
+        payloads: wind_messages.Payloads,
+        log_time: NDArray[np.int64],
+        publish_time: NDArray[np.int64],
+    ) -> None:
+        """Add many messages of one topic, in order of log time."""
+        first = 0
+        while first < len(log_time):
+            earliest = min(int(log_time[first:].min()), int(publish_time[first:].min()))
+            channel = self._channel(topic, kind, earliest)
+            last = len(log_time)
+            if self._chunking is Chunking.LIVE:
+                self._flush_each_second(int(log_time[first]))
+                until = (self._flushed or 0) + NANOSECONDS
+                last = max(first + 1, int(np.searchsorted(log_time, until)))
+            rows = slice(first, last)
+            block = MessageBlock(
+                log_time=log_time[rows], publish_time=publish_time[rows], payload=payloads.data[rows],
+                used=payloads.used[rows],
+            )  # fmt: skip
+            self._writer.add_messages(block, channel_id=channel, sequence=self._sequences[topic])
+            self._sequences[topic] += last - first
+            first = last
+
+    def _channel(self, topic: str, kind: Any, earliest: int) -> int:
+        """The number of a topic's channel, for messages from `earliest` on [UTC ns]."""
+        if earliest < 0:
+            raise TimeError(
+                "an instant before 1970, which MCAP cannot hold", where=f"{self.path}, {topic}",
+                fix="set the device's start time",
+            )  # fmt: skip
+        if topic not in self._channels:
+            schema = self._writer.register_schema(
+                name=kind.DESCRIPTOR.full_name, encoding=SchemaEncoding.Protobuf, data=messages.descriptor_set(kind)
+            )
+            self._channels[topic] = self._writer.register_channel(
+                topic=topic, message_encoding=MessageEncoding.Protobuf, schema_id=schema
+            )
+            self._sequences[topic] = 0
+        return self._channels[topic]
 
     def _flush_each_second(self, log_time: int) -> None:
         if self._flushed is None:

@@ -41,14 +41,14 @@ class Numbers:
     state: NDArray[np.uint8]
 
 
-def numbers(cells: Sequence[str], *, decimal: str = ".", missing: Sequence[str] = ()) -> Numbers:
+def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missing: Sequence[str] = ()) -> Numbers:
     """Read a column of cells.
 
     Args:
         decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
     """
-    text = pc.utf8_trim_whitespace(pa.array(cells, pa.string()))
+    text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
     if decimal == ",":
         pointed = pc.match_substring(text, ".")
         text = pc.if_else(pointed, "?", pc.replace_substring(text, ",", "."))

@@ -6,6 +6,7 @@ Works on rows in strictly increasing time. Each check names the samples it conce
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -208,7 +209,8 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
         present = [name for bit, name in enumerate(names) if kind >> bit & 1]
         if WIND_CHANNELS.isdisjoint(present):
             continue  # a direction without a speed is no reading of the wind
-        repeats, finding = _stale_rows(reading.take(rows), present)
+        looked_at = replace(reading, channels={name: reading.channels[name] for name in present}, host_time=None)
+        repeats, finding = _stale_rows(looked_at.take(rows), present)
         flags[rows[repeats]] = SampleFlag.STALE
         found.extend(finding)
     return flags, tuple(found)
@@ -263,7 +265,7 @@ def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], 
 
 def _runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First row and number of repeats of each run of repeats."""
-    edges = np.diff(np.concatenate(([0], same.astype(np.int8), [0])))
+    edges = np.diff(same.astype(np.int8), prepend=np.int8(0), append=np.int8(0))
     starts = np.flatnonzero(edges == 1)
     return starts, np.flatnonzero(edges == -1) - starts
 

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.columns import Columns, Lines, Shape, lines_of, shape_of
 from flagdata.ingest.anemometer.recipe import FileLayout
 from flagdata.ingest.anemometer.source import TextFile
+
+_PLAIN = ("utf-8", "utf-8-sig", "latin-1")
+"""Encodings in which a byte of ASCII is that character wherever it stands."""
 
 
 class RowReader:
@@ -44,39 +50,104 @@ class RowReader:
             names = head[layout.preamble].lstrip("\ufeff")
             self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
 
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
         """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
 
-        One empty cell more (a delimiter at the line's end) is allowed.
+        One empty cell more (a delimiter at the line's end) is allowed. Where the encoding lets bytes be cut, regular
+        lines come as columns: see `columns`.
         """
+        delimiter = self._layout.delimiter
+        plain = self._source.encoding in _PLAIN and len(delimiter) == 1 and delimiter.isascii() and delimiter != " "
+        return self._columns(width) if plain and delimiter != '"' else self.rows(width)
+
+    def rows(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        """What `blocks` gives, row by row: its definition."""
+        for first, lines in self._source.blocks():
+            where, good = self._sorted(list(range(first, first + len(lines))), lines, width)
+            if good:
+                yield where, good
+
+    def _sorted(
+        self, numbers: Sequence[int], lines: Sequence[str], width: int
+    ) -> tuple[NDArray[np.int64], list[list[str]]]:
+        """Of these lines the rows that fit, with their numbers; the others are counted."""
         named = len(self.header) if self.header is not None else None
         comment = self._layout.comment
-        for first, lines in self._source.blocks():
-            numbers: list[int] = []
-            kept: list[str] = []
-            for offset, line in enumerate(lines):
-                if first + offset < self.first_line or not line.strip(" \t\x00\x1a"):
-                    continue
-                if comment and line.startswith(comment):
-                    continue
-                numbers.append(first + offset)
-                kept.append(line)
-            rows = _cut(kept, self._layout.delimiter)
-            good: list[list[str]] = []
-            where: list[int] = []
-            for number, row in zip(numbers, rows, strict=True):
-                size = len(row)
-                fits = size == named or (size == (named or 0) + 1 and not row[-1].strip()) if named else size >= width
-                if fits and size >= width:
-                    good.append(row)
-                    where.append(number)
-                else:
-                    self._malformed.append(number)
-            self._read += len(good)
-            if numbers:
-                self._last_malformed = bool(self._malformed) and self._malformed[-1] == numbers[-1]
-            if good:
-                yield np.array(where, dtype=np.int64), good
+        looked: list[int] = []
+        kept: list[str] = []
+        for number, line in zip(numbers, lines, strict=True):
+            if number < self.first_line or not line.strip(" \t\x00\x1a"):
+                continue
+            if comment and line.startswith(comment):
+                continue
+            looked.append(number)
+            kept.append(line)
+        good: list[list[str]] = []
+        where: list[int] = []
+        for number, row in zip(looked, _cut(kept, self._layout.delimiter), strict=True):
+            size = len(row)
+            fits = size == named or (size == (named or 0) + 1 and not row[-1].strip()) if named else size >= width
+            if fits and size >= width:
+                good.append(row)
+                where.append(number)
+            else:
+                self._malformed.append(number)
+        self._read += len(good)
+        if looked:
+            self._last_malformed = bool(self._malformed) and self._malformed[-1] == looked[-1]
+        return np.array(where, dtype=np.int64), good
+
+    def _columns(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
+        encoding = "utf-8" if self._source.encoding == "utf-8-sig" else self._source.encoding
+        first, shape = 1, None
+        for data in self._source.raw_blocks():
+            shape = shape or self._shape(data, width)
+            lines = lines_of(data, shape) if shape is not None and shape.cells >= width else None
+            if lines is None:
+                with io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline=None) as stream:
+                    texts = [line.rstrip("\n") for line in stream]
+                where, good = self._sorted(range(first, first + len(texts)), texts, width)
+                if good:
+                    yield where, good
+                first += len(texts)
+                continue
+            where, found = self._of_lines(lines, first, width, encoding)
+            if len(where):
+                yield where, found
+            first += len(lines.start)
+
+    def _shape(self, data: bytes, width: int) -> Shape | None:
+        """The shape of the file's regular lines by its first row; `None` where the block has no row."""
+        at = -1
+        for _ in range(self.first_line - 1):
+            at = data.find(b"\n", at + 1)
+            if at < 0:
+                return None
+        line = data[at + 1 :].partition(b"\n")[0].rstrip(b"\r")
+        named = len(self.header) if self.header is not None else None
+        return shape_of(
+            line, delimiter=self._layout.delimiter, named=named, comment=self._layout.comment,
+            ascii_only=self._source.encoding == "latin-1",
+        )  # fmt: skip
+
+    def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[NDArray[np.int64], Columns]:
+        """Rows of a block whose first line has the number `first`."""
+        number = first + np.arange(len(lines.start), dtype=np.int64)
+        lines = replace(lines, regular=lines.regular & (number >= self.first_line))
+        regular, others = number[lines.regular], number[~lines.regular]
+        found = lines.columns(width)
+        before = self._last_malformed
+        texts = [lines.text(at, encoding) for at in (others - first).tolist()]
+        where, good = self._sorted(others.tolist(), texts, width)
+        self._read += len(regular)
+        if len(regular) and (not self._malformed or self._malformed[-1] < regular[-1]):
+            self._last_malformed = False
+        elif not len(others):
+            self._last_malformed = before
+        if not good:
+            return regular, found
+        order = np.argsort(np.concatenate((regular, where)), kind="stable")
+        return np.sort(np.concatenate((regular, where))), found.with_rows(good, order)
 
     def findings(self) -> tuple[Finding, ...]:
         """What did not fit; complete when `blocks` has been read.

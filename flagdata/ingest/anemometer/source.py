@@ -88,6 +88,22 @@ class TextFile:
                 yield first, lines
                 first += len(lines)
 
+    def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
+        """The file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a line."""
+        with self.path.open("rb") as stream:
+            rest = b""
+            first = True
+            while chunk := stream.read(size):
+                if first:
+                    chunk, first = chunk.removeprefix(codecs.BOM_UTF8), False
+                data = rest + chunk
+                cut = data.rfind(b"\n") + 1
+                rest = data[cut:]
+                if cut:
+                    yield data[:cut]
+            if rest:
+                yield rest
+
     def head(self, count: int = 60) -> list[str]:
         """The first `count` lines."""
         with self.path.open(encoding=self.encoding, newline=None) as stream:

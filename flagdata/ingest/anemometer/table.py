@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, TimeError, UnknownNameError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import possible
 from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.stamps import YEARS, Stamps
@@ -26,6 +28,9 @@ from flagdata.units import unit
 NEWEST_FIRST = 0.9
 """Share of rows older than the row before them from which a log is a list with the newest row on top."""
 
+Block: TypeAlias = Columns | Sequence[Sequence[str]]
+"""Rows of cells, or their columns."""
+
 
 class Rows(Protocol):
     """Where the cells come from; `shift` is the index of the column that recipes call 1."""
@@ -34,7 +39,7 @@ class Rows(Protocol):
     shift: int
     first_line: int
 
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]: ...
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Block]]: ...
 
     def findings(self) -> tuple[Finding, ...]: ...
 
@@ -61,10 +66,14 @@ class _Column:
     states: list[NDArray[np.uint8]] = field(default_factory=list)
 
     def value(self, order: slice) -> NDArray[np.float64]:
-        return np.concatenate(self.values)[order]
+        """All values; the blocks are let go, so that a long log is not held twice."""
+        blocks, self.values = self.values, []
+        return np.concatenate(blocks)[order]
 
     def state(self, order: slice) -> NDArray[np.uint8]:
-        return np.concatenate(self.states)[order]
+        """All states; likewise."""
+        blocks, self.states = self.states, []
+        return np.concatenate(blocks)[order]
 
 
 @dataclass
@@ -95,10 +104,11 @@ class _Clock:
     ns: list[NDArray[np.int64]] = field(default_factory=list)
     utc: list[NDArray[np.bool_]] = field(default_factory=list)
 
-    def parse(self, block: Sequence[Sequence[str]]) -> Stamps:
+    def parse(self, block: Block) -> Stamps:
         if len(self.columns) == 1:
-            only = self.columns[0]
-            return parse_stamps([row[only] for row in block], self.form)
+            return parse_stamps(_cells(block, self.columns[0]), self.form)
+        if isinstance(block, Columns):
+            return parse_stamps(block.joined(self.columns), self.form)
         return parse_stamps([" ".join(row[i].strip() for i in self.columns) for row in block], self.form)
 
     def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
@@ -119,7 +129,9 @@ class _Clock:
     def instants(
         self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str
     ) -> tuple[Instants, tuple[Finding, ...]]:
+        """The instants and what was found; the blocks are let go."""
         wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
+        self.ns, self.utc = [], []
         return instants(wall, utc, line=line, zone_name=zone_name, where=where)
 
 
@@ -143,7 +155,7 @@ class _Gathered:
         """Cells a row must have."""
         return 1 + max([*self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
 
-    def add(self, line: NDArray[np.int64], block: Sequence[Sequence[str]], recipe: Recipe) -> None:
+    def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
         stamps = self.clock.parse(block)
         keep = stamps.valid
         if self.host is not None:
@@ -155,16 +167,26 @@ class _Gathered:
         self.distant += int(stamps.distant.sum())
         self.lines.append(line[keep])
         for column in self.columns():
-            cells = [row[column.index] for row in block]
-            parsed = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing)
+            parsed = numbers(_cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing)
             column.values.append(parsed.value[keep])
             column.states.append(parsed.state[keep])
         for check in self.checks:
-            right = np.array([row[check.index].strip() in check.layout.values for row in block], dtype=bool)
+            right = _among(block, check.index, check.layout.values)
             check.right.append(right[keep])
 
     def line(self) -> NDArray[np.int64]:
         return np.concatenate(self.lines) if self.lines else np.zeros(0, dtype=np.int64)
+
+
+def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
+    return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]
+
+
+def _among(block: Block, index: int, values: Sequence[str]) -> NDArray[np.bool_]:
+    """(n,) whether the trimmed cells of a column are among `values`."""
+    if isinstance(block, Columns):
+        return block.among(index, values)
+    return np.array([row[index].strip() in values for row in block], dtype=bool)
 
 
 def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None, extra: Sequence[str] = ()) -> Table:
@@ -191,9 +213,11 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
     )
     for line, block in rows.blocks(gathered.width()):
         gathered.add(line, block, recipe)
+    pa.default_memory_pool().release_unused()  # the text of the last blocks
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
     order = gathered.clock.order()
     line = gathered.line()[order]
+    gathered.lines = [line]
     if order.step == -1:
         text = "the newest row comes first: read from the end"
         findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from scipy import ndimage
 
 from flagdata.errors import RefusedError
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
@@ -134,6 +133,8 @@ def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: st
         maps: (run, height, width) deviation in each run.
         motion: (height, width) their root mean square.
     """
+    from scipy import ndimage  # only now: ingesting a log needs none of it
+
     smooth = ndimage.gaussian_filter(motion, 1.5)
     middle = float(np.median(smooth))
     noise = 1.4826 * float(np.median(np.abs(smooth - middle)))

@@ -17,7 +17,7 @@ class Start:
 
     Attributes:
         instant: [UTC ns].
-        source: "option", or "metadata: <key>".
+        source: "option", "unknown", or "metadata: <key>".
         sigma: standard uncertainty of reading it off the file [s], the camera's clock error not included; `None` for
             the user's own figure.
     """
@@ -28,6 +28,8 @@ class Start:
     findings: tuple[Finding, ...] = ()
 
 
+UNKNOWN = 946_684_800 * NANOSECONDS
+"""2000-01-01T00:00:00Z: the start of a recording of which nobody knows when it began, told by --start unknown."""
 _RECORDED = "recording time in the video"
 _WHOLE_SECOND = 1 / 12**0.5  # σ of an instant cut to whole seconds
 _EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock (epochs of 1904, 1970 and 1980)
@@ -57,6 +59,13 @@ def find_start(
     Raises:
         TimeError: nothing usable was found.
     """
+    if option == UNKNOWN:
+        finding = Finding(
+            kind="start-unknown", severity=Severity.WARNING,
+            what=f"nobody knows when the recording began; it is stamped from {iso(UNKNOWN)} on",
+            fix="declare its wind (flagdata declare), or give the clock's offset (flagdata align --by given)",
+        )  # fmt: skip
+        return Start(instant=UNKNOWN, source="unknown", sigma=None, findings=(finding,))
     if option is not None:
         return Start(instant=option, source="option", sigma=None)
     default = zone(place, where="zone") if place else None

@@ -100,7 +100,7 @@ def test_an_estimate_makes_a_recording_on_the_winds_clock_with_clips_in_one_comm
     lake = Lake.open(folder)
     before = lake.resolve(None)
     plot = tmp_path / "lag.png"
-    said = run("align", camera[:12], wind[:12], "--lake", str(folder), "--window", "40", "--plot", str(plot))
+    said = run("align", camera[:12], wind[:12], "--lake", str(folder), "--search", "40", "--plot", str(plot))
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert lake.resolve(None) == before + 1  # one commit
     recording = lake.artifact(str(said["recording"]))
@@ -188,7 +188,7 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
     camera, wind = fill(lake, steady=True, seconds=150)
     head = lake.resolve(None)
     with pytest.raises(RefusedError, match="without gusts") as refused:
-        run("align", camera, wind, "--lake", str(lake.path), "--window", "40")
+        run("align", camera, wind, "--lake", str(lake.path), "--search", "40")
     assert refused.value.exit_code == 3
     assert lake.resolve(None) == head
 
@@ -201,7 +201,7 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
         (["--by", "given", "--offset", "3"], "without an uncertainty"),
         (["--by", "stamps"], "without an uncertainty"),
         (["--offset-sigma", "1"], "is estimated"),
-        (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--window", "5"], "searches nothing"),
+        (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
         (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset of nan"),
         (["--by", "given", "--offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
         (["--by", "stamps", "--offset-sigma", "1", "--plot", "x.png"], "no search to draw"),

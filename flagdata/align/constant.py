@@ -1,0 +1,116 @@
+"""A wind that somebody states instead of measuring it: a tunnel's constant speed, known to a σ, all along a film.
+
+It becomes a wind artifact on the film's own clock, so that everything behind it (recordings, clips, their σ) goes as
+with a log: a sample a second, or sixty in a shorter window, of the stated speed, of an instrument whose accuracy is the stated σ. The quality flag
+"wind-declared" goes with it into the recording and its clips.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flagdata.align.recording import MARGIN_AFTER
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical, code_version, recipe_hash
+from flagdata.record import RecordWriter
+from flagdata.record.metadata import PROVENANCE
+from flagdata.schema import Kind
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import NANOSECONDS, iso
+
+REPORT_SCHEMA = "flagdata.declared-wind-report/1"
+DECLARED = "wind-declared"
+_SAMPLES = 60  # in a window, at least, so that it is covered but for the last sixtieth
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantWind:
+    """A wind of `speed` all along, known to the standard uncertainty `sigma` [m/s].
+
+    Raises:
+        UsageError: a speed below 0, a σ that is not above 0, or numbers that are not finite.
+    """
+
+    speed: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.speed) and self.speed >= 0):
+            raise UsageError(f"a wind of {self.speed} m/s", where="--speed", fix="give a speed of 0 or more in m/s")
+        if not (math.isfinite(self.sigma) and self.sigma > 0):
+            raise UsageError(
+                f"a wind known to {self.sigma} m/s", where="--sigma",
+                fix="state how well the speed is known, in m/s (one standard deviation)",
+            )  # fmt: skip
+
+    def recipe(self) -> dict[str, Any]:
+        """What the artifact's identity depends on, beside the film."""
+        return {"declare": {"wind": self.speed, "sigma": self.sigma}}
+
+    def series(self, start: int, end: int, *, period: float) -> WindSeries:
+        """Samples every `period` [s] from `start` to `end` and beyond [UTC ns]."""
+        step = round(period * NANOSECONDS)
+        time = np.arange(start // step, -(-end // step) + 1, dtype=np.int64) * step
+        return WindSeries(
+            time=time,
+            channels={"wind_speed": np.full(len(time), self.speed)},
+            flags=np.zeros(len(time), dtype=np.uint16),
+            sensor=Sensor(name="declared constant wind", averaging=0.0, distance_constant=0.0, accuracy=self.sigma),
+        )
+
+
+def declared_wind(
+    lake: Lake, camera: Artifact, wind: ConstantWind, *, window: float, session: str | None, branch: str
+) -> Artifact:
+    """The wind artifact of a film in a declared wind; the one that is there where there is one.
+
+    Args:
+        window: of the ground truth [s]: so long before the film the wind begins.
+
+    Raises:
+        UsageError: `camera` is no camera artifact.
+    """
+    if camera.kind is not Kind.CAMERA or camera.start is None or camera.end is None:
+        raise UsageError(
+            f"{camera.name!r} is a {camera.kind}, not a camera", where=camera.id,
+            fix="flagdata declare CAMERA takes a camera artifact; see flagdata ls",
+        )  # fmt: skip
+    recipe = {**wind.recipe(), "window": window}
+    for row in lake.rows(f"kind = 'wind' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist():
+        if list(row["parents"]) == [camera.id]:
+            return Artifact.from_row(row)
+    before, after = round((window + 1) * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
+    period = min(1.0, window / _SAMPLES)
+    series = wind.series(camera.start - before, camera.end + after, period=period)
+    stated = Finding(
+        kind=DECLARED, severity=Severity.WARNING, value=wind.speed,
+        what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s all along",
+    )  # fmt: skip
+    start, end = int(series.time[0]), int(series.time[-1])
+    report = {
+        "schema": REPORT_SCHEMA, "kind": Kind.WIND.value, "speed": wind.speed, "sigma": wind.sigma,
+        "start": iso(start), "end": iso(end), "findings": [stated.as_dict()],
+    }  # fmt: skip
+    provenance = {
+        "camera": camera.id, "recipe": canonical(recipe), "recipe_hash": recipe_hash(recipe),
+        "code_version": code_version(),
+    }  # fmt: skip
+    with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
+        staged = transaction.staging(".mcap")
+        with RecordWriter(staged, metadata={PROVENANCE: provenance}) as record:
+            record.wind(series)
+        artifact = Artifact(
+            kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),
+            parents=(camera.id,), recipe=recipe, session=session or camera.session, day=iso(start)[:10], start=start,
+            end=end, rate=1 / period, quality=quality_flags((stated,)),
+            report=json.dumps(report, allow_nan=False, ensure_ascii=False), branch=branch,
+        )  # fmt: skip
+        transaction.add(artifact)
+    return lake.artifact(artifact.id, at=branch)

@@ -1,0 +1,165 @@
+"""Two wind artifacts of one wind made one clock: the sensor's log written anew on the reference's clock, in one commit.
+
+The new artifact is a wind artifact like any other, whose parents are the reference and the sensor. Its record holds the
+sensor's samples with the reference's instants as log times and its own stamps as publish times. Values stay as the
+sensor gave them: the gain is reported, not applied. The vendor's file stays attached to the parent.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flagdata.align.clock import NINETY
+from flagdata.align.logs import LogClock
+from flagdata.errors import ConflictError, InputError, UsageError
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical, code_version, recipe_hash
+from flagdata.record import Record, RecordWriter
+from flagdata.record.metadata import PROVENANCE
+from flagdata.schema import Kind
+from flagdata.signals import WindSeries
+from flagdata.timebase import iso
+
+REPORT_SCHEMA = "flagdata.align-logs-report/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindPair:
+    """A reference and a sensor of one lake."""
+
+    reference: Artifact
+    sensor: Artifact
+    reference_series: WindSeries
+    sensor_series: WindSeries
+
+    @classmethod
+    def of(cls, lake: Lake, reference: str, sensor: str, *, at: str | None = None) -> WindPair:
+        """Look both up by id or unique prefix of it.
+
+        Raises:
+            UsageError: artifacts of other kinds, or one artifact twice.
+            InputError: one holds no samples.
+        """
+        found = [lake.artifact(identity, at=at) for identity in (reference, sensor)]
+        for artifact in found:
+            if artifact.kind is not Kind.WIND or artifact.object is None:
+                raise UsageError(
+                    f"{artifact.name!r} is a {artifact.kind}, not a wind", where=artifact.id,
+                    fix="flagdata align REFERENCE SENSOR takes two wind artifacts; see flagdata ls",
+                )  # fmt: skip
+        if found[0].id == found[1].id:
+            raise UsageError("a log and itself", where=found[0].id, fix="name two wind artifacts")
+        series = []
+        for artifact in found:
+            samples = Record.open(lake.object_path(str(artifact.object))).wind()
+            if samples is None or not len(samples):
+                raise InputError("the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew")
+            series.append(samples)
+        return cls(reference=found[0], sensor=found[1], reference_series=series[0], sensor_series=series[1])
+
+    @property
+    def names(self) -> tuple[str, str]:
+        return self.reference.name, self.sensor.name
+
+
+def find_aligned(
+    lake: Lake, pair: WindPair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
+) -> Artifact | None:
+    """The artifact that these parents and options make, if it is on the branch.
+
+    Raises:
+        ConflictError: it is, under another name or session than the one asked for.
+    """
+    rows = lake.rows(f"kind = 'wind' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
+    for row in rows:
+        if list(row["parents"]) == [pair.reference.id, pair.sensor.id]:
+            artifact = Artifact.from_row(row)
+            for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
+                if asked is not None and asked != kept:
+                    raise ConflictError(
+                        f"the aligned log is there already with the {label} {kept!r}", where=artifact.id,
+                        fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
+                    )  # fmt: skip
+            return artifact
+    return None
+
+
+def make_aligned(
+    lake: Lake,
+    pair: WindPair,
+    found: LogClock,
+    *,
+    recipe: Mapping[str, Any],
+    name: str | None,
+    session: str | None,
+    branch: str,
+) -> Artifact:
+    """Write the sensor's log on the reference's clock and publish it in one commit.
+
+    Args:
+        name: what people call it; the sensor's name if `None`.
+        session: one set-up at one place; the sensor's if `None`.
+    """
+    clock, own = found.model, pair.sensor_series.time
+    metadata = {
+        PROVENANCE: {
+            "reference": pair.reference.id,
+            "sensor": pair.sensor.id,
+            "recipe": canonical(recipe),
+            "recipe_hash": recipe_hash(recipe),
+            "code_version": code_version(),
+        }
+    }
+    with lake.transaction(f"align {pair.sensor.name} with {pair.reference.name}", branch=branch) as transaction:
+        staged = transaction.staging(".mcap")
+        with RecordWriter(staged, metadata=metadata) as record:
+            record.wind(pair.sensor_series, clock=clock)
+        common = clock.to_common(own)
+        middle = int(own[0] + (own[-1] - own[0]) // 2)
+        start, end = int(common[0]), int(common[-1])
+        report = {
+            "schema": REPORT_SCHEMA,
+            "kind": Kind.WIND.value,
+            "samples": len(own),
+            "start": iso(start),
+            "end": iso(end),
+            **summary(found),
+        }
+        artifact = Artifact(
+            kind=Kind.WIND, name=name or pair.sensor.name, object=transaction.put(staged),
+            parents=(pair.reference.id, pair.sensor.id), recipe=recipe, session=session or pair.sensor.session,
+            day=iso(start)[:10], start=start, end=end, rate=pair.sensor.rate, clock_method=clock.method,
+            clock_offset=float(clock.to_common(middle) - middle) * 1e-9, clock_drift=clock.segments[0].drift,
+            clock_sigma=float(clock.sigma(middle)), clock_model=clock.to_json(), quality=pair.sensor.quality,
+            report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+        )  # fmt: skip
+        transaction.add(replace(artifact, branch=branch))
+    return lake.artifact(artifact.id, at=branch)
+
+
+def summary(found: LogClock) -> dict[str, Any]:
+    """The numbers for JSON: of the sensor's clock on the reference's, and of its gain; `drift_parts` is 0 where the
+    drift is a prior's."""
+    (segment,) = found.model.segments
+    half = NINETY * segment.sigma_offset
+    gain = found.gain
+    return {
+        "method": found.model.method,
+        "offset": segment.offset,
+        "at": iso(segment.origin),
+        "sigma": segment.sigma_offset,
+        "interval": [segment.offset - half, segment.offset + half],
+        "level": 0.9,
+        "confidence": found.model.confidence,
+        "drift": segment.drift,
+        "drift_sigma": segment.sigma_drift,
+        "drift_parts": len(found.line.parts),
+        "gain": gain.gain,
+        "gain_sigma": gain.sigma,
+        "zero": gain.zero,
+        "zero_sigma": gain.sigma_zero,
+        "gain_minutes": gain.count,
+    }
