@@ -94,6 +94,8 @@ class RecordWriter:
     ) -> None:
         if not 1 <= quality <= 100:
             raise UsageError(f"JPEG quality {quality} is not between 1 and 100", fix="leave it at the default")
+        if CHECKSUMS in metadata:
+            raise ConflictError(f"metadata {CHECKSUMS!r} is the record's own", where=str(path), fix="rename it")
         self.path = path
         self._quality = quality
         self._chunking = chunking
@@ -249,7 +251,7 @@ class RecordWriter:
         return self._video.encode(image)
 
     def _metadata(self, name: str, values: Mapping[str, str]) -> None:
-        if name in self._names or name == CHECKSUMS:
+        if name in self._names:
             raise ConflictError(f"metadata {name!r} is there already", where=str(self.path), fix="write it once")
         self._names.add(name)
         self._writer.add_metadata(name, dict(values))
