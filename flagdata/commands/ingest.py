@@ -63,9 +63,7 @@ from flagdata.errors import UsageError
     "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
 )
 @click.option("--date-order", type=click.Choice(["dmy", "mdy"]), help="Wind: of dates written with numbers only.")
-@click.option(
-    "--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle (any format)."
-)
+@click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
 @click.option("--talker", metavar="ID", help="Wind: of NMEA 0183, where several instruments share a stream.")
 @click.option(
     "--azimuth", type=float, metavar="DEG", help="Wind: of the sensor's north or bow, clockwise from true north."

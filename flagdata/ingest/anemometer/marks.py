@@ -165,7 +165,7 @@ class TimeLine:
 def _one_clock(
     marks: Instants, at: NDArray[np.int64], choice: ClockChoice | None
 ) -> tuple[Instants, tuple[Finding, ...]]:
-    """Marks on one clock where it was set back for good; those that leave the stream's time for a moment do not rise."""
+    """Marks on one clock where it was set back for good; those that leave its time for a moment do not rise."""
     most = max(FEW, len(marks) // 100)
     stray = clocks.excursions(marks, most=most) if len(clocks.set_back(marks)) <= most else np.zeros(len(marks), bool)
     settled = np.flatnonzero(~stray)

@@ -164,10 +164,8 @@ def idle(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
         if not long.any() or (name == "wind_speed" and not always):
             continue
         zero = np.concatenate([rows[s : s + k] for s, k in zip(starts[long], lengths[long], strict=True)])
-        what = (
-            f"{name} reads exactly 0 in {'all ' if always else ''}{len(zero)} rows, for {float(span[long].max()):.0f} s "
-            "on end: "
-        )
+        longest = float(span[long].max())
+        what = f"{name} reads exactly 0 in {'all ' if always else ''}{len(zero)} rows, for {longest:.0f} s on end: "
         if name == "wind_speed":
             what += "a calm all along, or a sensor that is not connected or blocked"
         else:
@@ -178,7 +176,7 @@ def idle(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
             what += "out of averages"
         found.append(
             Finding(
-                kind="stays-at-zero", severity=Severity.WARNING, count=len(zero), value=float(span[long].max()),
+                kind="stays-at-zero", severity=Severity.WARNING, count=len(zero), value=longest,
                 where=f"line {reading.line[zero[0]]}", what=what, fix="check the sensor, its cable and the column",
             )
         )  # fmt: skip

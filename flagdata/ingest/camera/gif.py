@@ -49,7 +49,8 @@ def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding
         raise TimeError(
             f"the GIF states delays of {float(np.median(stated)):g} hundredths of a second, which stands for \"as fast "
             'as possible": the camera\'s rate is not known',
-            where=str(path), fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF was made of",
+            where=str(path),
+            fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF was made of",
         )  # fmt: skip
     if timing.variable or period.denominator > 100:
         return []  # delays of 3, 3 and 4 hundredths keep a mean

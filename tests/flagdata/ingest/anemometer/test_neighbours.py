@@ -40,7 +40,7 @@ def test_two_logs_of_one_wind_an_hour_apart_are_told_with_the_correction(off: in
     assert finding is not None
     assert finding.value == -off
     assert "mast" in finding.what
-    assert finding.fix is not None and "--zone" in finding.fix
+    assert "--zone" in (finding.fix or "")
 
 
 @pytest.mark.parametrize("off", [0, 20, -45])

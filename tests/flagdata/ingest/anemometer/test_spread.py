@@ -30,7 +30,8 @@ def smooth(n: int) -> np.ndarray:
 def ordered(time: np.ndarray, values: np.ndarray, *, step: int) -> Reading:
     reading = Reading(
         time=T0 + np.asarray(time, dtype=np.int64), channels={"wind_speed": values},
-        flags=np.zeros(len(time), dtype=np.uint16), line=np.arange(2, len(time) + 2), sensor=Sensor(name="x"), step=step,
+        flags=np.zeros(len(time), dtype=np.uint16), line=np.arange(2, len(time) + 2), sensor=Sensor(name="x"),
+        step=step,
     )  # fmt: skip
     return in_order(reading, where="x")
 
