@@ -1,8 +1,8 @@
 """A wind that somebody states instead of measuring it: a tunnel's constant speed, known to a σ, all along a film.
 
 It becomes a wind artifact on the film's own clock, so that everything behind it (recordings, clips, their σ) goes as
-with a log: a sample a second, or sixty in a shorter window, of the stated speed, of an instrument whose accuracy is the stated σ. The quality flag
-"wind-declared" goes with it into the recording and its clips.
+with a log: a sample a second, or sixty in a shorter window, of the stated speed, of an instrument whose accuracy is
+the stated σ. The quality flag "wind-declared" goes with it into the recording and its clips.
 """
 
 from __future__ import annotations

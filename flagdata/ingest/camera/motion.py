@@ -160,6 +160,8 @@ def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: st
 
 def _with_tip(region: NDArray[np.bool_], maps: NDArray[np.float32]) -> NDArray[np.bool_]:
     """The region with what moves in any run and touches it; without, where that is much larger than the region."""
+    from scipy import ndimage  # only now: ingesting a log needs none of it
+
     moving = np.zeros_like(region)
     for run in maps:
         smooth = ndimage.gaussian_filter(run, 0.7)
