@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, TimeError, UnknownNameError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.dates import decide
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
@@ -225,15 +226,18 @@ class CompassRows(RowReader):
 
     def __init__(self, source: TextFile, layout: FileLayout, columns: Sequence[int]) -> None:
         super().__init__(source, layout)
-        self._columns = [column - 1 for column in columns]
+        self._compass = [column - 1 for column in columns]
         self._degrees = {name: text.replace(".", layout.decimal) for name, text in POINTS.items()}
         self.points = 0
 
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
-        """See `RowReader.blocks`."""
-        for line, rows in super().blocks(width):
-            for row in rows if self._columns else ():
-                for column in self._columns:
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
+        """See `RowReader.blocks`; row by row where there are points of the compass."""
+        return self._in_degrees(width) if self._compass else super().blocks(width)
+
+    def _in_degrees(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        for line, rows in self.rows(width):
+            for row in rows:
+                for column in self._compass:
                     degrees = self._degrees.get(row[column].strip().upper())
                     if degrees is not None:
                         row[column] = degrees
