@@ -50,6 +50,11 @@ class SheetText(TextFile):
         for first in range(0, len(self.text), size):
             yield first + 1, list(self.text[first : first + size])
 
+    def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
+        """See `TextFile.raw_blocks`: the rows' text, not the workbook's bytes."""
+        for _, lines in self.blocks():
+            yield "".join(f"{line}\n" for line in lines).encode(self.encoding)
+
     def head(self, count: int = 60) -> list[str]:
         """See `TextFile.head`."""
         return list(self.text[:count])
