@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -183,7 +183,10 @@ def evaluate(
         frames=tuple(frames),
         reads=tuple(reads),
         layout=None if tsne_of is None else layout(models[tsne_of][0], seed=seed),
-        findings=(*findings, *(finding for read in reads for finding in read.readout.findings)),
+        findings=(
+            *findings,
+            *(replace(f, where=f"{read.label} on {read.data}") for read in reads for f in read.readout.findings),
+        ),
     )
 
 

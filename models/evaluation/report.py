@@ -76,7 +76,9 @@ def page(found: Evaluation) -> str:
 def markdown(found: Evaluation) -> str:
     """The tables and their warnings as Markdown; the charts are the page's."""
     parts = [f"# Models compared on {found.data}", _counts(found)]
-    parts += [f"**Warning:** {finding.what}." for finding in found.findings]
+    parts += [
+        f"**Warning:** {f'{finding.where}: ' if finding.where else ''}{finding.what}." for finding in found.findings
+    ]
     parts += [_grid(_models(found)), table.LEGEND, "## What the paper printed", paper.WARNING, _grid(_paper(found))]
     for title, made in (
         (f"## Against {found.reference}, pair by pair", _differences(found)),
@@ -174,12 +176,14 @@ def _differences(found: Evaluation) -> Grid | None:
 
 def _targets(found: Evaluation) -> Grid:
     ordered = sorted(found.targets, key=lambda row: [r.target for r in found.targets].index(row.target))
+
+    def cells(row: table.TargetRow) -> tuple[tuple[str, ...], ...]:
+        own = table.digits(row.scores["rmse"].value)
+        return tuple(table.cell(row.scores[name], own if name in ("rmse", "bias") else 3) for name in _SCORES)
+
     return Grid(
         head=("target", "model", *_SCORES.values()),
-        body=tuple(
-            Line(cells=((row.target,), (row.label,), *(table.cell(row.scores[name], 3) for name in _SCORES)))
-            for row in ordered
-        ),
+        body=tuple(Line(cells=((row.target,), (row.label,), *cells(row))) for row in ordered),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -258,6 +259,11 @@ class Column:
 def number(value: float, digits: int) -> str:
     """A number for people; a dash where it is undefined."""
     return f"{value:.{digits}f}".replace("-", "−") if np.isfinite(value) else _NONE
+
+
+def digits(error: float) -> int:
+    """Decimals that show an error to three significant digits, at least three."""
+    return max(3, 2 - math.floor(math.log10(error))) if error > 0 else 3
 
 
 def cell(score: Estimate | None, digits: int) -> tuple[str, ...]:

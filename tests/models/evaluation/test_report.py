@@ -18,6 +18,7 @@ from models.evaluation.linear import bouman
 from models.evaluation.predictions import Predictions
 from models.evaluation.report import markdown, page, write
 from models.evaluation.scores import SCORES
+from models.evaluation.table import digits
 from tests.models.evaluation.made import generator, of_wind, posterior
 
 GROUP = np.repeat(np.arange(30), 4)
@@ -174,3 +175,15 @@ def test_points_of_curves_that_make_no_sense_are_refused() -> None:
         LearningPoint(label="a", sequences=10, rmse=0.2, interval=(0.3, 0.1))
     with pytest.raises(InputError, match="not per cent"):
         FramesPoint(label="a", frames=10, accuracy=96.3, interval=(95.0, 97.0))
+
+
+@pytest.mark.parametrize(("error", "decimals"), [(0.0194, 4), (0.00123, 5), (0.2, 3), (12.0, 3), (0.0, 3)])
+def test_small_errors_are_shown_to_three_significant_digits(error: float, decimals: int) -> None:
+    assert digits(error) == decimals
+
+
+def test_a_warning_of_a_readout_says_of_which_model_and_data_it_is() -> None:
+    made = run("SDN", 1, 1)
+    readout = bouman(WIND[:, None] + 1, {"density": WIND + 1}, group=GROUP, generator=generator(1))
+    shown = evaluate([made], data="made", seed=0, draws=10, reads=[Read(label="SDN", data="cloth", readout=readout)])
+    assert "**Warning:** SDN on cloth: 1 principal components are kept, not 50" in markdown(shown)
