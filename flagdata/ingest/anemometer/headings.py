@@ -120,11 +120,13 @@ def stamp_format(texts: Sequence[str], options: WindOptions, where: str) -> tupl
     """
     filled = [text.strip() for text in texts if text.strip()]
     decision = decide(filled, told=options.date_order, where=where)
-    rest = next((match for text in filled if (match := _REST.search(text))), None)
+    found = [match for text in filled if (match := _REST.search(text))]
+    rest = next(iter(found), None)
     if rest is None:
         first = filled[0] if filled else ""
         raise TimeError(f"no time of day in {first!r}", where=where, fix="export date and time")
-    clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "") + ("%f" if rest["f"] else "")
+    clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "")
+    clock += "%f" if any(match["f"] for match in found) else ""  # some loggers drop zeros at the end
     half = f"{' ' if rest['b'] else ''}%p" if rest["p"] else ""
     form = f"{decision.directives()} {clock}{half}{'%z' if rest['z'] else ''}"
     if decision.order == "ymd":
