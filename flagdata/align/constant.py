@@ -1,8 +1,8 @@
 """A wind that somebody states instead of measuring it: a tunnel's constant speed, known to a σ, all along a film.
 
 It becomes a wind artifact on the film's own clock, so that everything behind it (recordings, clips, their σ) goes as
-with a log: a sample a second, or sixty in a shorter window, of the stated speed, of an instrument whose accuracy is
-the stated σ. The quality flag "wind-declared" goes with it into the recording and its clips.
+with a log: a sample a second of the stated speed, of an instrument whose accuracy is the stated σ. The quality flag
+"wind-declared" goes with it into the recording and its clips.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.align.recording import MARGIN_AFTER
+from flagdata.align.recording import MARGIN_AFTER, MARGIN_BEFORE
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.lake import Artifact, Lake
@@ -27,7 +27,6 @@ from flagdata.timebase import NANOSECONDS, iso
 
 REPORT_SCHEMA = "flagdata.declared-wind-report/1"
 DECLARED = "wind-declared"
-_SAMPLES = 60  # in a window, at least, so that it is covered but for the last sixtieth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +53,9 @@ class ConstantWind:
         """What the artifact's identity depends on, beside the film."""
         return {"declare": {"wind": self.speed, "sigma": self.sigma}}
 
-    def series(self, start: int, end: int, *, period: float) -> WindSeries:
-        """Samples every `period` [s] from `start` to `end` and beyond [UTC ns]."""
-        step = round(period * NANOSECONDS)
-        time = np.arange(start // step, -(-end // step) + 1, dtype=np.int64) * step
+    def series(self, start: int, end: int) -> WindSeries:
+        """Samples on whole seconds from `start` to `end` and beyond [UTC ns]."""
+        time = np.arange(start // NANOSECONDS, -(-end // NANOSECONDS) + 1, dtype=np.int64) * NANOSECONDS
         return WindSeries(
             time=time,
             channels={"wind_speed": np.full(len(time), self.speed)},
@@ -66,13 +64,8 @@ class ConstantWind:
         )
 
 
-def declared_wind(
-    lake: Lake, camera: Artifact, wind: ConstantWind, *, window: float, session: str | None, branch: str
-) -> Artifact:
+def declared_wind(lake: Lake, camera: Artifact, wind: ConstantWind, *, session: str | None, branch: str) -> Artifact:
     """The wind artifact of a film in a declared wind; the one that is there where there is one.
-
-    Args:
-        window: of the ground truth [s]: so long before the film the wind begins.
 
     Raises:
         UsageError: `camera` is no camera artifact.
@@ -82,13 +75,12 @@ def declared_wind(
             f"{camera.name!r} is a {camera.kind}, not a camera", where=camera.id,
             fix="flagdata declare CAMERA takes a camera artifact; see flagdata ls",
         )  # fmt: skip
-    recipe = {**wind.recipe(), "window": window}
+    recipe = wind.recipe()
     for row in lake.rows(f"kind = 'wind' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist():
         if list(row["parents"]) == [camera.id]:
             return Artifact.from_row(row)
-    before, after = round((window + 1) * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
-    period = min(1.0, window / _SAMPLES)
-    series = wind.series(camera.start - before, camera.end + after, period=period)
+    before, after = round(MARGIN_BEFORE * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
+    series = wind.series(camera.start - before, camera.end + after)
     stated = Finding(
         kind=DECLARED, severity=Severity.WARNING, value=wind.speed,
         what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s all along",
@@ -109,7 +101,7 @@ def declared_wind(
         artifact = Artifact(
             kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),
             parents=(camera.id,), recipe=recipe, session=session or camera.session, day=iso(start)[:10], start=start,
-            end=end, rate=1 / period, quality=quality_flags((stated,)),
+            end=end, rate=1.0, quality=quality_flags((stated,)),
             report=json.dumps(report, allow_nan=False, ensure_ascii=False), branch=branch,
         )  # fmt: skip
         transaction.add(artifact)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import click
 
-from flagdata.commands.durations import DURATION
 from flagdata.console import document, json_option, lake_option, progress
 
 SAME_CLOCK = 1e-3
@@ -17,14 +14,13 @@ SAME_CLOCK = 1e-3
 @click.argument("camera")
 @click.option("--speed", type=float, required=True, metavar="M/S", help="Speed of the wind all along.")
 @click.option("--sigma", type=float, required=True, metavar="M/S", help="Its standard uncertainty.")
-@click.option("--window", type=DURATION, metavar="TIME", help="Length of the ground truth's mean; 60s by default.")
 @click.option("--name", help="What to call the recording; the camera's name by default.")
 @click.option("--session", help="One set-up at one place, for splits; the camera's by default.")
 @click.option("--branch", default="main", show_default=True, help="Branch to commit on.")
 @json_option
 @lake_option
 def declare(
-    camera: str, speed: float, sigma: float, window: float | None, name: str | None, session: str | None, branch: str,
+    camera: str, speed: float, sigma: float, name: str | None, session: str | None, branch: str,
     as_json: bool, lake_path: str,
 ) -> None:  # fmt: skip
     """State that the wind of the artifact CAMERA was constant, as in a wind tunnel: a recording and its clips.
@@ -34,23 +30,20 @@ def declare(
     """
     from flagdata.align.constant import ConstantWind, declared_wind
     from flagdata.align.declared import by_stamps
-    from flagdata.align.recording import Alignment, Pair, make_recording, truth_recipe
+    from flagdata.align.recording import Alignment, Pair, make_recording
     from flagdata.lake import Lake
-    from flagdata.schema import TRUTH_WINDOW
 
     wind = ConstantWind(speed=speed, sigma=sigma)
-    length = TRUTH_WINDOW if window is None else window
-    recipe: dict[str, Any] = {**wind.recipe(), **truth_recipe(length)}
     lake = Lake.open(lake_path)
     film = lake.artifact(camera, at=branch)
-    stated = declared_wind(lake, film, wind, window=length, session=session, branch=branch)
+    stated = declared_wind(lake, film, wind, session=session, branch=branch)
     pair = Pair.of(lake, film.id, stated.id, at=branch)
     start, end = pair.span
     clock = by_stamps(film.name, stated.name, start=start, end=end, sigma=SAME_CLOCK)
     details = {"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0}
     with progress(pair.camera_record.frame_count, label="copying", unit="frame") as advance:
         made = make_recording(
-            lake, pair, Alignment(clock=clock, recipe=recipe, details=details), name=name, session=session,
+            lake, pair, Alignment(clock=clock, recipe=wind.recipe(), details=details), name=name, session=session,
             branch=branch, progress=advance,
         )  # fmt: skip
     if as_json:
