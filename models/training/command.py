@@ -135,7 +135,7 @@ def trained(
             ranks.barrier()
         identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
         training = Training(
-            recipe=recipe, train=train_inputs, validation=validation_inputs, identity=identity,
+            recipe=recipe, train=train_inputs.held(), validation=validation_inputs.held(), identity=identity,
             run=run if run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}",
             device=torch.device(device), bars=bars,
         )  # fmt: skip

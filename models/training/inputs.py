@@ -17,11 +17,12 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
@@ -93,6 +94,23 @@ class Prepared:
 
     def __len__(self) -> int:
         return len(self.maps)
+
+    def held(self) -> Prepared:
+        """The same in memory, if that leaves half of what is free; small random reads of files are slower than steps.
+
+        Raises:
+            CorruptError: a file that is cut off or gone.
+        """
+        if not isinstance(self.maps, Files):
+            return self
+        count, variants, *shape = self.maps.shape
+        first = self.maps[np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)]
+        if count * variants * first.nbytes > psutil.virtual_memory().available / 2:
+            return self
+        maps = np.empty((count, variants, *shape), dtype=first.dtype)
+        for entry in range(count):
+            maps[entry] = self.maps[np.full(variants, entry), np.arange(variants)]
+        return replace(self, maps=maps)
 
     def truth(self, names: Sequence[str]) -> NDArray[np.float64]:
         """(n, target), as `models.targets.truth`.
