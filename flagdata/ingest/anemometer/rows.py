@@ -43,11 +43,13 @@ class RowReader:
         if layout.header:
             names = head[layout.preamble].lstrip("\ufeff")
             self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
+            while len(self.header) > 1 and not self.header[-1]:
+                self.header.pop()
 
     def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
         """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
 
-        One empty cell more (a delimiter at the line's end) is allowed.
+        Empty cells beyond (delimiters at the line's end) are allowed.
         """
         named = len(self.header) if self.header is not None else None
         comment = self._layout.comment
@@ -66,7 +68,7 @@ class RowReader:
             where: list[int] = []
             for number, row in zip(numbers, rows, strict=True):
                 size = len(row)
-                fits = size == named or (size == (named or 0) + 1 and not row[-1].strip()) if named else size >= width
+                fits = size >= width if named is None else size == named or _only_empty_beyond(row, named)
                 if fits and size >= width:
                     good.append(row)
                     where.append(number)
@@ -107,6 +109,10 @@ class RowReader:
                 )
             )  # fmt: skip
         return tuple(found)
+
+
+def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
+    return len(row) > named and not any(cell.strip() for cell in row[named:])
 
 
 def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -9,20 +10,22 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, TimeError, UnknownNameError
+from flagdata.errors import InputError, TimeError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import possible
+from flagdata.ingest.anemometer import counted, possible, unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.stamps import YEARS, Stamps
-from flagdata.ingest.anemometer.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.wall import to_utc
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants
-from flagdata.timebase import zone
+from flagdata.timebase import NANOSECONDS, zone
 from flagdata.units import unit
 
+DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
+"""Channels whose unit is held against their values."""
 NEWEST_FIRST = 0.9
 """Share of rows older than the row before them from which a log is a list with the newest row on top."""
 
@@ -50,6 +53,14 @@ class Table:
 
     reading: Reading
     extra: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """What the user says about time beside the zone: the first row's instant [UTC ns], or its day."""
+
+    start: int | None = None
+    date: dt.date | None = None
 
 
 @dataclass
@@ -92,14 +103,21 @@ class _Clock:
     form: str
     columns: list[int]
     step: int = 2**62
+    bare_dates: int = 0
     ns: list[NDArray[np.int64]] = field(default_factory=list)
     utc: list[NDArray[np.bool_]] = field(default_factory=list)
 
     def parse(self, block: Sequence[Sequence[str]]) -> Stamps:
         if len(self.columns) == 1:
             only = self.columns[0]
-            return parse_stamps([row[only] for row in block], self.form)
-        return parse_stamps([" ".join(row[i].strip() for i in self.columns) for row in block], self.form)
+            texts = [row[only] for row in block]
+        else:
+            texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
+        if self.form in counted.FORMS or counted.is_time_of_day(self.form):
+            return counted.parse(texts, self.form)
+        stamps, bare = parse_with_bare_dates(texts, self.form)
+        self.bare_dates += bare
+        return stamps
 
     def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
         self.ns.append(stamps.ns[keep])
@@ -117,10 +135,23 @@ class _Clock:
         return slice(None, None, -1) if turned else slice(None)
 
     def instants(
-        self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str
+        self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
     ) -> tuple[Instants, tuple[Finding, ...]]:
         wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
-        return instants(wall, utc, line=line, zone_name=zone_name, where=where)
+        if counted.is_elapsed(self.form):
+            return counted.since_start(wall, self.form, start=given.start, line=line, where=where)
+        found: tuple[Finding, ...] = ()
+        if counted.is_time_of_day(self.form):
+            wall, found = counted.on_days(wall, date=given.date, line=line, where=where)
+        elif given.start is not None or given.date is not None:
+            option = "--start" if given.start is not None else "--date"
+            raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
+        if self.bare_dates:
+            what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
+            bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)
+            found = (*found, bare)
+        time, further = instants(wall, utc, line=line, zone_name=zone_name, where=where)
+        return time, (*found, *further)
 
 
 @dataclass
@@ -132,6 +163,7 @@ class _Gathered:
     channels: dict[str, _Column]
     extra: dict[str, _Column]
     checks: list[_Check]
+    rows: int | None = None
     lines: list[NDArray[np.int64]] = field(default_factory=list)
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
@@ -141,9 +173,15 @@ class _Gathered:
 
     def width(self) -> int:
         """Cells a row must have."""
-        return 1 + max([*self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
+        only = [] if self.rows is None else [self.rows]
+        return 1 + max([*only, *self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
 
     def add(self, line: NDArray[np.int64], block: Sequence[Sequence[str]], recipe: Recipe) -> None:
+        if self.rows is not None and recipe.rows is not None:
+            wanted = [row[self.rows].strip() == recipe.rows.value for row in block]
+            line, block = line[wanted], [row for row, kept in zip(block, wanted, strict=True) if kept]
+            if not block:
+                return
         stamps = self.clock.parse(block)
         keep = stamps.valid
         if self.host is not None:
@@ -167,7 +205,15 @@ class _Gathered:
         return np.concatenate(self.lines) if self.lines else np.zeros(0, dtype=np.int64)
 
 
-def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None, extra: Sequence[str] = ()) -> Table:
+def read_table(
+    rows: Rows,
+    recipe: Recipe,
+    *,
+    where: str,
+    zone_name: str | None,
+    extra: Sequence[str] = (),
+    given: Given | None = None,
+) -> Table:
     """Read cells by a recipe.
 
     Args:
@@ -175,8 +221,10 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         where: the file, for messages.
         zone_name: of wall-clock stamps; goes before the recipe's.
         extra: further columns to read, by name.
+        given: what the user says about stamps that are no dates.
 
     Raises:
+        UsageError: a start or date for stamps that have one.
         InputError: no such columns, or hardly a row that can be read.
         TimeError: stamps without a zone, or impossible ones.
     """
@@ -188,6 +236,7 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         channels={name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()},
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
         checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
+        rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
     )
     for line, block in rows.blocks(gathered.width()):
         gathered.add(line, block, recipe)
@@ -201,11 +250,12 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         text = f"the stamps state their own zone: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
     zone_name = zone_name or recipe.time.zone
-    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where)
+    given = given or Given()
+    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
     host_time = None
     if gathered.host is not None:
-        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where)
+        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
     channels: dict[str, NDArray[np.float64]] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     for name, column in gathered.channels.items():
@@ -213,6 +263,11 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         value = in_si(column.value(order), layout)
+        if name in DOUBTED:
+            span = float(time.max() - time.min()) / NANOSECONDS
+            written = np.where(np.isin(state, (Cell.NUMBER,)), column.value(order), np.nan)
+            doubt = unitcheck.contradiction(written * layout.gain, layout.unit, span=span, channel=name)
+            findings.extend([doubt] if doubt is not None else [])
         channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
         if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
