@@ -99,15 +99,19 @@ def canonical(text: str, *, where: str | None = None) -> str:
     Raises:
         UnknownNameError: with the nearest known spelling.
     """
+    name = spelled(text)
+    if name is None:
+        raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
+    return name
+
+
+def spelled(text: str) -> str | None:
+    """The table's own name of the unit that a file spells as `text`; `None` where it spells none."""
     stripped = text.strip()
     if stripped in UNITS:
         return stripped
     key = _key(stripped)
-    if key in UNITS:
-        return key
-    if key in SPELLINGS:
-        return SPELLINGS[key]
-    raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
+    return key if key in UNITS else SPELLINGS.get(key)
 
 
 def _key(text: str) -> str:

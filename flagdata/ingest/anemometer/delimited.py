@@ -37,20 +37,13 @@ class Delimited:
         """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
         best: Guess | None = None
         for name in recipes.SENSORS.names():
-            guess = _match(recipes.load(name), name, head)
-            if guess and (best is None or guess.score > best.score):
-                best = guess
+            found = _match(recipes.load(name), name, head)
+            if found and (best is None or found.score > best.score):
+                best = found
         if best is not None:
             return best
         proposal = draft(head.lines)
-        if proposal is None:
-            return None
-        return Guess(
-            format="delimited", score=_DOUBTED if proposal.doubts else _DRAFTED,
-            reasons=proposal.understood, notes=(*proposal.warnings, *proposal.remarks),
-            doubts=tuple(f"{doubt.what}: {doubt.fix}" for doubt in proposal.doubts), winds=proposal.winds,
-            fix="; ".join(doubt.fix for doubt in proposal.doubts) or None, draft=proposal.toml or None,
-        )  # fmt: skip
+        return None if proposal is None else guess(proposal)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a file by the recipe in `options`, or by its draft."""
@@ -93,9 +86,19 @@ class Delimited:
         return replace(reading, findings=(*reading.findings, *found), drafted=proposal.toml)
 
 
+def guess(proposal: Draft) -> Guess:
+    """What `sniff` says of a draft."""
+    return Guess(
+        format="delimited", score=_DOUBTED if proposal.doubts else _DRAFTED,
+        reasons=proposal.understood, notes=(*proposal.warnings, *proposal.remarks),
+        doubts=tuple(f"{doubt.what}: {doubt.fix}" for doubt in proposal.doubts), winds=proposal.winds,
+        fix="; ".join(doubt.fix for doubt in proposal.doubts) or None, draft=proposal.toml or None,
+    )  # fmt: skip
+
+
 def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     """The draft of a file's recipe, completed by what the user says."""
-    lines = source.head(HEAD_LINES)
+    lines = tuple(source.head(HEAD_LINES))
     return draft(lines, unit=options.unit, order=options.date_order, wind=options.wind)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -58,8 +59,9 @@ class Draft:
     delimiter: str = ","
 
 
+@lru_cache(maxsize=4)
 def draft(
-    lines: Sequence[str], *, unit: str | None = None, order: _ORDER | None = None, wind: str | None = None
+    lines: tuple[str, ...], *, unit: str | None = None, order: _ORDER | None = None, wind: str | None = None
 ) -> Draft | None:
     """What the table is that `lines` seem to begin; `None` where they hold no table, or neither time nor wind.
 

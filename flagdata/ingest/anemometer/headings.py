@@ -10,9 +10,8 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from flagdata.errors import UnknownNameError
 from flagdata.schema import CHANNELS
-from flagdata.units import UNITS, canonical
+from flagdata.units import UNITS, spelled
 
 _WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
 _CAMEL = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöü])|[A-ZÄÖÜ]?[a-zäöüßéèíóá]+|[^\W\d_]+")
@@ -227,6 +226,8 @@ def _height(text: str) -> float | None:
 def _unit(text: str, stated: str) -> tuple[str, str | None]:
     """The heading without its unit, and the unit."""
     below = _known(stated.strip().strip("[]()<>"))
+    if len(text) > 1 and below is None and (whole := _known(text)) is not None:
+        return text, whole
     for found in _BRACKET.finditer(text):
         inside = _known(found[1])
         if inside is not None:
@@ -243,27 +244,24 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
         # At the end ("wind_speed_km_h", "Wind Speed, m/s") and at the beginning ("m/s Wind Speed").
         if len(pieces) > count:
             for part, others in ((pieces[-count:], pieces[:-count]), (pieces[:count], pieces[count:])):
-                spelled = "".join(part)
-                if count > 1 and not re.search(r"[\d/]|per|m_s|km_h|deg|deg[ _]|kilo|m[ _]s", spelled, re.IGNORECASE):
+                joined = "".join(part)
+                if count > 1 and not re.search(r"[\d/]|per|m_s|km_h|deg|kilo|m[ _]s", joined, re.IGNORECASE):
                     continue
-                for way in (spelled, re.sub(r"[_ ]", "/", spelled), re.sub(r"[_ ]", "", spelled)):
+                for way in (joined, re.sub(r"[_ ]", "/", joined), re.sub(r"[_ ]", "", joined)):
                     inside = _known(way)
                     if inside is not None and inside not in ("m", "s", "Hz", "px", "1", "ft", "cm", "mm", "K", "rad"):
                         return "".join(others), inside
     return text, None
 
 
-def _known(spelled: str) -> str | None:
+def _known(words: str) -> str | None:
     """The table's name of a unit, where a text spells one; "ms" is metres a second in a log of wind."""
-    text = spelled.strip().strip(".").strip()
+    text = words.strip().strip(".").strip()
     if not text or len(text) > 40:
         return None
     if text.lower() in ("ms", "m/s/1", "m_s"):
         return "m/s"
-    try:
-        return canonical(text)
-    except UnknownNameError:
-        return None
+    return spelled(text)
 
 
 def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tuple[str, bool, set[str]]:
@@ -335,7 +333,9 @@ def _weather(words: list[str], compact: str, si: str | None, windy: bool) -> tup
     sonic = bool(known & {"sonic", "son", "acoustic", "tsonic", "ts", "tson", "csat", "tv"})
     warm = known & _TEMPERATURE or re.search(r"temp|^t$|^t\d+$|^tair", compact) or (words[:1] == ["t"] and len(words) > 1)
     if si in (None, "K") and sonic and (warm or known & {"ts", "tsonic", "tson"}):
-        return "sonic_temperature", True, known & {"sonic", "ts", "temp", "temperature", "t", "tsonic"}
+        # TS is a sonic's among u, v and w, the soil's in ICOS's and AmeriFlux's tables.
+        said = bool(known & {"sonic", "son", "acoustic", "tsonic", "tson", "csat"})
+        return "sonic_temperature", said, known & {"sonic", "ts", "temp", "temperature", "t", "tsonic"}
     if si in (None, "K") and (warm or (si == "K" and not known)) and not known & _NO_AIR and "dew" not in compact:
         return "air_temperature", True, (known & _TEMPERATURE) or (known & {"t"})
     if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not known & _NO_AIR:

@@ -267,6 +267,8 @@ def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
     first = next(iter(columns.values())).index
     for channel in _WEATHER:
         candidates = found.of(channel)
+        if channel == "sonic_temperature" and "wind_x" not in columns:
+            candidates = [i for i in candidates if found.headings[i].sure]
         if channel == "sonic_temperature" and "wind_x" in columns:
             candidates += [i for i in found.of("air_temperature") if words_of(found.layout.names[i])[:1] == ["t"]]
         if channel == "air_temperature" and "wind_x" in columns:

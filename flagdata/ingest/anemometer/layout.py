@@ -9,12 +9,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from flagdata.errors import UnknownNameError
 from flagdata.ingest.anemometer.recipe import MISSING
-from flagdata.units import canonical
+from flagdata.units import spelled
 
 TAIL = 200
-"""Lines at the end of those looked at by which the delimiter is told."""
+"""Lines at the end of those looked at by which the delimiter is told; half of them where the file is short."""
 _CANDIDATES = (";", "\t", ",", "|", " ")
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 _STAMP = re.compile(
@@ -74,12 +73,13 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         interest: how much a cell looks like the heading of a time or a wind, to tell the line of names.
     """
     filled = [(number, line) for number, line in enumerate(lines) if line.strip(" \t\x00\x1a")]
-    delimiter = _delimiter([line for _, line in filled[-TAIL:]])
+    tail = min(TAIL, max(1, len(filled) // 2))
+    delimiter = _delimiter([line for _, line in filled[-tail:]])
     if delimiter is None:
         return None
     table = [(number, cut(line, delimiter)) for number, line in filled]
-    width = _width([cells for _, cells in table[-TAIL:]])
-    typed = _typed([cells for _, cells in table[-TAIL:] if len(_trimmed(cells, width)) == width], width)
+    width = _width([cells for _, cells in table[-tail:]])
+    typed = _typed([cells for _, cells in table[-tail:] if len(_trimmed(cells, width)) == width], width)
     if width < 2 or not typed:
         return None
     fits = [_is_row(cells, width, typed) for _, cells in table]
@@ -125,11 +125,7 @@ def is_unit(text: str) -> bool:
     bare = text.strip().strip("[]()<>").strip()
     if bare.lower() in ("ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "v"):
         return True
-    try:
-        canonical(bare)
-    except UnknownNameError:
-        return False
-    return True
+    return spelled(bare) is not None
 
 
 def _delimiter(lines: Sequence[str]) -> str | None:

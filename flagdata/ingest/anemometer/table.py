@@ -125,8 +125,8 @@ class _Clock:
         self.step = min(self.step, stamps.step)
 
     def stated(self) -> bool:
-        """Whether every stamp states its zone, as Unix times do."""
-        return all(bool(utc.all()) for utc in self.utc)
+        """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
+        return counted.is_elapsed(self.form) or all(bool(utc.all()) for utc in self.utc)
 
     def order(self) -> slice:
         """The rows from the oldest on, for logs that list the newest first."""

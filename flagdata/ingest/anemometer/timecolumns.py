@@ -25,6 +25,8 @@ _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%I:%M:%S%p", "%I:%
 _MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 _DATE = re.compile(r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$")
 _CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$")
+_STAMPLIKE = re.compile(r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:")
+"""What a cell must have in it to be a date and a time."""
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
     ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hr|hour|stunde", 0, 23),
     ("%M", r"mi|min|mm|minute|m", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
@@ -129,7 +131,7 @@ def _whole(
     layout: Layout, columns: tuple[int, ...], texts: list[str], order: Literal["dmy", "mdy"] | None
 ) -> TimeChoice | None:
     """Date and time in `texts`."""
-    if not any(re.search(r"\d", text) for text in texts[:5]):
+    if not any(_STAMPLIKE.search(text) for text in texts[:5]):
         return None
     for form in ("iso", "epoch-s", "epoch-ms"):
         found, _ = parse_with_bare_dates(texts, form)

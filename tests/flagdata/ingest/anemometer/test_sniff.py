@@ -16,7 +16,7 @@ Write = Callable[..., Path]
 @pytest.mark.parametrize(
     ("content", "format_name", "recipe"),
     [
-        ("time,wind_speed\n2026-05-01T12:00:00Z,3\n", "delimited", "generic-csv"),
+        ("time,wind_speed [m/s]\n2026-05-01T12:00:00Z,3\n", "delimited", None),
         ('"TOA5","s","CR1000"\n"TIMESTAMP","RECORD","WS"\n', "toa5", None),
         ("$WIMWV,214.8,R,0.1,K,A*28\n", "nmea", None),
         ("Device Name;K\nDevice Model;5500\nTime;Wind Speed;Temp;Dir\nx;m/s;C;d\n", "kestrel", None),
