@@ -174,7 +174,8 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
                 towards = _direction(found, index, _DIRECTION_OF[channel])
                 if towards is not None:
                     columns[towards[0]] = towards[1]
-            lone = set(words_of(found.layout.names[first])) <= {"speed", "spd", "velocity", "vel"}
+            said = set(words_of(found.layout.names[first]))
+            lone = bool(said & {"speed", "spd", "velocity", "vel"}) and not any("wind" in word for word in said)
             winds.append(Wind(
                 label=found.name(first), height=found.headings[first].height, columns=columns,
                 sure=found.headings[first].sure and not (lone and moving),

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flagdata.ingest.anemometer.recipe import MISSING
+from flagdata.ingest.anemometer.rows import blank_cells
 from flagdata.units import spelled
 
 TAIL = 200
@@ -90,7 +91,8 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     kept = [(number, _trimmed(cells, width)) for (number, cells), fit in zip(table, fits, strict=True) if fit]
     kept = [(number, cells) for number, cells in kept if number >= start]
     rows = tuple(tuple(cells) for _, cells in kept)
-    names, units, at, by_name, strange = _heading(lines, start, delimiter, width, interest)
+    full = Counter(len(cells) for (_, cells), fit in zip(table, fits, strict=True) if fit).most_common(1)[0][0]
+    names, units, at, by_name, strange = _heading(lines, start, delimiter, (width, full), interest)
     decimal: Literal[".", ","] = "," if delimiter != "," and _decimal_commas(rows) else "."
     return Layout(
         delimiter=delimiter, decimal=decimal, preamble=start if at is None else at,
@@ -102,7 +104,7 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
 def cut(line: str, delimiter: str) -> list[str]:
     """Cells of one line, trimmed; quotes bind where they are closed."""
     if delimiter == " ":
-        return line.split()
+        return blank_cells(line)
     if '"' in line and line.count('"') % 2 == 0:
         return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")], delimiter=delimiter), [])]
     return [cell.strip() for cell in line.split(delimiter)]
@@ -123,7 +125,8 @@ def cell_kind(cell: str) -> CellKind:
 def is_unit(text: str) -> bool:
     """Whether a cell of a line of units spells one; brackets are looked through."""
     bare = text.strip().strip("[]()<>").strip()
-    if bare.lower() in ("ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "v"):
+    if bare.lower() in ("ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "v",
+                        "yr", "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none", "w/m^2"):  # fmt: skip
         return True
     return spelled(bare) is not None
 
@@ -196,9 +199,14 @@ def _decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
 
 
 def _heading(
-    lines: Sequence[str], start: int, delimiter: str, width: int, interest: Callable[[str], int]
+    lines: Sequence[str], start: int, delimiter: str, widths: tuple[int, int], interest: Callable[[str], int]
 ) -> tuple[tuple[str, ...], tuple[str, ...], int | None, bool, tuple[str, ...]]:
-    """Names and units of the columns, the index of the line of names, whether it can be read as a recipe reads it."""
+    """Names and units of the columns, the index of the line of names, whether it can be read as a recipe reads it.
+
+    Args:
+        widths: cells of a row, without and with those at its end that are always empty.
+    """
+    width = widths[0]
     nothing = ("",) * width
     candidates: list[tuple[int, list[str], bool]] = []
     strange: list[str] = []
@@ -206,7 +214,7 @@ def _heading(
         line = lines[number].lstrip("\ufeff")
         if not re.sub(r"[\s,;|]", "", line):
             continue
-        cells, plain = _names(line, delimiter, width)
+        cells, plain = _names(line, delimiter, *widths)
         if cells is None:
             if not candidates and any(interest(cell) for cell in cut(_MARK.sub("", line), delimiter)):
                 count = len(cut(_MARK.sub("", line), delimiter))
@@ -228,9 +236,11 @@ def _heading(
     return tuple(names), tuple(units), at, by_name, ()
 
 
-def _names(line: str, delimiter: str, width: int) -> tuple[list[str] | None, bool]:
+def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] | None, bool]:
     """Cells of a line of names that fit `width`, and whether a recipe would cut it like this."""
     plain = _trimmed(cut(line, delimiter), width)
+    if len(plain) == full > width:
+        return plain[:width], not _MARK.match(line)
     if len(plain) == width and not _MARK.match(line):
         return plain, True
     bare = _MARK.sub("", line.strip())

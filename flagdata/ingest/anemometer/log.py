@@ -111,6 +111,9 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         name = "host-stamped" if recipes.load(options.recipe).file.host else "delimited"
         return name, options, (f"the recipe {options.recipe} was named",)
     guesses = recognise(source)
+    if guesses and guesses[0].score < SURE:
+        # A table in doubt is refused by its own reader, which knows what the user has said already.
+        guesses = tuple(sorted(guesses, key=lambda guess: not guess.doubts))
     if not guesses or (guesses[0].score < SURE and not guesses[0].doubts):
         seen = "; ".join(reason for guess in guesses for reason in guess.reasons)
         raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -12,6 +13,8 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import FileLayout
 from flagdata.ingest.anemometer.source import TextFile
+
+_BLANK_CELL = re.compile(r'"([^"]*)"|([^\s"]+)')
 
 
 class RowReader:
@@ -111,6 +114,13 @@ class RowReader:
         return tuple(found)
 
 
+def blank_cells(line: str) -> list[str]:
+    """Cells divided by runs of blanks; quotes bind where they are closed."""
+    if '"' not in line or line.count('"') % 2:
+        return line.split()
+    return [quoted or plain for quoted, plain in _BLANK_CELL.findall(line)]
+
+
 def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
     return len(row) > named and not any(cell.strip() for cell in row[named:])
 
@@ -118,7 +128,7 @@ def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
 def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:
     """Cells of each line. Quotes bind within a line; a line with an unclosed quote becomes one cell."""
     if delimiter == " ":
-        return [line.split() for line in lines]
+        return [blank_cells(line) for line in lines]
     if not any('"' in line for line in lines):
         return [line.split(delimiter) for line in lines]
     closed = [line if line.count('"') % 2 == 0 else "" for line in lines]

@@ -263,7 +263,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         return
     value = parsed.value[parsed.state == Cell.NUMBER]
     steps = np.diff(value)
-    if len(value) < 2 or float((steps >= 0).mean()) < 0.95 or not np.any(steps > 0):
+    if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
     if names_time(name) and float(steps.max()) < 400:
