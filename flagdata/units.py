@@ -116,7 +116,7 @@ def spelled(text: str) -> str | None:
 
 def _key(text: str) -> str:
     """A spelling in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
-    key = text.lower().replace("º", "°").replace("⁻", "-").replace("−", "-").replace("¹", "1")  # noqa: RUF001
+    key = text.lower().replace("º", "°").replace("⁻", "-").replace("−", "-").replace("¹", "1")
     key = key.replace("^", "").replace("·", ".").replace("-per-", "/").replace(" per ", "/").replace("(-1)", "-1")
     key = "".join(key.split())
     return "°" + key[1:] if key[:1] == "*" and len(key) > 1 else key

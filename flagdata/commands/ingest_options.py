@@ -114,7 +114,6 @@ def wind_options(
     import datetime as dt
 
     from flagdata import timebase
-
     from flagdata.ingest.anemometer import WindOptions
     from flagdata.ingest.store import WindIngest
     from flagdata.units import unit as unit_of

@@ -25,7 +25,6 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import stamps
 from flagdata.ingest.anemometer.stamps import DAY, Stamps
 from flagdata.timebase import NANOSECONDS, iso
-from flagdata.units import UNITS
 
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}

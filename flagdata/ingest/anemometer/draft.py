@@ -127,9 +127,9 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
         if missing:
             found.append(_unit_doubt(layout, wind, missing))
             break
-    unsure = [wind.label for wind in ((chosen,) if chosen is not None else winds) if not wind.sure]
+    unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
-        fix = "save the draft, check it, and name it: --recipe FILE.toml"
+        fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         found.append(Doubt(what=what, fix=fix))
     return found

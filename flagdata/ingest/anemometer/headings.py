@@ -97,7 +97,9 @@ _INSIDE = {
     "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
 }  # fmt: skip
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
-_SENSORS = frozenset({"csat", "csat3", "sonic", "sat", "metek", "gill", "young", "wind", "comp", "component", "hs", "wm"})
+_SENSORS = frozenset(
+    {"csat", "csat3", "sonic", "sat", "metek", "gill", "young", "wind", "comp", "component", "hs", "wm"}
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,7 +333,9 @@ def _weather(words: list[str], compact: str, si: str | None, windy: bool) -> tup
     if windy:
         return "", False, set()
     sonic = bool(known & {"sonic", "son", "acoustic", "tsonic", "ts", "tson", "csat", "tv"})
-    warm = known & _TEMPERATURE or re.search(r"temp|^t$|^t\d+$|^tair", compact) or (words[:1] == ["t"] and len(words) > 1)
+    warm = (
+        known & _TEMPERATURE or re.search(r"temp|^t$|^t\d+$|^tair", compact) or (words[:1] == ["t"] and len(words) > 1)
+    )
     if si in (None, "K") and sonic and (warm or known & {"ts", "tsonic", "tson"}):
         # TS is a sonic's among u, v and w, the soil's in ICOS's and AmeriFlux's tables.
         said = bool(known & {"sonic", "son", "acoustic", "tsonic", "tson", "csat"})
@@ -341,7 +345,11 @@ def _weather(words: list[str], compact: str, si: str | None, windy: bool) -> tup
     if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not known & _NO_AIR:
         return "relative_humidity", True, known & _HUMIDITY
     pressed = known & _PRESSURE or re.search(r"press|baro|^p$|^p\d+$", compact)
-    if si in (None, "Pa") and pressed and not known & {"sea", "msl", "slp", "qnh", "vapor", "vapour", "box", "cell", "mslp"}:
+    if (
+        si in (None, "Pa")
+        and pressed
+        and not known & {"sea", "msl", "slp", "qnh", "vapor", "vapour", "box", "cell", "mslp"}
+    ):
         return "air_pressure", True, known & (_PRESSURE | {"p"})
     return "", False, set()
 

@@ -185,7 +185,9 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
 
 def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
     """Of columns with the same words, those that are readings of their own: not another unit, not the mean of one."""
-    order = sorted(indices, key=lambda i: (found.headings[i].unit is None, found.headings[i].mean, found.headings[i].unit != "m/s"))
+    order = sorted(
+        indices, key=lambda i: (found.headings[i].unit is None, found.headings[i].mean, found.headings[i].unit != "m/s")
+    )
     kept: list[int] = []
     for index in order:
         heading = found.headings[index]
@@ -193,7 +195,9 @@ def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
         if same is None:
             kept.append(index)
         else:
-            found.remarks.append(f"column {heading.name!r} is {found.layout.names[same]!r} again, averaged or in another unit")
+            found.remarks.append(
+                f"column {heading.name!r} is {found.layout.names[same]!r} again, averaged or in another unit"
+            )
     return sorted(kept)
 
 
@@ -220,7 +224,9 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
             names = ", ".join(found.layout.names[index] for index in indices.values())
             found.remarks.append(f"components {names} are left out beside the speed")
             continue
-        columns = {channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices}
+        columns = {
+            channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices
+        }
         first = indices["wind_x"]
         winds.append(Wind(label=found.name(first), height=found.headings[first].height, columns=columns, sure=True))
     return winds
@@ -233,7 +239,12 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     height = found.headings[speed].height
     near = [i for i in candidates if height is not None and found.headings[i].height is not None
             and abs(float(found.headings[i].height or 0) - height) <= max(5.0, 0.15 * height)]  # fmt: skip
-    near.sort(key=lambda i: (abs(float(found.headings[i].height or 0) - float(height or 0)), found.headings[i].label != found.headings[speed].label))
+    near.sort(
+        key=lambda i: (
+            abs(float(found.headings[i].height or 0) - float(height or 0)),
+            found.headings[i].label != found.headings[speed].label,
+        )
+    )
     lone = candidates if len(candidates) == 1 else []
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
     chosen = exact or near[:1] or lone or plain
@@ -250,8 +261,15 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
         found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
         return None
-    if heading.unit in (None, "deg") and float(known.max()) <= 16 and bool(np.all(known % 1 == 0)) and len(np.unique(known)) > 3:
-        found.remarks.append(f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out")
+    if (
+        heading.unit in (None, "deg")
+        and float(known.max()) <= 16
+        and bool(np.all(known % 1 == 0))
+        and len(np.unique(known)) > 3
+    ):
+        found.remarks.append(
+            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out"
+        )
         return None
     if heading.unit is None and float(np.abs(known).max()) <= 6.3:
         found.remarks.append(f"column {heading.name!r} may be in degrees or radians: left out")

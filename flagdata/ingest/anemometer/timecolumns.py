@@ -21,11 +21,26 @@ from flagdata.timebase import NANOSECONDS
 
 _SHARE = 0.9
 """Share of rows that must fit for a column to be what it seems."""
-_CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%I:%M:%S%p", "%I:%M%p", "%H%M%S", "%H%M", "%H.%M.%S", "%H")
+_CLOCKS = (
+    "%H:%M:%S%f",
+    "%H:%M",
+    "%I:%M:%S %p",
+    "%I:%M %p",
+    "%I:%M:%S%p",
+    "%I:%M%p",
+    "%H%M%S",
+    "%H%M",
+    "%H.%M.%S",
+    "%H",
+)
 _MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
-_DATE = re.compile(r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$")
+_DATE = re.compile(
+    r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
+)
 _CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$")
-_STAMPLIKE = re.compile(r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:")
+_STAMPLIKE = re.compile(
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
+)
 """What a cell must have in it to be a date and a time."""
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
     ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hr|hour|stunde", 0, 23),
@@ -124,7 +139,9 @@ def _choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, 
     words = {word for name in names for word in words_of(name)}
     score += (0.6 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
     score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & {"gust", "max", "min", "created", "updated", "start"})
-    return TimeChoice(columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score)
+    return TimeChoice(
+        columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score
+    )
 
 
 def _whole(
@@ -204,9 +221,7 @@ def _compact(shape: str) -> tuple[str, ...]:
     return (known,) if known else ()
 
 
-def _with_month_names(
-    layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str
-) -> TimeChoice | None:
+def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
     dates = [form.format(s=sign) for sign in "- /" for form in _MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
     for form in (f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in _CLOCKS[:6]):
         found, _ = parse_with_bare_dates(texts[:20], form)
@@ -241,9 +256,7 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     return None
 
 
-def _part_at(
-    names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]
-) -> bool:
+def _part_at(names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]) -> bool:
     if at >= len(names):
         return False
     return bool(re.fullmatch(rf"({part[1]})( utc)?", names[at])) and _whole_numbers(columns[at], part[2], part[3])

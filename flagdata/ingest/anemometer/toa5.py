@@ -164,9 +164,7 @@ def _channel(name: str) -> str | None:
     return None
 
 
-def _by_heading(
-    names: list[str], units: list[str], known: Mapping[str, ChannelLayout]
-) -> dict[str, ChannelLayout]:
+def _by_heading(names: list[str], units: list[str], known: Mapping[str, ChannelLayout]) -> dict[str, ChannelLayout]:
     """Channels of fields whose names are of no known program, by what their words say; the first that fits."""
     found: dict[str, ChannelLayout] = {}
     for name, spelling in zip(names, units, strict=True):

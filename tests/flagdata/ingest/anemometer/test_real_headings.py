@@ -32,9 +32,23 @@ def rows(form: str, *, step: float = 1.0, start: dt.datetime = START, count: int
         v = SPEED[i % len(SPEED)]
         t = start + dt.timedelta(seconds=i * step)
         lines.append(
-            form.format(t=t, v=v, kmh=v * 3.6, mph=v / 0.44704, kn=v * 3600 / 1852, d=200 + 7 * i, i=i, n=i + 1,
-                        x=-v * 0.6, y=v * 0.8, w=0.1, c=20.5 + i / 10, s=i * step, ms=round(1000 * i * step) + 5312,
-                        epoch=t.timestamp())  # fmt: skip
+            form.format(
+                t=t,
+                v=v,
+                kmh=v * 3.6,
+                mph=v / 0.44704,
+                kn=v * 3600 / 1852,
+                d=200 + 7 * i,
+                i=i,
+                n=i + 1,
+                x=-v * 0.6,
+                y=v * 0.8,
+                w=0.1,
+                c=20.5 + i / 10,
+                s=i * step,
+                ms=round(1000 * i * step) + 5312,
+                epoch=t.timestamp(),
+            )  # fmt: skip
         )
     return "\n".join(lines) + "\n"
 
@@ -74,20 +88,28 @@ TABLES: dict[str, Table] = {
     "zone-in-stamps": Table(text="timestamp,ws_ms\n" + rows("{t:%Y-%m-%dT%H:%M:%S}+00:00,{v}")),
     "german-semicolons": Table(
         text="Station 7\n\nDatum;Uhrzeit;Windgeschwindigkeit [km/h];Windrichtung [°]\n"
-        + rows("{t:%d.%m.%Y;%H:%M:%S};{kmh:.6f};{d}").replace(".05.", "#").replace(".2026", "~").replace(".", ",")
-        .replace("#", ".05.").replace("~", ".2026"),
-        within=1e-6, has={"wind_direction": 200 * DEG},
+        + rows("{t:%d.%m.%Y;%H:%M:%S};{kmh:.6f};{d}")
+        .replace(".05.", "#")
+        .replace(".2026", "~")
+        .replace(".", ",")
+        .replace("#", ".05.")
+        .replace("~", ".2026"),
+        within=1e-6,
+        has={"wind_direction": 200 * DEG},
     ),
     "american": Table(
         text="Date Time,Gust (mph),Wind Speed (mph),Temp (F)\n"
         + rows("{t:%m/%d/%Y %I:%M:%S %p},{mph:.6f},{mph:.6f},68.0"),
-        within=1e-6, has={"air_temperature": 293.15},
+        within=1e-6,
+        has={"air_temperature": 293.15},
     ),
     "unix-tabs": Table(text="ts\tspeed_ms\n" + rows("{epoch:.0f}\t{v}")),
     "unix-ms": Table(text="timestamp_ms,wind_kts\n" + rows("{epoch:.0f}000,{kn:.6f}"), within=1e-6),
     "unix-ns-influx": Table(text="time,wind_speed_mps\n" + rows("{epoch:.0f}000000000,{v}")),
     "epoch-fraction": Table(text="t_unix,windSpeedMps\n" + rows("{epoch:.3f},{v}")),
-    "unit-row": Table(text="TIMESTAMP,WS,WD,RH\nUTC,m/s,deg,%\n" + rows(T + ",{v},{d},55"), has={"relative_humidity": 0.55}),
+    "unit-row": Table(
+        text="TIMESTAMP,WS,WD,RH\nUTC,m/s,deg,%\n" + rows(T + ",{v},{d},55"), has={"relative_humidity": 0.55}
+    ),
     "units-below-with-blanks": Table(
         text="Date/Time\tWind Speed\tWind Direction\n\tMetres/Second\tDeg\n\n" + rows(T + "\t{v}\t{d}")
     ),
@@ -111,21 +133,29 @@ TABLES: dict[str, Table] = {
     "named-T": Table(text="T,wind_mps\n" + rows(T + ",{v}")),
     "T-is-the-air": Table(text="time,T [°C],ws [m/s]\n" + rows(T + ",{c},{v}"), has={"air_temperature": 293.65}),
     "T-of-a-sonic": Table(
-        text="time,u [m/s],v [m/s],w [m/s],T [°C]\n" + rows(T + ",{x:.6f},{y:.6f},{w},{c}"), within=1e-6,
-        has={"sonic_temperature": 293.65, "wind_z": 0.1}, lacks=("air_temperature",),
+        text="time,u [m/s],v [m/s],w [m/s],T [°C]\n" + rows(T + ",{x:.6f},{y:.6f},{w},{c}"),
+        within=1e-6,
+        has={"sonic_temperature": 293.65, "wind_z": 0.1},
+        lacks=("air_temperature",),
     ),
     "uvw-without-unit": Table(
         text="TIMESTAMP,U_[R350],V_[R350],W_[R350],T_SONIC_[R350]\n" + rows(T + ",{x:.6f},{y:.6f},{w},293.5"),
-        says=MS, asks="--unit", within=1e-6, lacks=("air_temperature",), has={"sonic_temperature": 293.5},
+        says=MS,
+        asks="--unit",
+        within=1e-6,
+        lacks=("air_temperature",),
+        has={"sonic_temperature": 293.5},
     ),
     "ux-uy-uz": Table(text="Time,Ux(m/s),Uy(m/s),Uz(m/s),Ts(C)\n" + rows(T + ",{x:.6f},{y:.6f},{w},{c}"), within=1e-6),
     "icos-name": Table(
         text="TIMESTAMP_END,WS_CUP_T1_2_1_Avg [m s-1],WD_VANE_T1_2_1_Avg [deg],TS_1_1_1 [degC]\n"
-        + rows("{t:%Y%m%d%H%M},{v},{d},11", step=60), lacks=("sonic_temperature", "air_temperature"),
+        + rows("{t:%Y%m%d%H%M},{v},{d},11", step=60),
+        lacks=("sonic_temperature", "air_temperature"),
     ),
     "icos-without-unit": Table(
         text="TIMESTAMP_START,TIMESTAMP_END,WS,WD\n" + rows("{t:%Y%m%d%H%M},{t:%Y%m%d%H%M},{v},{d}", step=60),
-        says=MS, asks="--unit",
+        says=MS,
+        asks="--unit",
     ),
     "no-unit": Table(text="time,wind_speed,wind_direction\n" + rows(T + ",{v},{d}"), says=MS, asks="--unit"),
     "no-unit-in-kmh": Table(
@@ -133,36 +163,42 @@ TABLES: dict[str, Table] = {
     ),
     "gust-is-no-wind": Table(
         text="time,wind_gust_ms,gust_dir_deg,wind_speed_ms,temp_f\n" + rows(T + ",19.1,10,{v},68"),
-        lacks=("wind_direction",), has={"air_temperature": 293.15},
+        lacks=("wind_direction",),
+        has={"air_temperature": 293.15},
     ),
     "other-temperatures": Table(
         text="time,Dew Point (°C),Wind Chill (°C),Wind Speed (m/s),Logger Temp (°C),Anemometer Temp (°C)\n"
-        + rows(T + ",5,6,{v},30,31"), lacks=("air_temperature",),
+        + rows(T + ",5,6,{v},30,31"),
+        lacks=("air_temperature",),
     ),
     "hobo": Table(
         text='"Plot Title: mast"\n"#","Date Time, GMT+00:00","Wind Speed, m/s (LGR S/N: 1, SEN S/N: 2)",'
         '"Gust Speed, m/s (LGR S/N: 1, SEN S/N: 2)","Wind Direction, ø (LGR S/N: 1, SEN S/N: 3)"\n'
         + rows("{n},{t:%m/%d/%y %I:%M:%S %p},{v},9.9,{d}"),
-        has={"wind_direction": 200 * DEG}, says={"zone": None},
+        has={"wind_direction": 200 * DEG},
+        says={"zone": None},
     ),
     "zentra-units-first": Table(
         text="Timestamps,° Wind Direction,m/s Wind Speed,m/s Gust Speed,kPa Reference Pressure\n"
-        + rows("{t:%m/%d/%Y %H:%M},{d},{v},9.9,97.8", step=60), has={"air_pressure": 97_800.0},
+        + rows("{t:%m/%d/%Y %H:%M},{d},{v},9.9,97.8", step=60),
+        has={"air_pressure": 97_800.0},
     ),
     "ambient": Table(
         text="Date,Simple Date,Outdoor Temperature (°F),Wind Speed (mph),Wind Gust (mph),Humidity (%)\n"
-        + rows("{t:%Y-%m-%dT%H:%M:%S}+00:00," + T + ",68,{mph:.6f},30,55"), within=1e-6,
+        + rows("{t:%Y-%m-%dT%H:%M:%S}+00:00," + T + ",68,{mph:.6f},30,55"),
+        within=1e-6,
     ),
     "open-meteo": Table(
         text="latitude,longitude\n52.5,13.4\n\ntime,wind_speed_10m (km/h),wind_direction_10m (°),temperature_2m (°C)\n"
-        + rows("{t:%Y-%m-%dT%H:%M},{kmh:.6f},{d},20", step=3600), within=1e-6,
+        + rows("{t:%Y-%m-%dT%H:%M},{kmh:.6f},{d},20", step=3600),
+        within=1e-6,
     ),
     "split-date": Table(
         text="Year,Month,Day,Hour,Minute,Second,WS(m/s),WD(deg)\n" + rows("{t:%Y,%m,%d,%H,%M,%S},{v},{d}"),
     ),
     "buoy-blanks": Table(
-        text="#YY  MM DD hh mm WDIR WSPD\n#yr  mo dy hr mn degT m/s\n"
-        + rows("{t:%Y %m %d %H %M} {d} {v}", step=600), has={"wind_direction": 200 * DEG},
+        text="#YY  MM DD hh mm WDIR WSPD\n#yr  mo dy hr mn degT m/s\n" + rows("{t:%Y %m %d %H %M} {d} {v}", step=600),
+        has={"wind_direction": 200 * DEG},
     ),
     "day-of-year": Table(text="year,doy,hour,min,wspd_ms\n" + rows("{t:%Y,%j,%H,%M},{v}", step=60)),
     "month-names": Table(text="Time,Speed m/s\n" + rows("{t:%d-%b-%Y %H:%M:%S},{v}")),
@@ -170,8 +206,11 @@ TABLES: dict[str, Table] = {
         text="No;Date;Battery;Time;Wind (km/h)\n" + rows("{n};{t:%Y-%m-%d};12;{t:%H:%M:%S};{kmh:.6f}"), within=1e-6
     ),
     "order-not-told": Table(
-        text="Date,Wind Speed (m/s)\n" + rows("{t:%d/%m/%Y %H:%M:%S},{v}", start=dt.datetime(2026, 5, 4, 12, tzinfo=dt.UTC)),
-        says={"date_order": "dmy"}, asks="--date-order", first="2026-05-04T12:00:00Z",
+        text="Date,Wind Speed (m/s)\n"
+        + rows("{t:%d/%m/%Y %H:%M:%S},{v}", start=dt.datetime(2026, 5, 4, 12, tzinfo=dt.UTC)),
+        says={"date_order": "dmy"},
+        asks="--date-order",
+        first="2026-05-04T12:00:00Z",
     ),
     "midnight-is-bare": Table(
         text="time,ws [m/s]\n"
@@ -183,14 +222,14 @@ TABLES: dict[str, Table] = {
     ),
     "seconds-since-start": Table(
         text="Time (s),Anemometer velocity (m/s)\n" + rows("{s:.2f},{v}", step=0.05),
-        says={"start": instant("2026-05-13T12:00:00Z")}, asks="--start",
+        says={"start": instant("2026-05-13T12:00:00Z")},
+        asks="--start",
     ),
     "time-of-day": Table(
         text="Time;Wind m/s\n" + rows("{t:%H:%M:%S};{v}"), says={"date": dt.date(2026, 5, 13)}, asks="--date"
     ),
     "excel-serial-days": Table(
-        text="Date,Wind speed [m/s]\n"
-        + "".join(f"{46155.5 + i / 1440:.9f},{v}\n" for i, v in enumerate(SPEED)),
+        text="Date,Wind speed [m/s]\n" + "".join(f"{46155.5 + i / 1440:.9f},{v}\n" for i, v in enumerate(SPEED)),
     ),
     "missing-codes": Table(
         text="time,ws (m/s)\n" + rows(T + ",{v}").replace(",5.38\n", ",-9999\n").replace(",6.27\n", ",NA\n"),
@@ -201,13 +240,18 @@ TABLES: dict[str, Table] = {
         text="time,Channel 3,Channel 4\n" + rows(T + ",{v},1"), says={"wind": "Channel 3", **MS}, asks="--wind"
     ),
     "lone-speed-of-a-boat": Table(
-        text="time,lat,lon,speed (m/s)\n" + rows(T + ",52.1,4.2,{v}"), says={"wind": "speed (m/s)"}, asks="--wind",
+        text="time,lat,lon,speed (m/s)\n" + rows(T + ",52.1,4.2,{v}"),
+        says={"wind": "speed (m/s)"},
+        asks="--wind",
     ),
     "sectors": Table(
-        text="time,wind_speed (km/h),wind_direction\n" + rows(T + ",{kmh:.6f},{i}"), within=1e-6, lacks=("wind_direction",)
+        text="time,wind_speed (km/h),wind_direction\n" + rows(T + ",{kmh:.6f},{i}"),
+        within=1e-6,
+        lacks=("wind_direction",),
     ),
     "spanish": Table(
-        text="Fecha y hora;Velocidad del viento (m/s);Dirección del viento (°)\n" + rows("{t:%d/%m/%Y %H:%M};{v};{d}", step=60),
+        text="Fecha y hora;Velocidad del viento (m/s);Dirección del viento (°)\n"
+        + rows("{t:%d/%m/%Y %H:%M};{v};{d}", step=60),
         has={"wind_direction": 200 * DEG},
     ),
     "french": Table(text="Date;Heure;Vitesse du vent (km/h)\n" + rows("{t:%d/%m/%Y;%H:%M:%S};{kmh:.6f}"), within=1e-6),
@@ -283,7 +327,9 @@ def test_a_damaged_gzip_file_is_refused(log_file: Write) -> None:
         read_log(log_file(packed[: len(packed) // 2], "a.csv.gz"), WindOptions(zone="UTC"))
 
 
-HEIGHTS = "Time,Spd80mN (m/s),Spd80mNStd (m/s),Spd40mN (m/s),Dir78m,Dir38m\n" + rows(T + ",{v},0.4,{x:.3f},{d},10").replace(",-", ",")
+HEIGHTS = "Time,Spd80mN (m/s),Spd80mNStd (m/s),Spd40mN (m/s),Dir78m,Dir38m\n" + rows(
+    T + ",{v},0.4,{x:.3f},{d},10"
+).replace(",-", ",")
 
 
 def test_each_height_of_a_table_is_an_anemometer_with_its_own_direction(log_file: Write) -> None:
@@ -307,7 +353,9 @@ def test_of_several_anemometers_one_must_be_named(log_file: Write) -> None:
 
 
 def test_each_site_of_a_table_is_read_by_itself(log_file: Write) -> None:
-    both = zip(rows("A,{t:%Y-%m-%d %H:%M:%S},{v}").splitlines(), rows("B,{t:%Y-%m-%d %H:%M:%S},1.5").splitlines(), strict=True)
+    both = zip(
+        rows("A,{t:%Y-%m-%d %H:%M:%S},{v}").splitlines(), rows("B,{t:%Y-%m-%d %H:%M:%S},1.5").splitlines(), strict=True
+    )
     path = log_file("station,time,wind_speed_ms\n" + "\n".join(line for pair in both for line in pair) + "\n")
     options = WindOptions(zone="UTC")
     assert anemometers(path, options) == ("A", "B")
