@@ -60,8 +60,8 @@ UNITS: dict[str, Unit] = {
     "px": Unit(si="px", scale=1.0),
 }
 
-# Spellings seen in instrument exports, as `_key` reduces them, → the table's name. Beaufort is left out on purpose: it is
-# an interval scale of classes, not a unit.
+# Spellings seen in instrument exports, as `_key` reduces them, → the table's name. Beaufort is left out on purpose: it
+# is an interval scale of classes, not a unit.
 SPELLINGS: dict[str, str] = {
     "mps": "m/s", "ms-1": "m/s", "m.s-1": "m/s", "m/sec": "m/s", "meters/sec": "m/s", "meter/sec": "m/s",
     "meters/second": "m/s", "meter/second": "m/s", "metres/second": "m/s", "metre/second": "m/s", "metres/sec": "m/s",
@@ -70,7 +70,8 @@ SPELLINGS: dict[str, str] = {
     "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn", "nauticalmiles/hour": "kn",
     "mi/h": "mph", "mi/hr": "mph", "miles/hour": "mph", "mile/hour": "mph",
     "fps": "ft/s", "fpm": "ft/min", "ft/sec": "ft/s", "feet/second": "ft/s", "feet/minute": "ft/min",
-    "°": "deg", "ø": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg", "degtrue": "deg",
+    "°": "deg", "ø": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg",
+    "degtrue": "deg",
     "degreestrue": "deg", "°true": "deg", "degn": "deg", "degreesn": "deg", "°n": "deg", "arcdegrees": "deg",
     "compassdegrees": "deg", "angulardegrees": "deg", "grad": "deg", "grados": "deg", "radian": "rad", "radians": "rad",
     "°c": "degC", "c": "degC", "celsius": "degC", "celcius": "degC", "degc": "degC", "deg_c": "degC",

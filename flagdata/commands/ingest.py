@@ -76,7 +76,7 @@ from flagdata.errors import UsageError
 @click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
 @click.option(
     "--unit", metavar="UNIT",
-    help="Wind: of a speed whose heading states none (m/s, km/h, mph, kn). Meshes, markers: of positions, by default m.",
+    help="Wind: of a speed whose heading states none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
 )  # fmt: skip
 @click.option(
     "--wind", metavar="LABEL",

@@ -27,7 +27,8 @@ FOREIGN = {
 }
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
-    "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind", "date_order"
+    "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
+    "date_order",
 )  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture")
 

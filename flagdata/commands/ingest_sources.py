@@ -208,14 +208,14 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     found = anemometers(source, options.wind.wind)
     if not found:
         return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
-    results: list[IngestResult] = []
     stem = options.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
-    for label in found:
-        results.append(ingest_wind(
+    return tuple(
+        ingest_wind(
             lake, source, replace(options.wind, wind=replace(options.wind.wind, wind=label)),
             labels=replace(options.labels, name=f"{stem}:{label}"), branch=options.branch,
-        ))  # fmt: skip
-    return tuple(results)
+        )
+        for label in found
+    )  # fmt: skip
 
 
 def _meshes(lake: Lake, source: Path, kind: Guess, options: Given) -> IngestResult:

@@ -4,7 +4,7 @@ times of day whose date the user gives.
     epoch-us, epoch-ns          Unix time
     excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall clock
     datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
-    elapsed-s, -ms, -us, -min   since a start that the user gives; a counter of 32 bits in ms or us runs over and goes on
+    elapsed-s, -ms, -us, -min   since a start that the user gives; a counter of 32 bits in ms or us may run over
     %H:%M:%S and the like       of the day that the user gives, and those that follow
 """
 

@@ -1,4 +1,4 @@
-"""The format "delimited": text in columns, described by a sensor recipe, or by a heading that leaves nothing in doubt."""
+"""The format "delimited": text in columns, by a sensor recipe, or by a heading that leaves nothing in doubt."""
 
 from __future__ import annotations
 

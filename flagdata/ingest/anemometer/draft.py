@@ -1,7 +1,7 @@
 """A recipe for a table nobody has described yet, from its first lines: what was understood, and what was not.
 
-What the file states without doubt (a heading with units, dates that can be meant in one way only) makes a recipe that is
-taken without asking. What is in doubt is named with the one thing to say, and the recipe has a "?" there.
+What the file states without doubt (a heading with units, dates that can be meant in one way only) makes a recipe that
+is taken without asking. What is in doubt is named with the one thing to say, and the recipe has a "?" there.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         height = f" at {wind.height:g} m" if wind.height is not None else ""
         site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""
         parts = [
-            f"{channel} from column {_shown(layout, column.index)}{', ' + column.told if column.told else ', unit not stated'}"
+            f"{channel} from column {_shown(layout, column.index)}, {column.told or 'unit not stated'}"
             for channel, column in wind.columns.items()
         ]
         found.append(f"anemometer {wind.label!r}{height}{site}: {'; '.join(parts)}")

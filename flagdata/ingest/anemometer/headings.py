@@ -1,7 +1,7 @@
 """What the heading of a column says: the quantity, whether it is a mean, the unit, the height, and whose it is.
 
-A heading is cut into words at blanks, signs, capitals and digits ("Spd80mN" is spd, 80, m, N). Words of the quantity, of
-the statistic and of the unit are known in the languages of common loggers; what is left tells instruments apart.
+A heading is cut into words at blanks, signs, capitals and digits ("Spd80mN" is spd, 80, m, N). Words of the quantity,
+of the statistic and of the unit are known in the languages of common loggers; what is left tells instruments apart.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ _ABBREVIATED = {
 }  # fmt: skip
 _NO_AIR = frozenset(
     {
-        "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger", "battery",
-        "batt", "panel", "internal", "indoor", "case", "board", "cpu", "virtual", "surface", "water", "sea", "heat",
+        "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger",
+        "battery", "batt", "panel", "internal", "indoor", "case", "board", "cpu", "virtual", "surface", "water", "sea", "heat",
         "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
         "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
         "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in", "gyro", "mpu",
@@ -142,7 +142,7 @@ def understand(name: str, stated: str = "") -> Heading:
     bare, averaged = _INTERVAL.subn(" ", bare.replace("_", " "))
     words = _words(bare)
     if unit is None:
-        unit = next((_INSIDE[word] for word in words[1:] or words if word in _INSIDE and word not in ("deg",)), None)
+        unit = next((_INSIDE[word] for word in words[1:] or words if word in _INSIDE and word != "deg"), None)
         unit = "deg" if unit is None and "deg" in words[1:] else unit
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
     known = set(words)
@@ -150,8 +150,8 @@ def understand(name: str, stated: str = "") -> Heading:
     spread = bool(known & _SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
     quantity, sure, used = _quantity(words, compact, unit, rest)
     if quantity and known & _OTHER and not (quantity.endswith("direction") and known & {"course"}):
-        excluded = known & _OTHER - {"vertical"} if quantity in ("wind_z",) else known & _OTHER
-        if quantity not in ("air_temperature", "relative_humidity", "air_pressure", "sonic_temperature") and excluded:
+        excluded = known & _OTHER - {"vertical"} if quantity == "wind_z" else known & _OTHER
+        if "wind" in quantity and excluded:
             quantity, sure = "", False
     left = list(words)
     for word in used:

@@ -326,8 +326,11 @@ def _weather(found: _Found, index: int, channel: str) -> Column | None:
 
 def _check_gusts(found: _Found, winds: Sequence[Wind]) -> None:
     """Remark gusts whose ratio to the mean no wind has: their units differ."""
-    gusts = [i for i in found.values if found.headings[i].spread and found.headings[i].quantity == "wind_speed"
-             and set(words_of(found.layout.names[i])) & {"gust", "gusts", "max", "maximum", "windgust", "peak"}]  # fmt: skip
+    gusts = [
+        i for i in found.values
+        if found.headings[i].spread and found.headings[i].quantity == "wind_speed"
+        and set(words_of(found.layout.names[i])) & {"gust", "gusts", "max", "maximum", "windgust", "peak"}
+    ]  # fmt: skip
     for wind in winds:
         speed = wind.columns.get("wind_speed")
         mine = [i for i in gusts if speed is not None and found.key(i) == found.key(speed.index)]
@@ -339,6 +342,6 @@ def _check_gusts(found: _Found, winds: Sequence[Wind]) -> None:
         ratio = unitcheck.gust_factor(found.values[speed.index] * own, found.values[mine[0]] * other.scale)
         if ratio is not None:
             found.warnings.append(
-                f"gusts {found.layout.names[mine[0]]!r} are {ratio:.2g} times the wind {wind.label!r}, which no wind is: "
-                "one of the two is in another unit"
+                f"gusts {found.layout.names[mine[0]]!r} are {ratio:.2g} times the wind {wind.label!r}, which no wind "
+                "is: one of the two is in another unit"
             )

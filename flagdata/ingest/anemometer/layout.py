@@ -24,6 +24,13 @@ _STAMP = re.compile(
 _MONTH_STAMP = re.compile(r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*")
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
 _MISSING = frozenset({*MISSING, "nan.", "inf", "-inf", "m", "///", "////"})
+_UNITS_OF_OTHERS = frozenset(
+    {
+        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr", "mo",
+        "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
+    }
+)  # fmt: skip
+"""What stands in a line of units below times, counts and quantities that are not read."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
 
@@ -125,10 +132,7 @@ def cell_kind(cell: str) -> CellKind:
 def is_unit(text: str) -> bool:
     """Whether a cell of a line of units spells one; brackets are looked through."""
     bare = text.strip().strip("[]()<>").strip()
-    if bare.lower() in ("ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "v",
-                        "yr", "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none", "w/m^2"):  # fmt: skip
-        return True
-    return spelled(bare) is not None
+    return bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
 
 
 def _delimiter(lines: Sequence[str]) -> str | None:
@@ -244,9 +248,9 @@ def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] 
     if len(plain) == width and not _MARK.match(line):
         return plain, True
     bare = _MARK.sub("", line.strip())
-    for way in (lambda text: cut(text, delimiter), lambda text: re.split(r"\t+|\s{2,}", text.strip()),
-                lambda text: cut(text, ","), lambda text: cut(text, ";"), lambda text: cut(text, "\t"), str.split):  # fmt: skip
-        cells = _trimmed(way(bare), width)
+    ways = [cut(bare, delimiter), re.split(r"\t+|\s{2,}", bare), *(cut(bare, other) for other in (",", ";", "\t", " "))]
+    for way in ways:
+        cells = _trimmed(way, width)
         if len(cells) == width:
             return cells, False
         # R writes the heading of its row names not at all.

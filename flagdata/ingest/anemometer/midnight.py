@@ -1,4 +1,4 @@
-"""Midnight that a spreadsheet or R wrote as a bare date: "2026-05-02" between "2026-05-01 23:50:00" and "… 00:10:00"."""
+"""Midnight written as a bare date, as R and spreadsheets do: "2026-05-02" after "2026-05-01 23:50:00"."""
 
 from __future__ import annotations
 

@@ -17,7 +17,6 @@ from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.stamps import Stamps
-from flagdata.timebase import NANOSECONDS
 
 _SHARE = 0.9
 """Share of rows that must fit for a column to be what it seems."""
@@ -311,5 +310,5 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-min", frozenset({"minutes", "mins", "minute"})),
     ("elapsed-s", frozenset({"s", "sec", "secs", "second", "seconds"})),
 )
-_SECONDS = {form: scale / NANOSECONDS for form, scale in
-            (("elapsed-ms", 1_000_000), ("elapsed-us", 1_000), ("elapsed-min", 60 * NANOSECONDS), ("elapsed-s", NANOSECONDS))}  # fmt: skip
+_SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0}
+"""Seconds a count."""

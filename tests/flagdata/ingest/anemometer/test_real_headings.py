@@ -1,4 +1,4 @@
-"""Tables in the styles of real loggers, made here: read right without a recipe, or refused with the one thing to say."""
+"""Tables in the styles of real loggers, made here: right without a recipe, or refused with the one thing to say."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def rows(form: str, *, step: float = 1.0, start: dt.datetime = START, count: int
                 s=i * step,
                 ms=round(1000 * i * step) + 5312,
                 epoch=t.timestamp(),
-            )  # fmt: skip
+            )
         )
     return "\n".join(lines) + "\n"
 
