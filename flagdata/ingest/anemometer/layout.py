@@ -26,8 +26,8 @@ _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
 _MISSING = frozenset({*MISSING, "nan.", "inf", "-inf", "m", "///", "////"})
 _UNITS_OF_OTHERS = frozenset(
     {
-        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr", "mo",
-        "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
+        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
+        "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
     }
 )  # fmt: skip
 """What stands in a line of units below times, counts and quantities that are not read."""
