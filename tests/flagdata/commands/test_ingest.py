@@ -150,7 +150,7 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
         (["{log}", "--crop", "auto"], "--crop means nothing for an anemometer log"),
         (["{log}", "--true-fps", "1000"], "--true-fps means nothing"),
         (["{log}", "--archive", "h264"], "--archive means nothing"),
-        (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start means nothing"),
+        (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start is not used"),
         (["{video}", "--date-order", "dmy"], "--date-order means nothing for a camera file"),
         (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
         (["{video}", "{log}", "--unit", "mm"], "'mm' is no unit of speed"),
