@@ -314,7 +314,7 @@ def _component(words: list[str], si: str | None) -> str | None:
         return None
     if head[0] == "w" and head[1:2] and head[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
         return None
-    if head[0] in ("x", "y", "z", "vx", "vy", "vz") and not (set(core) & {"wind", "sonic", "csat"} or si == "m/s"):
+    if head[0] in ("x", "y", "z", "vx", "vy", "vz") and not set(core) & {"wind", "sonic", "csat"}:
         return None
     if "star" in head or (len(head) > 1 and head[1] in _COMPONENTS):
         return None

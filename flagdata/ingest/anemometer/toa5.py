@@ -173,7 +173,9 @@ def _by_heading(names: list[str], units: list[str], known: Mapping[str, ChannelL
             continue
         if heading.unit is not None and fits(heading.channel, heading.unit):
             found[heading.channel] = ChannelLayout(column=name, unit=heading.unit)
-    return found
+    if {"wind_x", "wind_y"} <= set(found):
+        return found
+    return {channel: layout for channel, layout in found.items() if channel not in ("wind_x", "wind_y", "wind_z")}
 
 
 def _averaging(processing: str, time: Instants) -> float | None:

@@ -16,6 +16,11 @@ ROWS = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f},{3 + k % 5 / 10:.1f}" f
 
 
 @pytest.fixture
+def lake(tmp_path: Path) -> Lake:
+    return Lake.create(tmp_path / "lake")
+
+
+@pytest.fixture
 def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
     """Runs `flagdata ingest` on the lake: exit code, stdout, stderr."""
 

@@ -109,7 +109,7 @@ REFUSED = [
         id="other-delimiter",
     ),
     pytest.param(
-        {"content": csv(ROW, header="time,speed"), "error": InputError, "says": "known format"}, id="column-missing"
+        {"content": csv(ROW, header="time,speed"), "error": InputError, "says": "--unit"}, id="column-missing"
     ),
     pytest.param(
         {

@@ -41,7 +41,7 @@ def test_a_log_is_told_by_its_first_lines(log_file: Write, content: str, format_
     [
         (b"\x00\x00\x00\x18ftypmp42" + bytes(20), "video", "camera"),
         (b"RIFF\x00\x00\x00\x00AVI LIST", "video", "camera"),
-        (b"\x1f\x8b\x08" + bytes(20), "gzip-compressed", "other"),
+        (b"\x1f\x8b\x08" + bytes(20), "gzip-compressed and damaged", "other"),
         (b"\x89MCAP0\r\n", "an MCAP record", "record"),
         (b"The wind blew.\n", "unknown", "other"),
         (bytes(range(256)) * 20, "unknown", "other"),
