@@ -152,9 +152,13 @@ class FrameStream(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class WindLog:
-    """What an anemometer reader returns: the series, what it found, and why it thinks the file is of this format."""
+    """What an anemometer reader returns: the series, what it found, and why it thinks the file is of this format.
+
+    `drafted` is the recipe (TOML) that was drafted from the file's own heading, "" where it was read by another.
+    """
 
     series: WindSeries
     format: str
     findings: tuple[Finding, ...] = ()
     reasons: tuple[str, ...] = field(default=())
+    drafted: str = ""

@@ -60,21 +60,29 @@ UNITS: dict[str, Unit] = {
     "px": Unit(si="px", scale=1.0),
 }
 
-# Spellings seen in instrument exports, lower-cased and without blanks, → the table's name. Beaufort is left out on
-# purpose: it is an interval scale of classes, not a unit.
+# Spellings seen in instrument exports, as `_key` reduces them, → the table's name. Beaufort is left out on purpose: it
+# is an interval scale of classes, not a unit.
 SPELLINGS: dict[str, str] = {
-    "mps": "m/s", "ms-1": "m/s", "m.s-1": "m/s", "meters/sec": "m/s", "meter/sec": "m/s",
-    "meters/second": "m/s", "meter/second": "m/s",
-    "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h",
-    "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn",
-    "mi/h": "mph", "miles/hour": "mph",
-    "fps": "ft/s", "fpm": "ft/min",
-    "°": "deg", "º": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg",
-    "°c": "degC", "ºc": "degC", "c": "degC", "celsius": "degC", "degc": "degC", "deg_c": "degC",
-    "°f": "degF", "ºf": "degF", "f": "degF", "fahrenheit": "degF", "degf": "degF", "deg_f": "degF",
-    "k": "K", "kelvin": "K",
-    "mb": "hPa", "mbar": "hPa", "hpa": "hPa", "kpa": "kPa", "pa": "Pa", "inhg": "inHg",
-    "percent": "%", "%rh": "%", "hz": "Hz",
+    "mps": "m/s", "ms-1": "m/s", "m.s-1": "m/s", "m/sec": "m/s", "meters/sec": "m/s", "meter/sec": "m/s",
+    "meters/second": "m/s", "meter/second": "m/s", "metres/second": "m/s", "metre/second": "m/s", "metres/sec": "m/s",
+    "m+1s-1": "m/s", "meterspersecond": "m/s",
+    "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h", "kmh-1": "km/h", "km.h-1": "km/h",
+    "kilometers/hour": "km/h", "kilometres/hour": "km/h",
+    "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn", "nauticalmiles/hour": "kn",
+    "mi/h": "mph", "mi/hr": "mph", "miles/hour": "mph", "mile/hour": "mph", "milesperhour": "mph",
+    "fps": "ft/s", "fpm": "ft/min", "ft/sec": "ft/s", "feet/second": "ft/s", "feet/minute": "ft/min",
+    "°": "deg", "ø": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg",
+    "degtrue": "deg", "deg_from_north": "deg", "degreesfromnorth": "deg",
+    "degreestrue": "deg", "°true": "deg", "degn": "deg", "degreesn": "deg", "°n": "deg", "arcdegrees": "deg",
+    "compassdegrees": "deg", "angulardegrees": "deg", "grad": "deg", "grados": "deg", "radian": "rad", "radians": "rad",
+    "°c": "degC", "℃": "degC", "c": "degC", "celsius": "degC", "celcius": "degC", "degc": "degC", "deg_c": "degC",
+    "degreesc": "degC", "degreec": "degC", "degreescelsius": "degC", "degreecelsius": "degC", "degcelsius": "degC",
+    "°f": "degF", "℉": "degF", "f": "degF", "fahrenheit": "degF", "degf": "degF", "deg_f": "degF",
+    "degreesf": "degF", "degreesfahrenheit": "degF",
+    "k": "K", "kelvin": "K", "degk": "K", "°k": "K",
+    "mb": "hPa", "mbar": "hPa", "millib": "hPa", "millibar": "hPa", "millibars": "hPa", "hpa": "hPa", "kpa": "kPa",
+    "hectopascal": "hPa", "hectopascals": "hPa", "pa": "Pa", "pascal": "Pa", "pascals": "Pa", "inhg": "inHg",
+    "percent": "%", "%rh": "%", "pct": "%", "%r.h.": "%", "rh%": "%", "hz": "Hz",
 }  # fmt: skip
 
 
@@ -84,12 +92,33 @@ def unit(text: str, *, where: str | None = None) -> Unit:
     Raises:
         UnknownNameError: with the nearest known spelling.
     """
+    return UNITS[canonical(text, where=where)]
+
+
+def canonical(text: str, *, where: str | None = None) -> str:
+    """The table's own name of the unit that a file spells as `text`.
+
+    Raises:
+        UnknownNameError: with the nearest known spelling.
+    """
+    name = spelled(text)
+    if name is None:
+        raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
+    return name
+
+
+def spelled(text: str) -> str | None:
+    """The table's own name of the unit that a file spells as `text`; `None` where it spells none."""
     stripped = text.strip()
     if stripped in UNITS:
-        return UNITS[stripped]
-    key = stripped.lower().replace(" ", "")
-    if key in UNITS:
-        return UNITS[key]
-    if key in SPELLINGS:
-        return UNITS[SPELLINGS[key]]
-    raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
+        return stripped
+    key = _key(stripped)
+    return key if key in UNITS else SPELLINGS.get(key)
+
+
+def _key(text: str) -> str:
+    """A spelling in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
+    key = text.lower().replace("º", "°").replace("⁻", "-").replace("−", "-").replace("¹", "1")
+    key = key.replace("^", "").replace("·", ".").replace("-per-", "/").replace(" per ", "/").replace("(-1)", "-1")
+    key = "".join(key.split())
+    return "°" + key[1:] if key[:1] == "*" and len(key) > 1 else key

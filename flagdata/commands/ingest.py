@@ -12,6 +12,7 @@ from flagdata.commands.ingest_options import (
     Given,
     camera_options,
     labels,
+    length_unit,
     marker_options,
     mesh_options,
     option,
@@ -36,7 +37,10 @@ from flagdata.errors import UsageError
 @click.option("--name", help="What people call the artifact; the file's name by default.")
 @click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
-@click.option("--start", metavar="TIME", help="Camera: instant of the first frame, ISO 8601, or unknown.")
+@click.option(
+    "--start", metavar="TIME",
+    help="Camera: instant of the first frame, ISO 8601. Wind: of the first row, where stamps count from a start.",
+)  # fmt: skip
 @click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(
@@ -74,7 +78,14 @@ from flagdata.errors import UsageError
 )  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
-@click.option("--unit", default="m", show_default=True, metavar="UNIT", help="Meshes, markers: of positions in space.")
+@click.option(
+    "--unit", metavar="UNIT",
+    help="Wind: of a speed whose heading states none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
+)  # fmt: skip
+@click.option(
+    "--wind", metavar="LABEL",
+    help="Wind: the one anemometer to read of a table that holds several, or the column of its speed.",
+)  # fmt: skip
 @json_option
 @lake_option
 @click.pass_context
@@ -104,7 +115,8 @@ def ingest(
     clock: str | None,
     zero_offset: str | None,
     encoding: str | None,
-    unit: str,
+    unit: str | None,
+    wind: str | None,
     as_json: bool,
     lake_path: str,
 ) -> None:
@@ -118,6 +130,7 @@ def ingest(
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
       flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png
       flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
+      flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
       flagdata ingest arcsim-output --name reference-4ms
     """
     from flagdata.timebase import names_zone
@@ -138,14 +151,15 @@ def ingest(
         wind=wind_options(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
-            clock=clock, zero_offset=zero_offset, encoding=encoding,
+            clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind,
         ),
-        meshes=mesh_options(rate=rate if "rate" in given else None, length=unit),
-        markers=marker_options(rate=rate if "rate" in given else None, length=unit),
+        meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
+        markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
         labels=labels(name, session),
         branch=branch,
         crop_picture=crop_picture,
         zoned_start=start is not None and names_zone(start),
+        unit=unit,
     )  # fmt: skip
     if sniff:
         for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):

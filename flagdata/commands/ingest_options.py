@@ -15,18 +15,23 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import CameraIngest, Labels, WindIngest
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
-CAMERA_ONLY = ("start", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
-WIND_ONLY = ("sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding")
+CAMERA_ONLY = ("true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
+WIND_ONLY = (
+    "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
+)  # fmt: skip
 LENGTHS = ("unit",)
-"""Of meshes and markers."""
+"""Of meshes and markers, and of the wind's speed."""
 FOREIGN = {
     "camera": ("a camera file", (*WIND_ONLY, *LENGTHS)),
-    "anemometer": ("an anemometer log", (*CAMERA_ONLY, *LENGTHS, "rate")),
-    "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
-    "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone")),
+    "anemometer": ("an anemometer log", (*CAMERA_ONLY, "rate")),
+    "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
+    "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
 }
 """What each kind of source is called, and the options that mean nothing for it."""
-SNIFF = ("sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture")
+SNIFF = (
+    "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
+    "date_order",
+)  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture")
 
 
@@ -42,6 +47,7 @@ class Given:
     branch: str
     crop_picture: Path | None
     zoned_start: bool
+    unit: str | None = None
 
 
 def option(parameter: str) -> str:
@@ -104,18 +110,27 @@ def wind_options(
     clock: Any,
     zero_offset: str | None,
     encoding: str | None,
+    unit: str | None,
+    start: str | None,
+    wind: str | None,
 ) -> WindIngest:
-    """Those of an anemometer.
+    """Those of an anemometer; `unit` is heeded where it is one of speed, since meshes have units, too.
 
     Raises:
-        UsageError: a date or zero offset that cannot be read.
+        UsageError: a date, start or zero offset that cannot be read.
     """
     import datetime as dt
 
+    from flagdata import timebase
     from flagdata.ingest.anemometer import WindOptions
     from flagdata.ingest.store import WindIngest
-    from flagdata.units import unit
+    from flagdata.units import unit as unit_of
 
+    try:
+        place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+        instant = timebase.parse(start, default=place, where="--start") if start is not None else None
+    except TimeError as error:
+        raise UsageError(error.what, where=error.where, fix=error.fix) from None
     try:
         day = dt.date.fromisoformat(date) if date is not None else None
     except ValueError:
@@ -133,9 +148,12 @@ def wind_options(
             date_order=date_order,
             platform=platform,
             talker=talker,
-            azimuth=float(unit("deg").to_si(azimuth)) if azimuth is not None else None,
+            azimuth=float(unit_of("deg").to_si(azimuth)) if azimuth is not None else None,
             clock=clock,
             zero_offset=offset,
+            unit=unit if unit is not None and unit_of(unit, where="--unit").si == "m/s" else None,
+            start=instant,
+            wind=wind,
         )
     )
 
@@ -172,6 +190,26 @@ def labels(name: str | None, session: str | None) -> Labels:
     return Labels(name=name, session=session)
 
 
+def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
+    """Refuse a unit that is one of no source's: of speed for a log, of length for meshes and markers."""
+    from flagdata.units import unit
+
+    wanted = {"anemometer": "m/s", "meshes": "m", "markers": "m"}
+    needed = {wanted[kind] for kind in kinds if kind in wanted}
+    if name is None or not needed or unit(name, where="--unit").si in needed:
+        return
+    if "m" in needed:
+        raise UsageError(f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
+    raise UsageError(f"{name!r} is no unit of speed", where="--unit", fix="give m/s, km/h, mph, kn or ft/s")
+
+
+def length_unit(name: str | None) -> str:
+    """The unit of positions: metres where none is given, or one of speed for a log beside."""
+    from flagdata.units import unit
+
+    return "m" if name is None or unit(name, where="--unit").si == "m/s" else name
+
+
 def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozenset[str]) -> None:
     """Refuse options that mean nothing for any source, or that time or name more than one, before anything is written.
 
@@ -182,6 +220,11 @@ def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozens
     if options.zoned_start:
         what, parameters = foreign["camera"]
         foreign["camera"] = (f"{what} whose --start names its zone", (*parameters, "zone"))
+    if "camera" in kinds:
+        # Of a camera and a log together, the start is the camera's.
+        what, parameters = foreign["anemometer"]
+        foreign["anemometer"] = (what, (*parameters, "start"))
+    _check_unit(kinds, options.unit)
     for parameter in sorted(given):
         strange = [kind in foreign and parameter in foreign[kind][1] for kind in kinds]
         if all(strange):

@@ -96,8 +96,15 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
             click.echo(f"    to do: {guess['fix']}")
+        for note in guess["notes"]:
+            click.echo(f"    not taken or odd: {note}")
+        if len(guess["winds"]) > 1:
+            click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact: {', '.join(guess['winds'])}")
+        for doubt in guess["doubts"]:
+            click.echo(f"    to say: {doubt}")
         if guess["draft"]:
-            click.echo("    a draft of a recipe, to complete and name by --recipe FILE.toml:")
+            state = "complete it where it says ?" if guess["doubts"] else "nothing is missing"
+            click.echo(f"    the recipe ({state}; name it by --recipe FILE.toml to change anything):")
             click.echo("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
     if "problem" in entry:
         click.echo(f"  {entry['problem']['what']}: {entry['problem']['fix']}")

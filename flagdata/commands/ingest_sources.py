@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
@@ -45,6 +46,8 @@ def ingest_sources(
     recipe = options.wind.wind.recipe
     kinds = _told(sources, lambda source: classify(source, format_name=format_name, recipe=recipe))
     check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
+    if any(not isinstance(kind, FlagdataError) and kind.kind == "camera" for kind in kinds):
+        options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None)))
     results, failures = _each(
         sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_results, as_json=as_json
     )
@@ -68,7 +71,7 @@ def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[s
     """
     from flagdata.ingest.classify import guesses
 
-    ranked = _told(sources, guesses)
+    ranked = _told(sources, lambda source: _completed(source, guesses(source), options))
     check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
     entries, failures = _each(
         sources, ranked, lambda source, found: _look(source, found, options), print_sniffed, as_json=as_json
@@ -76,6 +79,17 @@ def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[s
     if as_json:
         document("sniff", {"sources": entries, "failures": _failures(failures)})
     _exit_on(failures, sources)
+
+
+def _completed(source: Path, ranked: tuple[Guess, ...], options: Given) -> tuple[Guess, ...]:
+    """The guesses, a draft among them completed by what was said beside --sniff."""
+    from flagdata.ingest.anemometer import completed
+
+    wind = options.wind.wind
+    said = wind.unit is not None or wind.wind is not None or wind.date_order is not None
+    if not said or ranked[0].format != "delimited" or ranked[0].recipe is not None:
+        return ranked
+    return (completed(source, wind) or ranked[0], *ranked[1:])
 
 
 def _look(source: Path, ranked: Sequence[Guess], options: Given) -> dict[str, Any]:
@@ -107,6 +121,9 @@ def _guess(guess: Guess) -> dict[str, Any]:
         "reasons": list(guess.reasons),
         "fix": guess.fix,
         "draft": guess.draft,
+        "notes": list(guess.notes),
+        "doubts": list(guess.doubts),
+        "winds": list(guess.winds),
     }
 
 
@@ -165,7 +182,7 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
 def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestResult, ...]:
     """Artifacts of a source: of a table of markers one a recording, of any other one."""
     from flagdata.ingest.markers.store import ingest_markers
-    from flagdata.ingest.store import ingest_camera, ingest_wind
+    from flagdata.ingest.store import ingest_camera
 
     if kind.kind == "markers":
         return ingest_markers(
@@ -174,13 +191,31 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     if kind.kind == "meshes":
         return (_meshes(lake, source, kind, options),)
     if kind.kind != "camera":
-        return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
+        return _winds(lake, source, options)
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
         result = ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
             progress=advance, crop_picture=picture.write if options.crop_picture else None,
         )  # fmt: skip
     return (result,)
+
+
+def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]:
+    """The artifact of a log; of a table that holds several anemometers one of each, named by its label."""
+    from flagdata.ingest.anemometer import anemometers
+    from flagdata.ingest.store import ingest_wind
+
+    found = anemometers(source, options.wind.wind)
+    if not found:
+        return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
+    stem = options.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
+    return tuple(
+        ingest_wind(
+            lake, source, replace(options.wind, wind=replace(options.wind.wind, wind=label)),
+            labels=replace(options.labels, name=f"{stem}:{label}"), branch=options.branch,
+        )
+        for label in found
+    )  # fmt: skip
 
 
 def _meshes(lake: Lake, source: Path, kind: Guess, options: Given) -> IngestResult:

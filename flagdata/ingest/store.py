@@ -212,6 +212,9 @@ def ingest_wind(
                 found = SENSORS.find(options.wind.recipe)
                 name = f"{found.name}.recipe.toml"
                 record.attach(name, found.data, media_type="application/toml", log_time=int(time[0]))
+            elif log.drafted:
+                drafted = log.drafted.encode()
+                record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
         source.check_unchanged()
         report = _wind_report(log, findings, named=options.wind.recipe)
         if paired is not None:

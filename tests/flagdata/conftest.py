@@ -47,8 +47,8 @@ def video(tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., P
 
 @pytest.fixture(scope="session")
 def wind_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """120 s at 1 Hz in the columns of recipe generic-csv, stamps at +02:00, one value missing in row 31."""
-    rows = ["time,wind_speed,wind_direction"]
+    """120 s at 1 Hz, units in the heading, stamps at +02:00, one value missing in row 31."""
+    rows = ["time,wind_speed (m/s),wind_direction (deg)"]
     for k in range(120):
         speed = "" if k == 30 else f"{5 + np.sin(k / 7):.2f}"
         rows.append(f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,{speed},{200 + k % 9}")

@@ -3,7 +3,8 @@
 from flagdata.ingest.anemometer.averaging import average
 from flagdata.ingest.anemometer.log import read_log
 from flagdata.ingest.anemometer.options import Limits, WindOptions
+from flagdata.ingest.anemometer.several import anemometers, completed
 from flagdata.ingest.anemometer.sniff import sniff
 from flagdata.ingest.anemometer.sniffing import Guess
 
-__all__ = ["Guess", "Limits", "WindOptions", "average", "read_log", "sniff"]
+__all__ = ["Guess", "Limits", "WindOptions", "anemometers", "average", "completed", "read_log", "sniff"]

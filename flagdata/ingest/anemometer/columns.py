@@ -47,6 +47,11 @@ class Columns:
         found = pc.is_in(pc.utf8_trim_whitespace(self.cells[index]), pa.array(list(values), pa.string()))
         return found.to_numpy(zero_copy_only=False).astype(bool)
 
+    def where(self, wanted: NDArray[np.bool_]) -> Columns:
+        """The rows that are wanted (n,)."""
+        mask = pa.array(wanted)
+        return Columns(cells=[cells.filter(mask) for cells in self.cells])
+
     def with_rows(self, rows: Sequence[Sequence[str]], order: NDArray[np.int64]) -> Columns:
         """These rows and then `rows`, all in the `order` of indices given (n,)."""
         more = [pa.array([row[i] for row in rows], pa.string()) for i in range(len(self.cells))]
@@ -64,14 +69,14 @@ class Shape:
     Attributes:
         delimiter: one byte.
         cells: in a line.
-        open_end: whether the last of them is empty: the line ends with a delimiter.
+        empty: how many of them are empty at the end of the line, beyond those that the header names.
         comment: first byte of lines that may be comments, `None` where there are none.
         ascii: whether a line with a byte beyond ASCII is irregular.
     """
 
     delimiter: int
     cells: int
-    open_end: bool
+    empty: int
     comment: int | None
     ascii: bool
 
@@ -131,11 +136,12 @@ def shape_of(line: bytes, *, delimiter: str, named: int | None, comment: str | N
     """The shape of a file of which `line` is a row and whose header names `named` cells, if it has one."""
     mark = ord(delimiter)
     found = line.count(mark) + 1
-    open_end = named is not None and found == named + 1 and line.endswith(delimiter.encode())
+    beyond = found - named if named is not None else 0
+    empty = beyond if beyond > 0 and line.endswith(beyond * delimiter.encode()) else 0
     return Shape(
         delimiter=mark,
-        cells=found if named is None or open_end else named,
-        open_end=open_end,
+        cells=found if named is None or empty else named,
+        empty=empty,
         comment=comment.encode()[0] if comment else None,
         ascii=ascii_only,
     )
@@ -159,8 +165,8 @@ def lines_of(data: bytes, shape: Shape) -> Lines | None:
     on = np.searchsorted(feeds, marks)
     regular = np.bincount(on, minlength=len(feeds)) == shape.cells - 1
     regular &= ~_with(data, byte, feeds, start, shape)
-    if shape.open_end:
-        regular &= (end > start) & (byte[np.maximum(end - 1, 0)] == shape.delimiter)
+    for back in range(1, shape.empty + 1):
+        regular &= (end - back >= start) & (byte[np.maximum(end - back, 0)] == shape.delimiter)
     if shape.comment is not None and len(byte):
         regular &= byte[np.minimum(start, len(byte) - 1)] != shape.comment
     quotes = np.flatnonzero(byte == _QUOTE)

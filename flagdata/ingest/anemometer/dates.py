@@ -42,8 +42,9 @@ class Decision:
 def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: str) -> Decision:
     """The order in which dates at the start of `texts` are written.
 
-    Evidence: a number above 12 is a day; where there is none, the order in which the log moves on by less than two
-    days between rows while the other jumps.
+    Evidence: a number above 12 is a day; where there is none, points between the numbers (every locale of the Unicode
+    CLDR that writes them so puts the day first), or the order in which the log moves on by less than two days between
+    rows while the other jumps.
 
     Args:
         told: the user's word; refused when a date contradicts it.
@@ -81,6 +82,9 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
         return Decision(order=order, separator=separator, long_year=long_year, reason=reason)
     if told is not None:
         return Decision(order=told, separator=separator, long_year=long_year, reason=f"the date order {told} was given")
+    if separator == ".":
+        reason = "dates whose numbers are divided by points are written with the day first"
+        return Decision(order="dmy", separator=separator, long_year=long_year, reason=reason)
     candidates: tuple[Literal["dmy", "mdy"], ...] = ("dmy", "mdy")
     smooth: list[Literal["dmy", "mdy"]] = [
         order for order in candidates if _moves_on(dated, order, separator, long_year)

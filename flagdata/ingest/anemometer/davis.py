@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.headings import Column, Export, assign, cut, read_export, stamp_format
+from flagdata.ingest.anemometer.exports import Column, Export, assign, cut, read_export, stamp_format
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, TimeLayout

@@ -1,71 +1,146 @@
-"""The format "delimited": text in columns, described by a sensor recipe."""
+"""The format "delimited": text in columns, by a sensor recipe, or by a heading that leaves nothing in doubt."""
 
 from __future__ import annotations
 
-from flagdata.errors import UsageError
+from dataclasses import replace
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.draft import draft
+from flagdata.ingest.anemometer.draft import Draft, draft
+from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.layout import cut
 from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.rows import RowReader
-from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
-from flagdata.ingest.anemometer.table import read_table
+from flagdata.ingest.anemometer.table import Given, read_table
+
+_DRAFTED = 0.55
+"""Score of a draft without doubts: it is taken, but any format that knows the file goes before it."""
+_DOUBTED = 0.3
+_ASKED = frozenset({"unit", "date_order", "wind"})
+"""Options that complete a draft; a recipe says these things itself."""
 
 
 class Delimited:
-    """Format "delimited": a recipe of catalogs/sensors, or the user's own TOML file."""
+    """Format "delimited": a recipe of catalogs/sensors, the user's own TOML file, or a draft without doubts."""
 
     name = "delimited"
-    about = "delimited text described by a sensor recipe"
-    uses = frozenset({"zone", "azimuth", "platform"})
+    about = "delimited text described by a sensor recipe, or by its own heading"
+    uses = frozenset({"zone", "azimuth", "platform", "start", "date", *_ASKED})
 
     def recognise(self, head: Head) -> Guess | None:
         """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
         best: Guess | None = None
         for name in recipes.SENSORS.names():
-            guess = _match(recipes.load(name), name, head)
-            if guess and (best is None or guess.score > best.score):
-                best = guess
+            found = _match(recipes.load(name), name, head)
+            if found and (best is None or found.score > best.score):
+                best = found
         if best is not None:
             return best
         proposal = draft(head.lines)
-        if proposal is None:
-            return None
-        return Guess(
-            format="delimited",
-            score=0.3,
-            reasons=("no recipe of the catalog names these columns", *proposal.reasons),
-            fix="save the draft that `flagdata ingest --sniff` prints, complete it, and name it: "
-            "--recipe FILE.toml of ingest, --sensor FILE.toml of close-loop",
-            draft=proposal.toml,
-        )
+        return None if proposal is None else guess(proposal)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Read a file by the recipe in `options`."""
+        """Read a file by the recipe in `options`, or by its draft."""
+        where = str(source.path)
         if options.recipe is None:
-            raise UsageError("the format delimited needs a recipe", where=str(source.path), fix="name one by --recipe")
+            return self._by_draft(source, options, where)
+        strange = sorted(name for name in _ASKED if getattr(options, name) is not None)
+        if strange:
+            raise UsageError(
+                f"the recipe says for itself: {', '.join(strange)}", where=where, fix="leave it out, or edit the recipe"
+            )
         recipe = recipes.load(options.recipe)
         if recipe.file.host:
             raise UsageError(
-                f"the recipe {recipe.name} is for host-stamped lines",
-                where=str(source.path),
-                fix="use --as host-stamped",
+                f"the recipe {recipe.name} is for host-stamped lines", where=where, fix="use --as host-stamped"
             )
-        rows = RowReader(source, recipe.file)
-        where = str(source.path)
-        columns = platform.position_columns(rows.header or ())
-        table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns or ())
-        reading = with_horizontal(table.reading, options.azimuth, where=where)
-        positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns or (), strict=False)}
-        return platform.settle(reading, options.platform, positions=positions, where=where)
+        return _read(source, recipe, options, where)
+
+    def _by_draft(self, source: TextFile, options: WindOptions, where: str) -> Reading:
+        proposal = drafted(source, options)
+        if proposal is None:
+            raise UsageError("the format delimited needs a recipe", where=where, fix="name one by --recipe")
+        if proposal.doubts:
+            what = "; ".join(doubt.what for doubt in proposal.doubts)
+            raise InputError(what, where=where, fix="; ".join(doubt.fix for doubt in proposal.doubts))
+        if len(proposal.winds) > 1 and options.wind is None:
+            names = ", ".join(proposal.winds)
+            raise InputError(
+                f"the file holds {len(proposal.winds)} anemometers: {names}", where=where,
+                fix=f"name the one to read: --wind {_argument(proposal.winds[0])}; ingest takes each by itself",
+            )  # fmt: skip
+        reading = _read(source, recipes.parse(proposal.toml, where=f"the draft for {where}"), options, where)
+        found = [
+            Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
+            for text in proposal.warnings
+        ]
+        if proposal.remarks:
+            text = "; ".join(proposal.remarks)
+            found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, what=text))
+        return replace(reading, findings=(*reading.findings, *found), drafted=proposal.toml)
+
+
+def guess(proposal: Draft) -> Guess:
+    """What `sniff` says of a draft."""
+    return Guess(
+        format="delimited", score=_DOUBTED if proposal.doubts else _DRAFTED,
+        reasons=proposal.understood, notes=(*proposal.warnings, *proposal.remarks),
+        doubts=tuple(f"{doubt.what}: {doubt.fix}" for doubt in proposal.doubts), winds=proposal.winds,
+        fix="; ".join(doubt.fix for doubt in proposal.doubts) or None, draft=proposal.toml or None,
+    )  # fmt: skip
+
+
+def drafted(source: TextFile, options: WindOptions) -> Draft | None:
+    """The draft of a file's recipe, completed by what the user says."""
+    lines = tuple(source.head(HEAD_LINES))
+    return draft(lines, unit=options.unit, order=options.date_order, wind=options.wind)
+
+
+def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:
+    """Labels of all anemometers of a file whose column tells sites apart, those beyond its first lines included."""
+    if proposal.site is None:
+        return proposal.winds
+    rests = {label.partition(":")[2] for label in proposal.winds}
+    known = {label.partition(":")[0] for label in proposal.winds}
+    for first, lines in source.blocks():
+        for line in lines[HEAD_LINES:] if first == 1 else lines:
+            cells = cut(line, proposal.delimiter)
+            if len(cells) > proposal.site and cells[proposal.site]:
+                known.add(cells[proposal.site])
+    return tuple(f"{site}:{rest}" if rest else site for site in sorted(known) for rest in sorted(rests))
+
+
+def _argument(text: str) -> str:
+    return text if text.isalnum() else f"'{text}'"
+
+
+def _read(source: TextFile, recipe: Recipe, options: WindOptions, where: str) -> Reading:
+    rows = RowReader(source, recipe.file)
+    given = Given(start=options.start, date=options.date)
+    columns = platform.position_columns(rows.header or ())
+    table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns or (), given=given)
+    reading = with_horizontal(table.reading, options.azimuth, where=where)
+    positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns or (), strict=False)}
+    return platform.settle(reading, options.platform, positions=positions, where=where)
+
+
+def _states_its_unit(recipe: Recipe) -> bool:
+    """Whether the headings that a recipe expects state the unit of the wind."""
+    winds = [layout.column for name, layout in recipe.channels.items() if name in WIND_CHANNELS]
+    return all(isinstance(column, str) and understand(column).unit is not None for column in winds)
 
 
 def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
     layout = recipe.file
+    if not _states_its_unit(recipe):
+        return None
     if layout.host or layout.header == 0 or len(head.lines) <= layout.preamble:
         return None
     line = head.lines[layout.preamble]

@@ -1,197 +1,240 @@
-"""A first draft of a sensor recipe for a table nobody has described yet, from its first lines.
+"""A recipe for a table nobody has described yet, from its first lines: what was understood, and what was not.
 
-A draft is a proposal to a person: units and zones that the file does not state are left for them to fill in, and a
-guess that carries one is never taken without asking.
+What the file states without doubt (a heading with units, dates that can be meant in one way only) makes a recipe that
+is taken without asking. What is in doubt is named with the one thing to say, and the recipe has a "?" there.
 """
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal
 
-from flagdata.errors import TimeError, UnknownNameError
-from flagdata.ingest.anemometer.cells import Cell, numbers
-from flagdata.ingest.anemometer.dates import decide
+import numpy as np
+
+from flagdata.ingest.anemometer import counted, unitcheck
+from flagdata.ingest.anemometer.cells import numbers
+from flagdata.ingest.anemometer.headings import interest
+from flagdata.ingest.anemometer.instruments import Wind, find_winds, named_wind, sites
+from flagdata.ingest.anemometer.layout import Layout, lay_out
 from flagdata.ingest.anemometer.recipe import DELIMITERS
-from flagdata.ingest.anemometer.stamps import parse
-from flagdata.schema import CHANNELS
-from flagdata.units import unit
+from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
 
-ROWS = 50
-"""Rows looked at."""
-_SHARE = 0.9
-"""Share of rows that must fit for a column to be what it seems."""
-_TIMES = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
-# What header cells say, in the languages of common loggers, most telling first.
-_HEADINGS: tuple[tuple[str, str], ...] = (
-    (r"dir|richtung|heading|bearing", "wind_direction"),
-    (r"gust|max|böe|min\b|std|chill", ""),
-    (r"wind.?(speed|spd|vel|geschw)|windspeed|geschwindigkeit|^ws|speed|velocity|vitesse", "wind_speed"),
-    (r"temp|°c|°f", "air_temperature"),
-    (r"hum|feuchte|^rh", "relative_humidity"),
-    (r"press|druck|baro", "air_pressure"),
-    (r"m/s|km/h|mph|knots", "wind_speed"),
-)
-_UNIT = re.compile(
-    r"[\[(]\s*([^\])]{1,12}?)\s*[\])]|[_ ](m/?s|mps|km/?h|kph|mph|kn|kts?|deg|hpa|mbar|degc|c|%)$", re.IGNORECASE
-)
+CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
+"""Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
+_ORDER = Literal["dmy", "mdy"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """Something that the file does not tell: what, and what the user can say."""
+
+    what: str
+    fix: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """A proposal.
+    """What a table is, as far as its first lines tell.
 
     Attributes:
-        toml: the recipe, with what is not known left to fill in.
-        reasons: what in the file speaks for it.
+        toml: the recipe; "?" stands where it is to be completed. "" where there is no time and no wind to describe.
+        understood: what in the file speaks for it.
+        remarks: what was left out, and why.
+        warnings: what is odd, but does not keep the table from being read.
+        doubts: what must be said before it can be read.
+        winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
+        site: index of the column that tells sites apart, `None` where there is one site.
+        delimiter: of the cells.
     """
 
     toml: str
-    reasons: tuple[str, ...]
+    understood: tuple[str, ...]
+    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
+    winds: tuple[str, ...] = ()
+    site: int | None = None
+    delimiter: str = ","
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Grid:
-    delimiter: str
-    header_line: int
-    header: list[str]
-    rows: list[list[str]]
+@lru_cache(maxsize=4)
+def draft(
+    lines: tuple[str, ...], *, unit: str | None = None, order: _ORDER | None = None, wind: str | None = None
+) -> Draft | None:
+    """What the table is that `lines` seem to begin; `None` where they hold no table, or neither time nor wind.
 
-    def column(self, index: int) -> list[str]:
-        return [row[index].strip().strip('"') for row in self.rows]
-
-
-def draft(lines: Sequence[str]) -> Draft | None:
-    """A recipe for the table that `lines` seem to begin; `None` where no stamps or no wind can be made out."""
-    grid = _grid(lines)
-    if grid is None:
+    Args:
+        unit: of the wind, by the user's word.
+        order: of dates written with numbers only, by the user's word.
+        wind: label of the anemometer to describe, of those that `Draft.winds` lists.
+    """
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
         return None
-    time = _time(grid)
+    time = find_time(layout, order=order)
+    columns = time.columns if time is not None else ()
+    winds, remarks, warnings = find_winds(layout, time=columns, told=unit)
+    if wind is not None and wind not in {one.label for one in winds}:
+        said = named_wind(layout, wind, told=unit)
+        winds = (*winds, *((said,) if said is not None else ()))
+    if time is None and not winds:
+        return None
+    mixed = sites(layout, time=columns, stamps=_stamps(layout, columns)) if time is not None else None
+    if mixed is not None:
+        winds = tuple(
+            replace(one, site=(mixed[0], site), label=site if len(winds) == 1 else f"{site}:{one.label}")
+            for one in winds for site in mixed[1]
+        )  # fmt: skip
+    labels = tuple(one.label for one in winds)
+    chosen = next((one for one in winds if one.label == wind), None)
+    doubts = list(_doubts(layout, time, winds, chosen))
+    if wind is not None and chosen is None and mixed is not None and winds:
+        # A site that the first rows do not hold.
+        label, _, rest = wind.partition(":")
+        like = next((one for one in winds if not rest or one.label.endswith(f":{rest}")), winds[0])
+        chosen = replace(like, label=wind, site=(mixed[0], label))
+    elif wind is not None and chosen is None:
+        known = ", ".join(labels) or "none"
+        doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
+    chosen = chosen or (winds[0] if winds else None)
+    toml = _toml(layout, time, chosen) if time is not None else ""
+    return Draft(
+        toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
+        warnings=warnings,
+        doubts=tuple(doubts), winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+    )  # fmt: skip
+
+
+def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
+    return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
+
+
+def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None) -> list[Doubt]:
+    found: list[Doubt] = []
+    names = ", ".join(repr(name) for name in layout.names if name) or "no names"
     if time is None:
-        return None
-    stamp_columns, form = time
-    names = [name for name in grid.header if grid.header.count(name) == 1]
-    decimal = "," if grid.delimiter != "," and _has_decimal_commas(grid) else "."
-    channels: dict[str, tuple[str, str | None]] = {}
-    for index, name in enumerate(grid.header):
-        channel = _channel(name)
-        if index in stamp_columns or name not in names or not channel or channel in channels:
-            continue
-        parsed = numbers(grid.column(index), decimal=decimal)
-        if float((parsed.state == Cell.UNREADABLE).mean()) > 1 - _SHARE:
-            continue
-        channels[channel] = (name, _unit(name, channel))
-    if "wind_speed" not in channels:
-        return None
-    stamps = [grid.header[index] for index in stamp_columns]
-    reasons = (
-        f"cells are divided by {_name(grid.delimiter)!r}, line {grid.header_line + 1} names the columns",
-        f"column {' and '.join(map(repr, stamps))} is a time as {form}",
-        *(f"column {name!r} looks like {channel}, {_told(known)}" for channel, (name, known) in channels.items()),
+        fix = "write a recipe with [time] columns and format, and name it: --recipe FILE.toml"
+        found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
+    elif time.doubt is not None and time.fix is not None:
+        found.append(Doubt(what=time.doubt, fix=time.fix))
+    if not winds:
+        fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
+        found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
+    for wind in (chosen,) if chosen is not None else winds:
+        missing = wind.without_unit()
+        if missing:
+            found.append(_unit_doubt(layout, wind, missing))
+            break
+    unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
+    if unsure:
+        fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
+        what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
+        found.append(Doubt(what=what, fix=fix))
+    return found
+
+
+def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
+    column = wind.columns[missing[0]].index
+    value = numbers(layout.column(column), decimal=layout.decimal).value
+    evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
+    likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
+    name = layout.names[column] or f"number {column + 1}"
+    fix = (
+        f"give it: --unit {evidence.unit if evidence else 'm/s'}{'' if evidence else ' (or km/h, mph, kn, ft/s)'}"
+        ", after the instrument's setting or manual"
     )
-    return Draft(toml=_toml(grid, decimal, stamps, form, channels), reasons=reasons)
+    return Doubt(what=f"the unit of column {name!r} is not stated{likely}", fix=fix)
 
 
-def _grid(lines: Sequence[str]) -> _Grid | None:
-    filled = [(number, line) for number, line in enumerate(lines) if line.strip()]
-    best: tuple[int, str] = (1, "")
-    tail = filled[-ROWS:]
-    for delimiter in (";", "\t", ",", "|"):
-        counts = Counter(line.count(delimiter) + 1 for _, line in tail)
-        cells, often = max(counts.items(), key=lambda item: item[1], default=(1, 0))
-        if cells > best[0] and often > len(tail) / 2:
-            best = (cells, delimiter)
-    width, delimiter = best
-    if width < 2:
-        return None
-    table = [(number, line.split(delimiter)) for number, line in filled if line.count(delimiter) + 1 == width]
-    number, header = table[0]
-    header = [cell.strip().strip('"').lstrip("\ufeff") for cell in header]
-    rows = [row for _, row in table[1 : ROWS + 1]]
-    if not rows or not all(header) or any(re.fullmatch(r"[-+\d.,:/ TZ]+", cell) for cell in header):
-        return None
-    return _Grid(delimiter=delimiter, header_line=number, header=header, rows=rows)
+def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[str]:
+    named = (
+        f"line {layout.preamble + 1} names the {layout.number_of_columns()} columns"
+        if layout.header
+        else f"no line names the {layout.number_of_columns()} columns"
+    )
+    units = f", line {_units_line(layout)} their units" if any(layout.units) else ""
+    decimal = ", numbers have decimal commas" if layout.decimal == "," else ""
+    found = [f"cells are divided by {delimiter_name(layout.delimiter)!r}{decimal}; {named}{units}"]
+    if time is not None:
+        stamps = " and ".join(_shown(layout, index) for index in time.columns)
+        zone = "which state their zone" if time.zoned else f"in {time.zone}" if time.zone else "without a zone"
+        if time.form is not None and (counted.is_elapsed(time.form) or counted.is_time_of_day(time.form)):
+            zone = "without a date"
+        found.append(f"column {stamps} is the time, as {time.form or 'a date in an order that is not told'}, {zone}")
+    for wind in winds:
+        height = f" at {wind.height:g} m" if wind.height is not None else ""
+        site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""
+        parts = [
+            f"{channel} from column {_shown(layout, column.index)}, {column.told or 'unit not stated'}"
+            for channel, column in wind.columns.items()
+        ]
+        found.append(f"anemometer {wind.label!r}{height}{site}: {'; '.join(parts)}")
+    return found
 
 
-def _time(grid: _Grid) -> tuple[list[int], str] | None:
-    """Columns and format of the stamps: one column, or a date and the time beside it."""
-    for index in range(len(grid.header)):
-        whole = grid.column(index)
-        for form in ("iso", "epoch-s", "epoch-ms"):
-            if _fits(whole, form):
-                return [index], form
-        beside = grid.column(index + 1) if index + 1 < len(grid.header) else None
-        for columns, texts in (([index], whole), ([index, index + 1], _joined(whole, beside))):
-            if texts is None:
-                continue
-            try:
-                date = decide(texts, told=None, where="")
-            except TimeError:
-                continue
-            for clock in _TIMES:
-                form = f"{date.directives()} {clock}"
-                if _fits(texts, form):
-                    return columns, form
-    return None
+def _units_line(layout: Layout) -> str:
+    return f"{layout.preamble + 2}" if layout.header == 2 else "below"
 
 
-def _joined(first: Sequence[str], second: Sequence[str] | None) -> list[str] | None:
-    return None if second is None else [f"{a} {b}" for a, b in zip(first, second, strict=True)]
+def _shown(layout: Layout, index: int) -> str:
+    return repr(layout.names[index]) if layout.names[index] else f"number {index + 1}"
 
 
-def _fits(texts: Sequence[str], form: str) -> bool:
-    return float(parse(texts, form).valid.mean()) >= _SHARE
-
-
-def _has_decimal_commas(grid: _Grid) -> bool:
-    return any(re.fullmatch(r"[-+]?\d+,\d+", cell.strip()) for row in grid.rows for cell in row)
-
-
-def _channel(name: str) -> str:
-    return next((channel for pattern, channel in _HEADINGS if re.search(pattern, name[:80], re.IGNORECASE)), "")
-
-
-def _unit(name: str, channel: str) -> str | None:
-    """The unit that a heading states, if it is one of the channel's quantity."""
-    match = _UNIT.search(name[:80])
-    stated = (match[1] or match[2]) if match else ""
-    if stated.lower() == "ms" and CHANNELS[channel].unit == "m/s":
-        return "m/s"  # "speed_ms" means metres a second, not milliseconds
-    for text in (stated, name):
-        try:
-            if text and unit(text).si == CHANNELS[channel].unit:
-                return text
-        except UnknownNameError:
-            continue
-    return None
-
-
-def _told(known: str | None) -> str:
-    return f"in {known}" if known else "in a unit the header does not state"
-
-
-def _name(delimiter: str) -> str:
+def delimiter_name(delimiter: str) -> str:
+    """What a recipe calls a delimiter."""
     return next(name for name, character in DELIMITERS.items() if character == delimiter)
 
 
 def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
 
 
-def _toml(
-    grid: _Grid, decimal: str, stamps: Sequence[str], form: str, channels: dict[str, tuple[str, str | None]]
-) -> str:
-    columns = ", ".join(map(_quoted, stamps))
+def _reference(layout: Layout, index: int) -> str:
+    """A column as a recipe names it: by its heading where that is its own, else by its number."""
+    name = layout.names[index]
+    return _quoted(name) if layout.by_name and name and layout.names.count(name) == 1 else str(index + 1)
+
+
+def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
+    preamble = layout.preamble if layout.by_name else layout.preamble + layout.header
+    label = wind.label if wind is not None else "anemometer"
     lines = [
-        'name = "my-sensor"', 'about = "what it is"', 'source = "its manual"', "",
-        "[file]", f"delimiter = {_quoted(_name(grid.delimiter))}", f"decimal = {_quoted(decimal)}",
-        f"preamble = {grid.header_line}", "",
-        "[time]", f"columns = [{columns}]", f"format = {_quoted(form)}",
+        'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
+        "[file]", f"delimiter = {_quoted(delimiter_name(layout.delimiter))}", f"decimal = {_quoted(layout.decimal)}",
+        f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
+        f"missing = [{', '.join(_quoted(f'{code:g}') for code in _codes(layout, wind))}]", "",
+        "[time]", f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]",
+        f"format = {_quoted(time.form or '?')}",
     ]  # fmt: skip
-    for channel, (name, known) in channels.items():
-        lines += ["", f"[channels.{channel}]", f"column = {_quoted(name)}"]
-        lines += [f"unit = {_quoted(known)}" if known else 'unit = "?"  # the header does not say: fill it in']
-    lines += ["", "[sensor]", 'name = "my sensor"', ""]
-    return "\n".join(lines)
+    if time.form is None:
+        lines[-1] += f"  # {time.doubt}"
+    if time.zone is not None:
+        lines.append(f"zone = {_quoted(time.zone)}")
+    if wind is not None and wind.site is not None:
+        lines += ["", "[rows]", f"column = {_reference(layout, wind.site[0])}", f"value = {_quoted(wind.site[1])}"]
+    if wind is None:
+        names = ", ".join(name for name in layout.names if name)
+        lines += ["", "[channels.wind_speed]", 'column = "?"  # ' + (f"one of: {names}" if names else "its number")]
+        lines += ['unit = "?"  # m/s, km/h, mph, kn']
+    for channel, column in (wind.columns if wind is not None else {}).items():
+        lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
+        lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
+    lines += ["", "[sensor]", f"name = {_quoted(label)}"]
+    if wind is not None and wind.height is not None:
+        lines.append(f"height = {wind.height:g}")
+    return "\n".join([*lines, ""])
+
+
+def _codes(layout: Layout, wind: Wind | None) -> list[float]:
+    """Codes for "no value": those that no quantity here can have, and those above every other value of the wind."""
+    codes = list(CODES)
+    for channel, column in (wind.columns if wind is not None else {}).items():
+        value = numbers(layout.column(column.index), decimal=layout.decimal).value
+        known = value[np.isfinite(value)]
+        for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
+            others = known[known != code]
+            if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:
+                codes.append(code)
+    return list(dict.fromkeys(codes))

@@ -1,296 +1,360 @@
-"""Exports with a heading: columns become channels by the names and units that the maker writes above them.
+"""What the heading of a column says: the quantity, whether it is a mean, the unit, the height, and whose it is.
 
-What the exports of loggers and weather stations share: a heading names every column, with its unit in the name or in a
-line of its own; one time column or two; rows. Each maker's file says where the heading stands, what the names mean and
-how stamps are written; the rest is here.
+A heading is cut into words at blanks, signs, capitals and digits ("Spd80mN" is spd, 80, m, N). Words of the quantity,
+of the statistic and of the unit are known in the languages of common loggers; what is left tells instruments apart.
 """
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 
-import numpy as np
-from numpy.typing import NDArray
-
-from flagdata.errors import InputError, TimeError, UnknownNameError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.columns import Columns
-from flagdata.ingest.anemometer.dates import decide
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, FileLayout, Recipe, TimeLayout
-from flagdata.ingest.anemometer.rows import RowReader
-from flagdata.ingest.anemometer.sonic import with_horizontal
-from flagdata.ingest.anemometer.source import TextFile
-from flagdata.ingest.anemometer.table import read_table
 from flagdata.schema import CHANNELS
-from flagdata.signals import Sensor
-from flagdata.timebase import NANOSECONDS, zone
-from flagdata.units import unit
+from flagdata.units import UNITS, spelled
 
-Names = Sequence[tuple[str, str]]
-"""Patterns of a column's whole name, case ignored → channel; the first pattern that fits decides."""
+_WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
+_CAMEL = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöü])|[A-ZÄÖÜ]?[a-zäöüßéèíóá]+|[^\W\d_]+")
+_BRACKET = re.compile(r"[\[(<{]([^\])>}]*)[\])>}]")
+_HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
+_INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
+_ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
-# Spellings of these exports that the table of units does not know, lower-case and without blanks and brackets.
-_SPELLED: Mapping[str, str] = {
-    "metres/second": "m/s", "metre/second": "m/s", "metres/sec": "m/s", "m+1s-1": "m/s", "meterspersecond": "m/s",
-    "milesperhour": "mph", "millibar": "hPa", "millibars": "hPa", "celcius": "degC", "*c": "degC", "℃": "degC",
-    "℉": "degF", "in": "inHg", "inches": "inHg", "ø": "deg", "deg_from_north": "deg", "degreesfromnorth": "deg",
+_WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
+_SPEED = frozenset(
+    {
+        "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
+        "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
+        "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
+        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots",
+    }
+)  # fmt: skip
+_DIRECTION = frozenset(
+    {
+        "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
+        "dd", "vane", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
+        "retning", "vindretning", "riktning", "wdr", "wdire", "deg", "winddeg", "azimuth", "bearing",
+    }
+)  # fmt: skip
+_OTHER = frozenset(
+    {
+        "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "rotor",
+        "rpm", "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
+        "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
+        "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
+        "load", "density", "elevation", "vertical", "gyro", "acc", "accel", "course", "heading", "track", "duration",
+    }
+)  # fmt: skip
+_SPREAD = frozenset(
+    {
+        "max", "maximum", "maxi", "min", "minimum", "mini", "gust", "gusts", "gst", "std", "sd", "sdev", "stdev",
+        "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov", "covariance", "peak", "lull", "hi",
+        "high", "low", "lo", "böe", "böen", "boe", "boeen", "bö", "windböe", "rafale", "rafales", "racha", "rajada",
+        "ti", "turbulence", "flag", "flags", "qc", "quality", "qf", "qa", "err", "error", "diag", "diagnostic",
+        "status", "skew", "skewness", "kurt", "kurtosis", "windgust", "wgust", "gustspeed", "windgustdir", "windrun",
+        "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples", "percentile", "trend",
+        "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast", "threshold",
+    }
+)  # fmt: skip
+_MEAN = frozenset({"avg", "average", "mean", "ave", "av", "moy", "mittel", "mittelwert", "media", "medio", "smp"})
+_PLAIN = frozenset(
+    {
+        "sensor", "value", "instant", "instantaneous", "inst", "current", "latest", "horizontal", "hor", "data",
+        "measured", "raw", "the", "of", "in", "s", "wvt", "d", "u", "at", "ch", "channel", "sonic", "anemometer",
+        "anem", "smp", "true", "mag", "magnetic", "outdoor", "out", "from", "north", "wind", "cup", "vane", "station",
+        "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
+    }
+)  # fmt: skip
+_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd"})
+_THEORETICAL = frozenset({"tws", "twa", "theoretical"})
+_ABBREVIATED = {
+    "aws": "apparent_wind_speed", "awa": "apparent_wind_direction", "awd": "apparent_wind_direction",
+    "tws": "theoretical_wind_speed", "twa": "theoretical_wind_direction",
 }  # fmt: skip
-
-
-_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
-POINTS: Mapping[str, str] = {name: f"{number * 22.5:g}" for number, name in enumerate(_ROSE)}
-"""Points of the compass → degrees from north, as text."""
-_REST = re.compile(
-    r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
+_NO_AIR = frozenset(
+    {
+        "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger",
+        "battery", "batt", "panel", "internal", "indoor", "case", "board", "cpu", "virtual", "surface", "water", "sea",
+        "heat",
+        "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
+        "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
+        "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in", "gyro", "mpu",
+    }
+)  # fmt: skip
+_TEMPERATURE = frozenset(
+    {"temp", "temperature", "temperatur", "température", "temperatura", "tair", "airt", "airtemp", "tmp", "tamb", "ta"}
+)
+_HUMIDITY = frozenset({"rh", "hum", "humidity", "humid", "feuchte", "luftfeuchte", "relhum", "humedad", "humidite"})
+_PRESSURE = frozenset(
+    {"press", "pressure", "baro", "barometer", "druck", "luftdruck", "bp", "barometric", "pression", "presion", "pa"}
+)
+_COMPONENTS = {
+    "u": "wind_x", "v": "wind_y", "w": "wind_z", "ux": "wind_x", "uy": "wind_y", "uz": "wind_z", "vx": "wind_x",
+    "vy": "wind_y", "vz": "wind_z", "x": "wind_x", "y": "wind_y", "z": "wind_z",
+}  # fmt: skip
+_INSIDE = {
+    "ms": "m/s", "mps": "m/s", "kmh": "km/h", "kph": "km/h", "kts": "kn", "kt": "kn", "knots": "kn", "kn": "kn",
+    "sknt": "kn", "mph": "mph", "deg": "deg", "degc": "degC", "degf": "degF", "c": "degC", "f": "degF", "hpa": "hPa",
+    "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
+}  # fmt: skip
+"""Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
+_SENSORS = frozenset(
+    {"csat", "csat3", "sonic", "sat", "metek", "gill", "young", "wind", "comp", "component", "hs", "wm"}
 )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
-    """A column of a heading: its number from 1, its name, and its unit as written ("" where there is none)."""
-
-    number: int
-    name: str
-    unit: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Assigned:
-    """Which columns are read.
+class Heading:
+    """What a heading says.
 
     Attributes:
-        channels: channel → column.
-        names: channel → name of its column.
-        unread: names of columns that are not read.
-        rivals: names of further columns of wind speed or components: other anemometers or heights.
-    """
-
-    channels: Mapping[str, ChannelLayout]
-    names: Mapping[str, str]
-    unread: tuple[str, ...] = ()
-    rivals: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Export:
-    """An export as its heading describes it.
-
-    Attributes:
-        name: of the format.
-        file, time, sensor, checks: see recipe.Recipe.
-        assigned: its columns.
-        described_by: the maker's description that the reader follows, where no file of the instrument was seen.
-        averaged: whether a row is the average over the distance of the stamps.
-        starts: whether the stamp of an average is that of its beginning.
-        compass: columns whose directions may be points of the compass ("NNE").
+        name: as written.
+        channel: of `schema.CHANNELS`; "" where it names none that a log of wind has, and for spreads and extremes.
+        sure: whether it names the channel; false where only the unit speaks for it.
+        spread: whether it is a maximum, gust, deviation, count or mark, of whatever quantity.
+        quantity: the channel that a spread belongs to, else `channel`.
+        mean: whether it says that it is a mean.
+        unit: the table's name of the unit it states, of whatever quantity; `None` where it states none.
+        height: above ground [m].
+        label: words that tell instruments apart, lower-case.
+        magnetic: of a direction, whether it is from magnetic north.
     """
 
     name: str
-    file: FileLayout
-    time: TimeLayout
-    sensor: Sensor
-    assigned: Assigned
-    checks: tuple[CheckLayout, ...] = ()
-    described_by: str | None = None
-    averaged: bool = False
-    starts: bool = False
-    compass: tuple[int, ...] = ()
+    channel: str
+    sure: bool
+    spread: bool
+    quantity: str
+    mean: bool
+    unit: str | None
+    height: float | None
+    label: tuple[str, ...]
+    magnetic: bool = False
 
 
-def cut(line: str, delimiter: str) -> list[str]:
-    """The cells of one line of a heading, without blanks and quotes around them."""
-    if delimiter == " ":
-        return line.split()
-    return [cell.strip() for cell in next(csv.reader([line.lstrip("\ufeff")], delimiter=delimiter), [])]
+@lru_cache(maxsize=4096)
+def understand(name: str, stated: str = "") -> Heading:
+    """What the heading `name` says, with the cell `stated` of a line of units below it."""
+    text = name[:120].strip().strip('"').strip()
+    text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
+    rest, unit = _unit(text, stated)
+    height = _height(rest)
+    bare = _HEIGHT.sub(" ", rest) if height is not None else rest
+    bare, averaged = _INTERVAL.subn(" ", bare.replace("_", " "))
+    words = _words(bare)
+    if unit is None:
+        unit = next((_INSIDE[word] for word in words[1:] or words if word in _INSIDE and word != "deg"), None)
+        unit = "deg" if unit is None and "deg" in words[1:] else unit
+        words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
+    known = set(words)
+    compact = "".join(words)
+    spread = bool(known & _SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
+    quantity, sure, used = _quantity(words, compact, unit, rest)
+    if quantity and known & _OTHER and not (quantity.endswith("direction") and known & {"course"}):
+        excluded = known & _OTHER - {"vertical"} if quantity == "wind_z" else known & _OTHER
+        if "wind" in quantity and excluded:
+            quantity, sure = "", False
+    left = list(words)
+    for word in used:
+        left.remove(word)
+    label = tuple(word for word in left if word not in _MEAN | _SPREAD | _PLAIN | _WIND)
+    return Heading(
+        name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
+        mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
+        magnetic=bool(known & {"mag", "magnetic"}),
+    )  # fmt: skip
 
 
-def stamp_format(texts: Sequence[str], options: WindOptions, where: str) -> tuple[str, tuple[Finding, ...]]:
-    """The format of stamps (see stamps.py) by the stamps themselves, and what was found about the order of dates.
-
-    Args:
-        texts: stamps of the first rows, date before time.
-
-    Raises:
-        TimeError: no date and time in them, or nothing that tells the day from the month.
-    """
-    filled = [text.strip() for text in texts if text.strip()]
-    decision = decide(filled, told=options.date_order, where=where)
-    found = [match for text in filled if (match := _REST.search(text))]
-    rest = next(iter(found), None)
-    if rest is None:
-        first = filled[0] if filled else ""
-        raise TimeError(f"no time of day in {first!r}", where=where, fix="export date and time")
-    clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "")
-    clock += "%f" if any(match["f"] for match in found) else ""  # some loggers drop zeros at the end
-    half = f"{' ' if rest['b'] else ''}%p" if rest["p"] else ""
-    form = f"{decision.directives()} {clock}{half}{'%z' if rest['z'] else ''}"
-    if decision.order == "ymd":
-        return form, ()
-    text = f"dates are read as {decision.order}: {decision.reason}"
-    return form, (Finding(kind="date-order", severity=Severity.NOTE, what=text),)
+def interest(name: str) -> int:
+    """How much a cell looks like the heading of a time (2), a wind (2) or another channel (1)."""
+    heading = understand(name)
+    if heading.unit is not None and _known(name.strip("[]()")) is not None:
+        return 0
+    if names_time(name):
+        return 1 if name.strip().upper() == "TS" else 2
+    if not heading.quantity or not heading.sure:
+        return 0
+    return 2 if "wind" in heading.quantity else 1
 
 
-def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of "Speed 80 m [m/s]" or "Wind(km/h)"; no unit where there are no brackets at the end."""
-    match = re.fullmatch(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*", name[:200])
-    return (match[1], match[2].strip()) if match else (name, "")
+def names_time(name: str) -> bool:
+    """Whether a heading names a time or a date."""
+    words = set(_words(name))
+    known = {
+        "time", "timestamp", "date", "datetime", "datum", "uhrzeit", "zeit", "zeitstempel", "fecha", "hora", "heure",
+        "horodatage", "stamp", "epoch", "unixtime", "unix", "millis", "milliseconds", "seconds", "elapsed", "ts",
+        "utc", "tijd", "tid", "dato", "data", "dt", "timestamps", "isotime", "when", "year", "month", "day", "hour",
+        "doy", "jday", "tstamp", "ora", "tmstamp", "dateutc", "ms", "observed", "obs",
+    }  # fmt: skip
+    return bool(words & known) or bool(re.search(r"time|date", "".join(words)))
 
 
-def known_unit(spelled: str) -> str | None:
-    """The unit that an export spells as `spelled`; `None` where it is not known."""
-    bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", spelled).strip()
-    key = re.sub(r"\s", "", bare).lower()
-    text = _SPELLED.get(key, bare)
-    try:
-        unit(text)
-    except UnknownNameError:
+def zone_of(name: str) -> str | None:
+    """The zone that the heading of a time states: "UTC", or an offset."""
+    found = _ZONE.search(re.sub(r"_", " ", name))
+    if found is None and re.search(r"utc|gmt", name, re.IGNORECASE):
+        return "UTC"
+    if found is None:
         return None
-    return text
+    if not found[1]:
+        return "UTC"
+    sign, digits = found[1][0], found[1][1:].strip().replace(":", "")
+    hours, minutes = (digits[:-2], digits[-2:]) if len(digits) > 2 else (digits, "00")
+    return f"{sign}{int(hours):02d}:{minutes}"
 
 
-def assign(
-    columns: Sequence[Column], names: Names, *, where: str, fix: str, ranges: Mapping[str, tuple[float, float]] = {}
-) -> Assigned:
-    """Find the channels among columns by their names.
-
-    Args:
-        columns: of the heading, without those of time.
-        names: see `Names`.
-        where: the heading, for messages.
-        fix: what to do about a unit that is not known or no wind at all.
-        ranges: of channels, in the column's own unit, where that is the channel's unit of the format.
-
-    Raises:
-        InputError: no column of wind, or wind in a unit that is not known.
-    """
-    channels: dict[str, ChannelLayout] = {}
-    taken: dict[str, str] = {}
-    unread: list[str] = []
-    rivals: list[str] = []
-    for column in columns:
-        short = column.name[:120]  # a heading of any length must not cost more
-        channel = next((c for pattern, c in names if re.fullmatch(pattern, short, re.IGNORECASE)), None)
-        if channel is None or channel in channels:
-            if channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s":
-                rivals.append(column.name)
-            elif column.name:
-                unread.append(column.name)
-            continue
-        spelled = known_unit(column.unit)
-        if spelled is None or unit(spelled).si != CHANNELS[channel].unit:
-            if channel.startswith("wind_"):
-                raise InputError(f"{column.name!r} is {channel}, but its unit is {column.unit!r}", where=where, fix=fix)
-            unread.append(column.name)
-            continue
-        channels[channel] = ChannelLayout(column=column.number, unit=spelled, range=ranges.get(channel))
-        taken[channel] = column.name
-    if not {"wind_speed", "wind_x"} & set(channels):
-        listed = ", ".join(column.name for column in columns[:40] if column.name)
-        raise InputError(f"no column of wind speed among {listed}", where=where, fix=fix)
-    return Assigned(channels=channels, names=taken, unread=tuple(unread), rivals=tuple(rivals))
+def words_of(name: str) -> list[str]:
+    """Words of a heading, lower-case."""
+    return _words(name)
 
 
-def read_export(source: TextFile, export: Export, options: WindOptions) -> Reading:
-    """Read the rows below a heading.
-
-    Raises:
-        InputError, TimeError: see `read_table`.
-    """
-    where = str(source.path)
-    assigned = export.assigned
-    recipe = Recipe(
-        name=export.name, about="from the file's own heading", source="the file", file=export.file, time=export.time,
-        channels=assigned.channels, sensor=export.sensor, checks=export.checks,
-    )  # fmt: skip
-    rows = CompassRows(source, export.file, export.compass)
-    reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
-    found = [*_zone(export.time.zone, options.zone), *column_findings(assigned)]
-    if rows.points:
-        text = f"{rows.points} directions are points of the compass, 22.5° apart"
-        found.append(Finding(kind="compass-points", severity=Severity.NOTE, count=rows.points, what=text))
-    if export.averaged:
-        reading = _with_period(reading)
-    if export.starts and reading.sensor.averaging:
-        text = f"stamps are of the beginning of averages over {reading.sensor.averaging:g} s; they are kept as written"
-        found.append(Finding(kind="stamps-at-start", severity=Severity.NOTE, what=text))
-    if export.described_by is not None:
-        found.append(described(export.described_by))
-    return with_horizontal(reading.with_findings(tuple(found)), options.azimuth, where=where)
+def _words(text: str) -> list[str]:
+    found: list[str] = []
+    for word in _WORD.findall(text.replace("µ", "u")):
+        if word[0].isdigit():
+            found.append(word)
+        elif word.isupper() or word.islower():
+            found.append(word.lower())
+        else:
+            parts = [part.lower() for part in _CAMEL.findall(word)]
+            found.extend(parts)
+    return found
 
 
-class CompassRows(RowReader):
-    """Rows in which points of the compass are written as degrees; `points` counts them."""
-
-    def __init__(self, source: TextFile, layout: FileLayout, columns: Sequence[int]) -> None:
-        super().__init__(source, layout)
-        self._compass = [column - 1 for column in columns]
-        self._degrees = {name: text.replace(".", layout.decimal) for name, text in POINTS.items()}
-        self.points = 0
-
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
-        """See `RowReader.blocks`; row by row where there are points of the compass."""
-        return self._in_degrees(width) if self._compass else super().blocks(width)
-
-    def _in_degrees(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
-        for line, rows in self.rows(width):
-            for row in rows:
-                for column in self._compass:
-                    degrees = self._degrees.get(row[column].strip().upper())
-                    if degrees is not None:
-                        row[column] = degrees
-                        self.points += 1
-            yield line, rows
+def _height(text: str) -> float | None:
+    found = _HEIGHT.findall(text.replace("_", " "))
+    return float(found[0]) if len(found) == 1 and 0 < float(found[0]) <= 500 else None
 
 
-def described(by: str) -> Finding:
-    """The finding that a reader follows a description alone."""
-    return Finding(
-        kind="read-by-description", severity=Severity.NOTE,
-        what=f"read by {by}; the reader was tried on made files only", fix="compare the first rows with the file",
-    )  # fmt: skip
+def _unit(text: str, stated: str) -> tuple[str, str | None]:
+    """The heading without its unit, and the unit."""
+    below = _known(stated.strip().strip("[]()<>"))
+    if len(text) > 1 and below is None and (whole := _known(text)) is not None:
+        return text, whole
+    for found in _BRACKET.finditer(text):
+        inside = _known(found[1])
+        if inside is not None:
+            return text[: found.start()] + " " + text[found.end() :], inside
+    # HOBO writes the serial numbers of logger and sensor in brackets: they tell no instruments of one file apart.
+    text = re.sub(r"\([^)]*\b(?:S/N|LGR|SEN)\b[^)]*\)?", "", text).strip()
+    if below is not None:
+        return text, below
+    mangled = re.search(r"\.+((?:X\.)?(?:m\.s|km\.h|mph|kn|kts|knots|m\.s\.1|deg|C|hPa|mbar))\.*$", text)
+    if mangled is not None and (inside := _known(mangled[1].replace(".1", "-1").replace(".", "/"))) is not None:
+        return text[: mangled.start()], inside
+    pieces = re.split(r"(\s*,\s*|\s+|_|;|:|-(?=[a-zA-Z]))", text)
+    for count in (5, 3, 1):
+        # At the end ("wind_speed_km_h", "Wind Speed, m/s") and at the beginning ("m/s Wind Speed").
+        if len(pieces) > count:
+            for part, others in ((pieces[-count:], pieces[:-count]), (pieces[:count], pieces[count:])):
+                joined = "".join(part)
+                if count > 1 and not re.search(r"[\d/]|per|m_s|km_h|deg|kilo|m[ _]s", joined, re.IGNORECASE):
+                    continue
+                for way in (joined, re.sub(r"[_ ]", "/", joined), re.sub(r"[_ ]", "", joined)):
+                    inside = _known(way)
+                    if inside is not None and inside not in ("m", "s", "Hz", "px", "1", "ft", "cm", "mm", "K", "rad"):
+                        return "".join(others), inside
+    return text, None
 
 
-def _with_period(reading: Reading) -> Reading:
-    """The same reading with the median distance of its stamps as the logger's averaging [s]."""
-    if len(reading.time) < 2:
-        return reading
-    period = float(np.median(np.abs(np.diff(reading.time)))) / NANOSECONDS
-    return replace(reading, sensor=replace(reading.sensor, averaging=period))
+def _known(words: str) -> str | None:
+    """The table's name of a unit, where a text spells one; "ms" is metres a second in a log of wind."""
+    text = words.strip().strip(".").strip()
+    if not text or len(text) > 40:
+        return None
+    if text.lower() in ("ms", "m/s/1", "m_s"):
+        return "m/s"
+    return spelled(text)
 
 
-def _zone(stated: str | None, given: str | None) -> list[Finding]:
-    if stated is None or given is None or zone(stated) == zone(given):
-        return []
-    return [
-        Finding(
-            kind="zone-contradicts", severity=Severity.WARNING,
-            what=f"the file says that its stamps are of {stated}; {given} was given and is used",
-            fix="leave out --zone unless the file is known to be wrong",
-        )
-    ]  # fmt: skip
+def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tuple[str, bool, set[str]]:
+    """The channel, whether the words name it (or only the unit does), and the words that do."""
+    known = set(words)
+    si = UNITS[unit].si if unit is not None else None
+    windy = bool(known & _WIND) or compact.startswith(("wind", "wnd"))
+    if words[:1] == ["w"] and words[1:2] and words[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
+        windy = True
+    component = _component(words, si)
+    if component is not None:
+        return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
+    if si in (None, "rad", "1") or windy:
+        away = known & _DIRECTION
+        if (away or re.search(r"wind?.?dir|windrichtung|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
+            sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane"}) or "dir" in compact
+            if known & {"deg", "azimuth", "bearing"} == away and not windy and not known & {"awa", "twa"}:
+                return "", False, set()
+            return _by_platform(known, "direction"), sure, known & (_DIRECTION | _APPARENT | _THEORETICAL)
+    if si in (None, "m/s"):
+        for word, channel in _ABBREVIATED.items():
+            if word in known and (si == "m/s") <= channel.endswith("speed"):
+                return channel, True, {word}
+        named = known & _SPEED
+        if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
+            return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
+        if windy and len(known - _WIND - _MEAN - _PLAIN) == 0:
+            return "wind_speed", True, known & _WIND
+    if si in (None, "rad") and known & {"awa", "twa", "awd"}:
+        word = next(iter(sorted(known & {"awa", "twa", "awd"})))
+        return _ABBREVIATED[word], True, {word}
+    if si == "m/s" and not known & _OTHER:
+        return "wind_speed", False, set()
+    return _weather(words, compact, si, windy)
 
 
-def column_findings(assigned: Assigned) -> tuple[Finding, ...]:
-    """What is to be said of the columns that are not read, anemometers first."""
-    found: list[Finding] = []
-    if assigned.rivals:
-        used = assigned.names.get("wind_speed", assigned.names.get("wind_x", ""))
-        found.append(
-            Finding(
-                kind="several-anemometers", severity=Severity.WARNING, count=len(assigned.rivals),
-                what=f"wind is read from {used!r}, the first of {len(assigned.rivals) + 1} columns of wind; not from "
-                f"{', '.join(assigned.rivals)}",
-                fix="to read another one, describe the file by a recipe that names its column",
-            )
-        )  # fmt: skip
-    if assigned.unread:
-        text = ", ".join(assigned.unread)
-        found.append(
-            Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(assigned.unread), what=text[:2000])
-        )
-    return tuple(found)
+def _component(words: list[str], si: str | None) -> str | None:
+    if si not in (None, "m/s"):
+        return None
+    core = [word for word in words if word not in _MEAN and not word.isdigit()]
+    head = [word for word in core if word not in _SENSORS]
+    if head and head[0] in ("u", "v", "w") and head[1:2] and head[1] in ("x", "y", "z"):
+        return _COMPONENTS[head[1]]
+    if head and head[-1] in _COMPONENTS and "wind" in words and set(head[:-1]) <= {"speed", "vel", "velocity"}:
+        return _COMPONENTS[head[-1]]
+    if not head or head[0] not in _COMPONENTS:
+        return None
+    if head[0] == "w" and head[1:2] and head[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
+        return None
+    if head[0] in ("x", "y", "z", "vx", "vy", "vz") and not set(core) & {"wind", "sonic", "csat"}:
+        return None
+    if "star" in head or (len(head) > 1 and head[1] in _COMPONENTS):
+        return None
+    return _COMPONENTS[head[0]]
+
+
+def _by_platform(known: set[str], quantity: str) -> str:
+    if known & _APPARENT:
+        return f"apparent_wind_{quantity}"
+    if known & _THEORETICAL:
+        return f"theoretical_wind_{quantity}"
+    return f"wind_{quantity}"
+
+
+def _weather(words: list[str], compact: str, si: str | None, windy: bool) -> tuple[str, bool, set[str]]:
+    known = set(words)
+    if windy:
+        return "", False, set()
+    sonic = bool(known & {"sonic", "son", "acoustic", "tsonic", "ts", "tson", "csat", "tv"})
+    warm = (
+        known & _TEMPERATURE or re.search(r"temp|^t$|^t\d+$|^tair", compact) or (words[:1] == ["t"] and len(words) > 1)
+    )
+    if si in (None, "K") and sonic and (warm or known & {"ts", "tsonic", "tson"}):
+        # TS is a sonic's among u, v and w, the soil's in ICOS's and AmeriFlux's tables.
+        said = bool(known & {"sonic", "son", "acoustic", "tsonic", "tson", "csat"})
+        return "sonic_temperature", said, known & {"sonic", "ts", "temp", "temperature", "t", "tsonic"}
+    if si in (None, "K") and (warm or (si == "K" and not known)) and not known & _NO_AIR and "dew" not in compact:
+        return "air_temperature", True, (known & _TEMPERATURE) or (known & {"t"})
+    if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not known & _NO_AIR:
+        return "relative_humidity", True, known & _HUMIDITY
+    pressed = known & _PRESSURE or re.search(r"press|baro|^p$|^p\d+$", compact)
+    if (
+        si in (None, "Pa")
+        and pressed
+        and not known & {"sea", "msl", "slp", "qnh", "vapor", "vapour", "box", "cell", "mslp"}
+    ):
+        return "air_pressure", True, known & (_PRESSURE | {"p"})
+    return "", False, set()
+
+
+def fits(channel: str, unit: str | None) -> bool:
+    """Whether a unit is one of a channel's quantity."""
+    return unit is not None and UNITS[unit].si == CHANNELS[channel].unit

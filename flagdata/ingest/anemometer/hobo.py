@@ -13,7 +13,7 @@ import re
 from collections.abc import Sequence
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer.headings import Column, Export, assign, cut, read_export, stamp_format
+from flagdata.ingest.anemometer.exports import Column, Export, assign, cut, read_export, stamp_format
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import FileLayout, TimeLayout

@@ -20,7 +20,7 @@ from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
 from flagdata.signals import Sensor
-from flagdata.units import SPELLINGS, UNITS
+from flagdata.units import spelled as spelled_unit
 
 # Header of a Kestrel → channel. The sign between words is a degree sign or what became of it.
 _COLUMNS: tuple[tuple[str, str], ...] = (
@@ -167,13 +167,9 @@ _RANGES = {"wind_speed": (0.0, 60.0)}
 def _unit(spelled: str, channel: str) -> str | None:
     """The unit a cell means, degree signs repaired; `None` where it cannot be told."""
     for text in (spelled, spelled.encode("ascii", "ignore").decode().strip()):
-        key = text.lower().replace(" ", "")
-        if not text:
-            continue
-        if text in UNITS or key in UNITS:
-            return text if text in UNITS else key
-        if key in SPELLINGS:
-            return SPELLINGS[key]
+        known = spelled_unit(text)
+        if known is not None:
+            return known
     bare = spelled.encode("ascii", "ignore").decode().strip()
     return _DEFAULT_UNIT.get(channel) if not bare else None
 

@@ -65,7 +65,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
         host_time=reading.host_time,
     )  # fmt: skip
-    return WindLog(series=series, format=name, findings=findings, reasons=reasons)
+    return WindLog(series=series, format=name, findings=findings, reasons=reasons, drafted=reading.drafted)
 
 
 def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
@@ -113,7 +113,10 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         name = "host-stamped" if recipes.load(options.recipe).file.host else "delimited"
         return name, options, (f"the recipe {options.recipe} was named",)
     guesses = recognise(source)
-    if not guesses or guesses[0].score < SURE:
+    if guesses and guesses[0].score < SURE:
+        # A table in doubt is refused by its own reader, which knows what the user has said already.
+        guesses = tuple(sorted(guesses, key=lambda guess: not guess.doubts))
+    if not guesses or (guesses[0].score < SURE and not guesses[0].doubts):
         seen = "; ".join(reason for guess in guesses for reason in guess.reasons)
         raise InputError(
             f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),

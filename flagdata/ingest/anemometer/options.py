@@ -9,7 +9,9 @@ from typing import Any, Literal, TypeAlias
 
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.clock import ClockChoice
+from flagdata.units import unit
 
+_LATER = frozenset({"clock", "unit", "start", "wind"})
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
 and change nothing, or subtract what they show."""
@@ -52,6 +54,9 @@ class WindOptions:
             direction stays sensor-relative.
         clock: whose stamps are right where the log's clock was set back or on: those before it ("first") or those after
             it ("last"); `None` where nobody said.
+        unit: of the wind's speed, for a file that does not state it; of a file that does, the user's word counts.
+        start: instant of the first row [UTC ns], for stamps that count from a start.
+        wind: which anemometer of a file that holds several, by the label that `sniff` gives it.
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
     """
@@ -66,6 +71,9 @@ class WindOptions:
     talker: str | None = None
     azimuth: float | None = None
     clock: ClockChoice | None = None
+    unit: str | None = None
+    start: int | None = None
+    wind: str | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
 
@@ -78,6 +86,8 @@ class WindOptions:
             raise UsageError(f"clock {self.clock!r}", where="clock", fix="give first or last")
         if self.azimuth is not None and not -7.0 < self.azimuth < 7.0:
             raise UsageError(f"azimuth {self.azimuth} is not in radians", where="azimuth", fix="give -2π to 2π")
+        if self.unit is not None and unit(self.unit, where="unit").si != "m/s":
+            raise UsageError(f"{self.unit} is no unit of speed", where="unit", fix="give m/s, km/h, mph, kn or ft/s")
         check_zero_offset(self.zero_offset, where="zero_offset")
 
     def given(self) -> frozenset[str]:
@@ -90,11 +100,13 @@ class WindOptions:
         return frozenset(f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) is not None)
 
     def as_dict(self) -> Mapping[str, Any]:
-        """Everything that shapes the result, for a recipe hash; limits do not (they only refuse)."""
+        """Everything that shapes the result, for a recipe hash; limits do not (they only refuse).
+
+        Options that came later are there only where they are given, so that older artifacts keep their hash.
+        """
         content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "limits"}
+        content = {name: value for name, value in content.items() if name not in _LATER or value is not None}
         content["date"] = self.date.isoformat() if self.date else None
-        if self.clock is None:
-            del content["clock"]  # older lakes have artifacts of the same log whose recipe does not name it
         return content
 
 

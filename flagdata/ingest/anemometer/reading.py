@@ -36,6 +36,7 @@ class Reading:
         rules: what is known about the instrument's errors.
         host_time: (n,) the logging computer's clock, where the file has it.
         findings: of the format.
+        drafted: the recipe (TOML) that was drafted from the file, "" where it was read by another.
     """
 
     time: Instants
@@ -47,6 +48,7 @@ class Reading:
     rules: QualityRules = field(default_factory=QualityRules)
     host_time: Instants | None = None
     findings: tuple[Finding, ...] = ()
+    drafted: str = ""
 
     def __post_init__(self) -> None:
         n = len(self.time)

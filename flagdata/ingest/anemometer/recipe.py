@@ -5,6 +5,7 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
     name, about, source       what it is, and where its facts come from
     [file]                    delimiter, decimal, encoding, preamble, header, comment, missing, host
     [time]                    columns, format, zone
+    [rows]                    column, value: only rows whose cell is this text are read
     [channels.<channel>]      column, unit, gain, offset, range, convention, rotation, optional
     [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
                               accuracy-relative (all SI)
@@ -20,6 +21,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
+from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
 from flagdata.ingest.anemometer.stamps import EPOCH, pattern
 from flagdata.recipes import Shelf, parsed
@@ -90,7 +92,7 @@ class TimeLayout:
     Attributes:
         columns: names or numbers (from 1) of the columns that are joined with a blank; none where the host's stamp is
             all there is.
-        format: "iso", "epoch-s", "epoch-ms", or strptime directives (see stamps.py).
+        format: "iso", "epoch-s", "epoch-ms", strptime directives (see stamps.py), or a count (see counted.py).
         zone: of wall-clock stamps; `None` leaves it to the user.
     """
 
@@ -99,7 +101,9 @@ class TimeLayout:
     zone: str | None = None
 
     def __post_init__(self) -> None:
-        if self.columns and self.format not in EPOCH:
+        if self.columns and counted.is_time_of_day(self.format):
+            pattern(f"%Y-%m-%d {self.format}")
+        elif self.columns and self.format not in (*EPOCH, *counted.FORMS):
             pattern(self.format)
         if self.zone is not None:
             zone(self.zone, where="[time] zone")
@@ -137,6 +141,17 @@ class ChannelLayout:
         if self.convention not in ("from", "to"):
             where = f"column {self.column}"
             raise UsageError(f"convention {self.convention!r}", where=where, fix='give "from" or "to"')
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowsLayout:
+    """Which rows are read: those whose cell in `column` (name, or number from 1) is `value`.
+
+    For tables that list several sites or sensors one below the other.
+    """
+
+    column: str | int
+    value: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,6 +210,7 @@ class Recipe:
     sensor: Sensor
     quality: QualityRules = field(default_factory=QualityRules)
     checks: tuple[CheckLayout, ...] = ()
+    rows: RowsLayout | None = None
 
     def __post_init__(self) -> None:
         if not self.time.columns and not self.file.host:
@@ -210,6 +226,7 @@ class Recipe:
                     where=self.name, fix="correct the unit or the channel",
                 )  # fmt: skip
         named = [c.column for c in (*self.channels.values(), *self.checks)] + list(self.time.columns)
+        named += [self.rows.column] if self.rows is not None else []
         if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in named):
             raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
 
@@ -254,7 +271,7 @@ class _Reader:
         self.where = where
 
     def recipe(self) -> Recipe:
-        self._known(self.data, "the recipe", "name about source file time channels sensor quality check")
+        self._known(self.data, "the recipe", "name about source file time rows channels sensor quality check")
         text = {key: self._text(self.data, key, "the recipe") for key in ("name", "about", "source")}
         channels = self._table(self.data, "channels")
         return Recipe(
@@ -264,6 +281,7 @@ class _Reader:
             channels={name: self._channel(name, self._table(channels, name)) for name in channels},
             sensor=self._sensor(self._table(self.data, "sensor")),
             quality=self._quality(self._table(self.data, "quality")),
+            rows=self._rows(self._table(self.data, "rows")),
             checks=tuple(self._check(table) for table in self._typed(self.data, "check", list, [])),
         )  # fmt: skip
 
@@ -288,6 +306,14 @@ class _Reader:
             format=self._text(table, "format", "[time]"),
             zone=self._typed(table, "zone", str, None),
         )
+
+    def _rows(self, table: Mapping[str, Any]) -> RowsLayout | None:
+        self._known(table, "[rows]", "column value")
+        if not table:
+            return None
+        if "column" not in table:
+            raise InputError("no column", where="[rows]", fix="name the column or give its number (from 1)")
+        return RowsLayout(column=self._column(table["column"], "[rows]"), value=self._text(table, "value", "[rows]"))
 
     def _channel(self, name: str, table: Mapping[str, Any]) -> ChannelLayout:
         where = f"[channels.{name}]"

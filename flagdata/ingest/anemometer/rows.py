@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -18,6 +19,7 @@ from flagdata.ingest.anemometer.source import TextFile
 
 _PLAIN = ("utf-8", "utf-8-sig", "latin-1")
 """Encodings in which a byte of ASCII is that character wherever it stands."""
+_BLANK_CELL = re.compile(r'"([^"]*)"|([^\s"]+)')
 
 
 class RowReader:
@@ -49,11 +51,13 @@ class RowReader:
         if layout.header:
             names = head[layout.preamble].lstrip("\ufeff")
             self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
+            while len(self.header) > 1 and not self.header[-1]:
+                self.header.pop()
 
     def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
         """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
 
-        One empty cell more (a delimiter at the line's end) is allowed. Where the encoding lets bytes be cut, regular
+        Empty cells beyond (delimiters at the line's end) are allowed. Where the encoding lets bytes be cut, regular
         lines come as columns: see `columns`.
         """
         delimiter = self._layout.delimiter
@@ -86,7 +90,7 @@ class RowReader:
         where: list[int] = []
         for number, row in zip(looked, _cut(kept, self._layout.delimiter), strict=True):
             size = len(row)
-            fits = size == named or (size == (named or 0) + 1 and not row[-1].strip()) if named else size >= width
+            fits = size >= width if named is None else size == named or _only_empty_beyond(row, named)
             if fits and size >= width:
                 good.append(row)
                 where.append(number)
@@ -180,10 +184,21 @@ class RowReader:
         return tuple(found)
 
 
+def blank_cells(line: str) -> list[str]:
+    """Cells divided by runs of blanks; quotes bind where they are closed."""
+    if '"' not in line or line.count('"') % 2:
+        return line.split()
+    return [quoted or plain for quoted, plain in _BLANK_CELL.findall(line)]
+
+
+def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
+    return len(row) > named and not any(cell.strip() for cell in row[named:])
+
+
 def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:
     """Cells of each line. Quotes bind within a line; a line with an unclosed quote becomes one cell."""
     if delimiter == " ":
-        return [line.split() for line in lines]
+        return [blank_cells(line) for line in lines]
     if not any('"' in line for line in lines):
         return [line.split(delimiter) for line in lines]
     closed = [line if line.count('"') % 2 == 0 else "" for line in lines]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import possible
-from flagdata.ingest.anemometer.headings import described
+from flagdata.ingest.anemometer.exports import described
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile

@@ -44,8 +44,8 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     guesses = recognise(source)
     if guesses:
         return guesses
-    text = "text, but neither header, sentence nor stamp of a known log in its first lines"
-    fix = "describe it by a recipe: --recipe FILE.toml"
+    text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
+    fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
     return (Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix),)
 
 

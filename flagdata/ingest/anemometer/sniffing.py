@@ -19,7 +19,10 @@ class Guess:
         kind: which ingest it belongs to.
         recipe: the sensor recipe, for the format "delimited" and "host-stamped".
         fix: what to do next, where that is not to ingest it.
-        draft: a recipe to complete (TOML), for a table that no recipe describes.
+        draft: a recipe (TOML) for a table that no recipe describes; "?" stands where it is to be completed.
+        notes: what was left out, and what is odd.
+        doubts: what must be said before it can be read, each with how to say it.
+        winds: labels of the anemometers, where a draft tells them.
     """
 
     format: str
@@ -29,6 +32,9 @@ class Guess:
     recipe: str | None = None
     fix: str | None = None
     draft: str | None = None
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    winds: tuple[str, ...] = ()
 
 
 SURE = 0.5

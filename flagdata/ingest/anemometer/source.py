@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import codecs
+import gzip
+import io
+import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -18,9 +23,12 @@ _CHUNK = 1 << 20
 HEAD = 65_536
 """Bytes looked at to tell what a file is."""
 
+GZIP = b"\x1f\x8b"
+"""First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in it."""
+
 # First bytes → what it is, what to do. Signatures as in the formats' own specifications.
 _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
-    (0, b"\x1f\x8b", "gzip-compressed", "unpack it first: gunzip FILE"),
+    (0, GZIP, "gzip-compressed and damaged", "copy it again, or unpack it: gunzip FILE"),
     (0, b"PK\x03\x04", "a zip archive or an Excel workbook", "unpack it, or save the sheet as CSV"),
     (0, b"PK\x05\x06", "an empty zip archive", "give the log itself"),
     (0, b"\xfd7zXZ\x00", "xz-compressed", "unpack it first: unxz FILE"),
@@ -83,14 +91,14 @@ class TextFile:
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
         """Lines without their ends, `size` at a time, each block with the number (from 1) of its first line."""
         first = 1
-        with self.path.open(encoding=self.encoding, newline=None) as stream:
+        with _text(self.path, self.encoding) as stream:
             while lines := [line.rstrip("\n") for line in islice(stream, size)]:
                 yield first, lines
                 first += len(lines)
 
     def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
         """The file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a line."""
-        with self.path.open("rb") as stream:
+        with opened(self.path) as stream:
             rest = b""
             first = True
             while chunk := stream.read(size):
@@ -106,12 +114,25 @@ class TextFile:
 
     def head(self, count: int = 60) -> list[str]:
         """The first `count` lines."""
-        with self.path.open(encoding=self.encoding, newline=None) as stream:
+        with _text(self.path, self.encoding) as stream:
             return [line.rstrip("\n") for line in islice(stream, count)]
 
 
+def opened(path: Path) -> IO[bytes]:
+    """The bytes of a file, of one compressed by gzip those that are in it."""
+    with path.open("rb") as stream:
+        packed = stream.read(2) == GZIP
+    return gzip.open(path, "rb") if packed else path.open("rb")  # type: ignore[return-value]
+
+
+@contextmanager
+def _text(path: Path, encoding: str) -> Iterator[IO[str]]:
+    with opened(path) as raw, io.TextIOWrapper(raw, encoding=encoding, newline=None) as stream:
+        yield stream
+
+
 def first_bytes(path: Path) -> bytes:
-    """The first `HEAD` bytes of a file.
+    """The first `HEAD` bytes of a file; of one compressed by gzip, of what is in it.
 
     Raises:
         NotFoundError: there is none.
@@ -122,8 +143,10 @@ def first_bytes(path: Path) -> bytes:
     if path.is_dir():
         raise InputError("this is a folder, not a log", where=str(path), fix="give one file")
     try:
-        with path.open("rb") as stream:
+        with opened(path) as stream:
             head = stream.read(HEAD)
+    except (gzip.BadGzipFile, zlib.error, EOFError):
+        return GZIP
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions") from None
     if not head:
@@ -161,8 +184,13 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         )
     if codec is None or not codec.startswith(("utf-16", "utf-32")):
         _refuse_binary(head, where)
-    codec, problem = _settle(path, codec)
-    lines, findings = _count(path, limits, wide=codec.startswith(("utf-16", "utf-32")))
+    try:
+        codec, problem = _settle(path, codec, limits)
+        lines, findings = _count(path, limits, wide=codec.startswith(("utf-16", "utf-32")))
+    except (gzip.BadGzipFile, zlib.error, EOFError):
+        raise InputError(
+            "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
+        ) from None
     return TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
 
 
@@ -187,7 +215,7 @@ def _refuse_binary(head: bytes, where: str) -> None:
         )
 
 
-def _settle(path: Path, codec: str | None) -> tuple[str, tuple[Finding, ...]]:
+def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[Finding, ...]]:
     """The codec that decodes the whole file."""
     where = str(path)
     try:
@@ -198,10 +226,14 @@ def _settle(path: Path, codec: str | None) -> tuple[str, tuple[Finding, ...]]:
     if not text or info.incrementaldecoder is None:
         raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252")
     decoder = info.incrementaldecoder()
-    done = 0
-    with path.open("rb") as stream:
+    done = size = 0
+    with opened(path) as stream:
         try:
             while chunk := stream.read(_CHUNK):
+                size += len(chunk)
+                if size > limits.size:
+                    fix = "split it, or give read_log wider limits"
+                    raise LimitError(f"the file unpacks to more than {limits.size} bytes", where=where, fix=fix)
                 decoder.decode(chunk)
                 done += chunk.count(b"\n")
             decoder.decode(b"", final=True)
@@ -231,9 +263,11 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
     where = str(path)
     unix = windows = mac = nul = lines = tail = before = 0
     last = b""
-    with path.open("rb") as stream:
+    size = 0
+    with opened(path) as stream:
         while chunk := stream.read(_CHUNK):
             nul += chunk.count(0)
+            size += len(chunk)
             pairs = chunk.count(b"\r\n") + (last == b"\r" and chunk[:1] == b"\n")
             feeds, returns = chunk.count(b"\n"), chunk.count(b"\r")
             windows, unix, mac = windows + pairs, unix + feeds - pairs, mac + returns - pairs
@@ -264,7 +298,7 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
         found.append(
             Finding(kind="mixed-line-ends", severity=Severity.NOTE, what=f"line ends of several kinds: {text}")
         )
-    if nul and nul * 3 < path.stat().st_size:
+    if nul and nul * 3 < size:
         found.append(
             Finding(
                 kind="nul-bytes", severity=Severity.WARNING, count=nul,

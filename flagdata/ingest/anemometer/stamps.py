@@ -2,8 +2,8 @@
 
 Directives: %Y %y %m %d %j %H %I %p %M %S %b, and %f, which here stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "+02:00"), %p for "AM", "p.m." or a bare "a" or "p". A blank stands for any run of blanks
-or a "T". Two-digit years are 2000 to 2099.
+optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p". A blank stands
+for any run of blanks or a "T". Two-digit years are 2000 to 2099.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -29,12 +29,12 @@ _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
     "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)", "b": r"(?P<b>[A-Za-z]{3})",
-    "z": r"\s*(?P<z>Z|[+-]\d{2}:?\d{2})?",
+    "z": r"\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
-    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
+    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?$"
 )
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""
@@ -92,6 +92,7 @@ def pattern(form: str) -> str:
     if len(set(used)) < len(used):
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
     dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
+    dated = dated or {"y", "b", "d"} <= set(used)
     if not (dated or {"Y", "j"} <= set(used)) or not {"H", "I"} & set(used):
         raise UsageError("no whole date and hour in it", where=f"time format {form!r}", fix="name them all")
     return "^" + "".join(out) + "$"
@@ -250,10 +251,10 @@ def _offset(found: pa.StructArray, n: int) -> tuple[NDArray[np.int64], NDArray[n
     text = pc.coalesce(column, "")
     stated = pc.not_equal(text, "").to_numpy(zero_copy_only=False).astype(bool)
     for value in pc.unique(text).to_pylist():
-        if value in ("", "Z"):
+        if value in ("", "Z", "UTC", "GMT"):
             continue
         sign = -1 if value[0] == "-" else 1
-        minutes = int(value[1:3]) * 60 + int(value[-2:])
+        minutes = int(value[1:3]) * 60 + int(value[3:].lstrip(":") or 0)
         rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
         offset[rows] = sign * minutes * 60 * NANOSECONDS
     return offset, stated

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
@@ -10,21 +11,23 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, TimeError, UnknownNameError
+from flagdata.errors import InputError, TimeError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import possible
+from flagdata.ingest.anemometer import counted, possible, unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
+from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.stamps import YEARS, Stamps
-from flagdata.ingest.anemometer.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.wall import to_utc, zone_advice
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants
-from flagdata.timebase import zone
+from flagdata.timebase import NANOSECONDS, zone
 from flagdata.units import unit
 
+DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
+"""Channels whose unit is held against their values."""
 NEWEST_FIRST = 0.9
 """Share of rows older than the row before them from which a log is a list with the newest row on top."""
 
@@ -55,6 +58,14 @@ class Table:
 
     reading: Reading
     extra: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """What the user says about time beside the zone: the first row's instant [UTC ns], or its day."""
+
+    start: int | None = None
+    date: dt.date | None = None
 
 
 @dataclass
@@ -101,15 +112,22 @@ class _Clock:
     form: str
     columns: list[int]
     step: int = 2**62
+    bare_dates: int = 0
     ns: list[NDArray[np.int64]] = field(default_factory=list)
     utc: list[NDArray[np.bool_]] = field(default_factory=list)
 
     def parse(self, block: Block) -> Stamps:
         if len(self.columns) == 1:
-            return parse_stamps(_cells(block, self.columns[0]), self.form)
-        if isinstance(block, Columns):
-            return parse_stamps(block.joined(self.columns), self.form)
-        return parse_stamps([" ".join(row[i].strip() for i in self.columns) for row in block], self.form)
+            texts = _cells(block, self.columns[0])
+        elif isinstance(block, Columns):
+            texts = block.joined(self.columns)
+        else:
+            texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
+        if self.form in counted.FORMS or counted.is_time_of_day(self.form):
+            return counted.parse(texts, self.form)
+        stamps, bare = parse_with_bare_dates(texts, self.form)
+        self.bare_dates += bare
+        return stamps
 
     def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
         self.ns.append(stamps.ns[keep])
@@ -117,8 +135,8 @@ class _Clock:
         self.step = min(self.step, stamps.step)
 
     def stated(self) -> bool:
-        """Whether every stamp states its zone, as Unix times do."""
-        return all(bool(utc.all()) for utc in self.utc)
+        """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
+        return counted.is_elapsed(self.form) or all(bool(utc.all()) for utc in self.utc)
 
     def order(self) -> slice:
         """The rows from the oldest on, for logs that list the newest first."""
@@ -127,12 +145,25 @@ class _Clock:
         return slice(None, None, -1) if turned else slice(None)
 
     def instants(
-        self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str
+        self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
     ) -> tuple[Instants, tuple[Finding, ...]]:
         """The instants and what was found; the blocks are let go."""
         wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
         self.ns, self.utc = [], []
-        return instants(wall, utc, line=line, zone_name=zone_name, where=where)
+        if counted.is_elapsed(self.form):
+            return counted.since_start(wall, self.form, start=given.start, line=line, where=where)
+        found: tuple[Finding, ...] = ()
+        if counted.is_time_of_day(self.form):
+            wall, found = counted.on_days(wall, date=given.date, line=line, where=where)
+        elif given.start is not None or given.date is not None:
+            option = "--start" if given.start is not None else "--date"
+            raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
+        if self.bare_dates:
+            what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
+            bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)
+            found = (*found, bare)
+        time, further = instants(wall, utc, line=line, zone_name=zone_name, where=where)
+        return time, (*found, *further)
 
 
 @dataclass
@@ -144,6 +175,7 @@ class _Gathered:
     channels: dict[str, _Column]
     extra: dict[str, _Column]
     checks: list[_Check]
+    rows: int | None = None
     lines: list[NDArray[np.int64]] = field(default_factory=list)
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
@@ -153,9 +185,15 @@ class _Gathered:
 
     def width(self) -> int:
         """Cells a row must have."""
-        return 1 + max([*self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
+        only = [] if self.rows is None else [self.rows]
+        return 1 + max([*only, *self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
 
     def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
+        if self.rows is not None and recipe.rows is not None:
+            wanted = _among(block, self.rows, (recipe.rows.value,))
+            line, block = line[wanted], _where(block, wanted)
+            if not len(line):
+                return
         stamps = self.clock.parse(block)
         keep = stamps.valid
         if self.host is not None:
@@ -182,6 +220,13 @@ def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
     return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]
 
 
+def _where(block: Block, wanted: NDArray[np.bool_]) -> Block:
+    """The rows of a block that are wanted (n,)."""
+    if isinstance(block, Columns):
+        return block.where(wanted)
+    return [row for row, kept in zip(block, wanted.tolist(), strict=True) if kept]
+
+
 def _among(block: Block, index: int, values: Sequence[str]) -> NDArray[np.bool_]:
     """(n,) whether the trimmed cells of a column are among `values`."""
     if isinstance(block, Columns):
@@ -189,7 +234,15 @@ def _among(block: Block, index: int, values: Sequence[str]) -> NDArray[np.bool_]
     return np.array([row[index].strip() in values for row in block], dtype=bool)
 
 
-def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None, extra: Sequence[str] = ()) -> Table:
+def read_table(
+    rows: Rows,
+    recipe: Recipe,
+    *,
+    where: str,
+    zone_name: str | None,
+    extra: Sequence[str] = (),
+    given: Given | None = None,
+) -> Table:
     """Read cells by a recipe.
 
     Args:
@@ -197,8 +250,10 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         where: the file, for messages.
         zone_name: of wall-clock stamps; goes before the recipe's.
         extra: further columns to read, by name.
+        given: what the user says about stamps that are no dates.
 
     Raises:
+        UsageError: a start or date for stamps that have one.
         InputError: no such columns, or hardly a row that can be read.
         TimeError: stamps without a zone, or impossible ones.
     """
@@ -210,6 +265,7 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         channels={name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()},
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
         checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
+        rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
     )
     for line, block in rows.blocks(gathered.width()):
         gathered.add(line, block, recipe)
@@ -225,18 +281,24 @@ def read_table(rows: Rows, recipe: Recipe, *, where: str, zone_name: str | None,
         text = f"the stamps state their own zone: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
     zone_name = zone_name or recipe.time.zone
-    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where)
+    given = given or Given()
+    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
     host_time = None
     if gathered.host is not None:
-        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where)
+        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
     channels: dict[str, NDArray[np.float64]] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     for name, column in gathered.channels.items():
         layout, state = recipe.channels[name], column.state(order)
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
-        value = in_si(column.value(order), layout)
+        cells = column.value(order)  # NaN where a cell is no number
+        value = in_si(cells, layout)
+        if name in DOUBTED:
+            span = float(time.max() - time.min()) / NANOSECONDS
+            doubt = unitcheck.contradiction(cells * layout.gain, layout.unit, span=span, channel=name)
+            findings.extend([doubt] if doubt is not None else [])
         channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
         if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):

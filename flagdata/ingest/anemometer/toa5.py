@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.headings import Assigned, column_findings, known_unit, stamp_format
+from flagdata.ingest.anemometer.exports import Assigned, column_findings, known_unit, stamp_format
+from flagdata.ingest.anemometer.headings import fits, understand
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
@@ -144,6 +146,9 @@ class Toa5:
             channels[channel] = ChannelLayout(column=name, unit=spelled)
             taken[channel] = name
         if not {"wind_speed", "wind_x"} & set(channels):
+            channels.update(_by_heading(names, units, channels))
+            unread = [name for name in unread if name not in {layout.column for layout in channels.values()}]
+        if not {"wind_speed", "wind_x"} & set(channels):
             raise InputError(
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
                 fix=f"describe the file by a recipe; its columns are {', '.join(names)}",
@@ -174,6 +179,20 @@ def _channel(name: str) -> str | None:
         if re.fullmatch(pattern, name, re.IGNORECASE):
             return channel
     return None
+
+
+def _by_heading(names: list[str], units: list[str], known: Mapping[str, ChannelLayout]) -> dict[str, ChannelLayout]:
+    """Channels of fields whose names are of no known program, by what their words say; the first that fits."""
+    found: dict[str, ChannelLayout] = {}
+    for name, spelling in zip(names, units, strict=True):
+        heading = understand(name, spelling)
+        if not heading.channel or not heading.sure or heading.channel in {*known, *found}:
+            continue
+        if heading.unit is not None and fits(heading.channel, heading.unit):
+            found[heading.channel] = ChannelLayout(column=name, unit=heading.unit)
+    if {"wind_x", "wind_y"} <= set(found):
+        return found
+    return {channel: layout for channel, layout in found.items() if channel not in ("wind_x", "wind_y", "wind_z")}
 
 
 def _averaging(processing: str, time: Instants) -> float | None:

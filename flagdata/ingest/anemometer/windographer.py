@@ -10,7 +10,7 @@ import re
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.headings import Column, Export, assign, cut, read_export, split_unit, stamp_format
+from flagdata.ingest.anemometer.exports import Column, Export, assign, cut, read_export, split_unit, stamp_format
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import FileLayout, TimeLayout

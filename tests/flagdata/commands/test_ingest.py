@@ -67,7 +67,7 @@ def test_sniff_says_what_and_why_and_touches_no_lake(run, lake: Lake, video: Pat
     assert code == 0
     assert "camera: video" in out
     assert "100 frames at 50 Hz" in out
-    assert "generic-csv" in out
+    assert "wind_speed (m/s)" in out
     assert "because" in out
     code, out, _ = run("--sniff", video, "--json")
     assert code == 0
@@ -150,10 +150,10 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
         (["{log}", "--crop", "auto"], "--crop means nothing for an anemometer log"),
         (["{log}", "--true-fps", "1000"], "--true-fps means nothing"),
         (["{log}", "--archive", "h264"], "--archive means nothing"),
-        (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start means nothing"),
+        (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start is not used"),
         (["{video}", "--date-order", "dmy"], "--date-order means nothing for a camera file"),
         (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
-        (["{video}", "{log}", "--unit", "mm"], "--unit means nothing for a camera file or an anemometer log"),
+        (["{video}", "{log}", "--unit", "mm"], "'mm' is no unit of speed"),
         (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
         (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
         (["{video}", "--start", "2026-02-30T10:00:00Z"], "day is out of range"),
@@ -200,9 +200,13 @@ def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(run, l
     assert lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000  # 10:00 UTC, summer time
 
 
-def test_each_option_goes_to_the_sources_of_its_kind(run, lake: Lake, video: Path, wind_log: Path) -> None:
+def test_each_option_goes_to_the_sources_of_its_kind(
+    run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "mast.csv"
+    log.write_text(wind_log.read_text().replace(" (m/s)", "").replace(" (deg)", ""))
     code, _, err = run(
-        video, wind_log, "--sensor", "generic-csv", "--zero-offset", "report", "--zone", "Europe/Amsterdam",
+        video, log, "--sensor", "generic-csv", "--zero-offset", "report", "--zone", "Europe/Amsterdam",
         "--start", "2026-05-01T10:00:01Z", "--exposure", "0.01", "--archive", "h264",
     )  # fmt: skip
     assert code == 0, err

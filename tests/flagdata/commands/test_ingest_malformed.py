@@ -67,7 +67,7 @@ def _zipped(data: bytes) -> bytes:
     return out.getvalue()
 
 
-def _log(rows: list[str], header: str = "time,wind_speed") -> bytes:
+def _log(rows: list[str], header: str = "time,wind_speed (m/s)") -> bytes:
     return "\n".join([header, *rows, ""]).encode()
 
 

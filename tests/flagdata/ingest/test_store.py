@@ -153,7 +153,7 @@ delimiter = ","
 columns = ["time"]
 format = "iso"
 [channels.wind_speed]
-column = "wind_speed"
+column = "wind_speed (m/s)"
 unit = "{unit}"
 [sensor]
 name = "mine"
@@ -239,7 +239,7 @@ def test_a_log_over_the_attachment_limit_is_ingested_and_says_so(
     result = ingest_wind(lake, wind_log)
     assert "log-not-attached" in result.artifact.quality
     assert result.artifact.object is not None
-    assert Record.open(lake.object_path(result.artifact.object)).attachments == ()
+    assert Record.open(lake.object_path(result.artifact.object)).attachments == ("drafted.recipe.toml",)
 
 
 def test_a_crop_from_motion_is_attached_as_a_picture(lake: Lake, video: Path) -> None:

@@ -82,7 +82,7 @@ def _logs(folder: Path, count: int) -> list[Path]:
     for number in range(count):
         rows = [f"2026-05-01T12:00:{k:02d}Z,{4 + k % 17 / 10 + number / 1000:.3f}" for k in range(60)]
         path = folder / f"{number}.csv"
-        path.write_text("\n".join(["time,wind_speed", *rows, ""]))
+        path.write_text("\n".join(["time,wind_speed (m/s)", *rows, ""]))
         paths.append(path)
     return paths
 

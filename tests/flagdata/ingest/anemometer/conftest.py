@@ -28,12 +28,20 @@ def log_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
     return write
 
 
+def named(content: str | bytes, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options that name the recipe generic-csv for a log with its heading, as its user must: it states no unit."""
+    first = content[:200] if isinstance(content, str) else content.replace(b"\0", b"")[:200].decode("latin-1")
+    if "time,wind_speed" in first.partition("\n")[0] and not {"recipe", "format"} & set(options):
+        return {**options, "recipe": "generic-csv"}
+    return dict(options)
+
+
 @pytest.fixture
 def read(log_file: Callable[[str | bytes], Path]) -> Reader:
     """Reads text or bytes as a log."""
 
     def run(content: str | bytes, **options: object) -> WindLog:
-        return read_log(log_file(content), WindOptions(**options))  # type: ignore[arg-type]
+        return read_log(log_file(content), WindOptions(**named(content, options)))  # type: ignore[arg-type]
 
     return run
 
@@ -51,7 +59,7 @@ def check_refused(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
     ) -> None:
         path = log_file(content)
         with pytest.raises(FlagdataError) as caught:
-            read_log(path, WindOptions(**(options or {})))
+            read_log(path, WindOptions(**named(content, options or {})))
         assert isinstance(caught.value, error), caught.value
         assert caught.value.fix
         assert where in (caught.value.where or "")
@@ -74,7 +82,7 @@ def check_reported(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
         samples: int | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> None:
-        log = read_log(log_file(content), WindOptions(**(options or {})))
+        log = read_log(log_file(content), WindOptions(**named(content, options or {})))
         found = [f for f in log.findings if f.kind == finding]
         assert found, [f.kind for f in log.findings]
         assert count in (None, found[0].count)

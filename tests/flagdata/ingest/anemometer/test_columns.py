@@ -31,6 +31,7 @@ LAWS: dict[str, bytes] = {
     "a blank before a quote": b'1, "2",3\n4,5,6\n',
     "too few and too many": b"1,2\n4,5,6\n7,8,9,10\n1,1,1\n2,2,2\n",
     "an empty cell more": b"1,2,3,\n4,5,6,\n7,8,9\n10,11,12, \n1,2,3,4\n",
+    "several empty cells more": b"1,2,3,,\n4,5,6,,\n7,8,9\n10,11,12, ,\n1,2,3,,4\n1,2,3,4,\n,,,,\n",
     "blank lines": b"\n1,2,3\n   \n4,5,6\n\x1a\n",
     "delimiters alone": b",,\n1,2,3\n",
     "NUL bytes": b"1,2,3\n\0\0\0\n4,\0,6\n7,8,9\n" + 20 * b"10,11,12\n",

@@ -109,7 +109,7 @@ REFUSED = [
         id="other-delimiter",
     ),
     pytest.param(
-        {"content": csv(ROW, header="time,speed"), "error": InputError, "says": "known format"}, id="column-missing"
+        {"content": csv(ROW, header="time,speed"), "error": InputError, "says": "--unit"}, id="column-missing"
     ),
     pytest.param(
         {
@@ -143,10 +143,11 @@ REFUSED = [
         id="format-unknown",
     ),
     pytest.param(
-        {"content": csv(ROW), "error": UsageError, "options": {"format": "delimited"}}, id="format-without-recipe"
+        {"content": csv(ROW), "error": InputError, "says": "--unit", "options": {"format": "delimited"}},
+        id="format-without-recipe",
     ),
     pytest.param(
-        {"content": csv(ROW), "error": UsageError, "says": "no use for: date", "options": DATE},
+        {"content": csv(ROW), "error": UsageError, "says": "--date is not used", "options": DATE},
         id="option-of-another-format",
     ),
     pytest.param(

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, LimitError
+from flagdata.ingest.anemometer import Limits
 
 Check = Callable[..., None]
 
@@ -37,8 +38,17 @@ REFUSED = [
     pytest.param({"content": b"\n\n\n", "error": InputError, "says": "known format"}, id="only-newlines"),
     pytest.param({"content": b"\x00" * 4096, "error": InputError, "says": "NUL"}, id="only-nul"),
     pytest.param({"content": b"x", "error": InputError, "says": "known format"}, id="one-byte"),
-    pytest.param({"content": gzip.compress(csv(ROW)), "error": InputError, "says": "gunzip"}, id="gzip"),
-    pytest.param({"content": gzip.compress(b"\x00" * 20000000), "error": InputError, "says": "gunzip"}, id="gzip-bomb"),
+    pytest.param({"content": gzip.compress(csv(ROW))[:-9], "error": InputError, "says": "gunzip"}, id="gzip-cut-off"),
+    pytest.param({"content": gzip.compress(b"\x00" * 20000000), "error": InputError, "says": "NUL"}, id="gzip-of-nul"),
+    pytest.param(
+        {
+            "content": gzip.compress(csv(*[ROW] * 40_000)),
+            "error": LimitError,
+            "says": "unpacks to more than",
+            "options": {"limits": Limits(size=1_000_000)},
+        },
+        id="gzip-bomb",
+    ),
     pytest.param({"content": zipped(csv(ROW)), "error": InputError, "says": "zip archive"}, id="zip"),
     pytest.param({"content": zipped(b"0" * 20000000), "error": InputError, "says": "zip archive"}, id="zip-bomb"),
     pytest.param({"content": b"PK\x05\x06" + bytes(18), "error": InputError, "says": "empty zip"}, id="empty-zip"),

@@ -61,7 +61,7 @@ def trimmed(moment: dt.datetime) -> str:
 def test_a_written_csv_is_read_back(values: Sequence[float], step: int, offset: int) -> None:
     place = dt.timezone(dt.timedelta(minutes=offset))
     rows = [f"{instant(i * step).astimezone(place).isoformat()},{v}" for i, v in enumerate(values)]
-    log = read("\n".join(["time,wind_speed", *rows]).encode())
+    log = read("\n".join(["time,wind_speed", *rows]).encode(), WindOptions(recipe="generic-csv"))
     assert log.series.time.tolist() == times(len(values), step)
     assert log.series.channels["wind_speed"].tolist() == list(values)
 

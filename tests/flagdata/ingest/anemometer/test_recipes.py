@@ -161,7 +161,7 @@ def test_a_skywatch_style_export_is_told_and_read(read: Read) -> None:
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig", "utf-32"])
 def test_a_byte_order_mark_settles_the_encoding(log_file: Callable[[bytes], Path], encoding: str) -> None:
-    log = read_log(log_file("time,wind_speed\n2026-05-01T12:00:00Z,3.25\n".encode(encoding)))
+    log = read_log(log_file("time,wind_speed [m/s]\n2026-05-01T12:00:00Z,3.25\n".encode(encoding)))
     assert log.series.channels["wind_speed"].tolist() == [3.25]
     assert log.findings == ()
 
@@ -223,7 +223,7 @@ BAD: list[tuple[str, str, str, str]] = [
     ("file-key", "[time]", '[file]\ndelimeter = ","\n[time]', "did you mean 'delimiter'"),
     ("channel", "wind_speed]", "wind_sped]", "did you mean 'wind_speed'"),
     ("channel-key", 'unit = "m/s"', 'unit = "m/s"\ngian = 2', "did you mean 'gain'"),
-    ("unit", '"m/s"', '"m/sec"', "unknown unit"),
+    ("unit", '"m/s"', '"m/hour"', "unknown unit"),
     ("unit-of-another-quantity", '"m/s"', '"degC"', "measured in m/s"),
     ("zone", 'format = "iso"', 'format = "iso"\nzone = "Europe/Amsterdm"', "Europe/Amsterdam"),
     ("no-name", 'name = "mine"\nabout', "about", "no name"),

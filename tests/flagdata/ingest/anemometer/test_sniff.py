@@ -16,7 +16,7 @@ Write = Callable[..., Path]
 @pytest.mark.parametrize(
     ("content", "format_name", "recipe"),
     [
-        ("time,wind_speed\n2026-05-01T12:00:00Z,3\n", "delimited", "generic-csv"),
+        ("time,wind_speed [m/s]\n2026-05-01T12:00:00Z,3\n", "delimited", None),
         ('"TOA5","s","CR1000"\n"TIMESTAMP","RECORD","WS"\n', "toa5", None),
         ("$WIMWV,214.8,R,0.1,K,A*28\n", "nmea", None),
         ("Device Name;K\nDevice Model;5500\nTime;Wind Speed;Temp;Dir\nx;m/s;C;d\n", "kestrel", None),
@@ -41,7 +41,7 @@ def test_a_log_is_told_by_its_first_lines(log_file: Write, content: str, format_
     [
         (b"\x00\x00\x00\x18ftypmp42" + bytes(20), "video", "camera"),
         (b"RIFF\x00\x00\x00\x00AVI LIST", "video", "camera"),
-        (b"\x1f\x8b\x08" + bytes(20), "gzip-compressed", "other"),
+        (b"\x1f\x8b\x08" + bytes(20), "gzip-compressed and damaged", "other"),
         (b"\x89MCAP0\r\n", "an MCAP record", "record"),
         (b"The wind blew.\n", "unknown", "other"),
         (bytes(range(256)) * 20, "unknown", "other"),

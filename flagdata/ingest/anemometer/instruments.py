@@ -1,0 +1,347 @@
+"""The anemometers of a table: which columns belong to which, in which unit, and what was left out and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.ingest.anemometer import unitcheck
+from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
+from flagdata.ingest.anemometer.layout import Layout
+from flagdata.units import unit
+
+SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
+COMPONENTS = ("wind_x", "wind_y", "wind_z")
+_DIRECTION_OF = {name: name.replace("speed", "direction") for name in SPEEDS}
+_WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
+_PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
+"""Ranges of the air pressure by unit [in it]; they do not overlap."""
+_POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
+_SITES = frozenset(
+    {
+        "station", "site", "stid", "id", "sensor", "device", "node", "location", "logger", "mast", "turbine", "address",
+        "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
+    }
+)  # fmt: skip
+_UNREADABLE = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column for a channel: its index, its unit (`None` where nothing tells it), and how the unit is known."""
+
+    index: int
+    unit: str | None
+    told: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wind:
+    """One anemometer of a table.
+
+    Attributes:
+        label: what the user calls it by: the heading of its speed, or of its first component.
+        height: above ground [m], where the heading tells.
+        columns: by channel.
+        sure: whether the heading names the wind; false where only the unit or a lone "speed" speaks for it.
+        site: column and text of the rows that are its own, where a table mixes sites.
+    """
+
+    label: str
+    height: float | None
+    columns: Mapping[str, Column]
+    sure: bool
+    site: tuple[int, str] | None = None
+
+    def without_unit(self) -> tuple[str, ...]:
+        """Channels of the wind's speed whose unit nothing tells."""
+        return tuple(name for name in (*SPEEDS, *COMPONENTS) if name in self.columns and not self.columns[name].unit)
+
+
+@dataclass
+class _Found:
+    """Columns by what their heading says, with numbers in them."""
+
+    layout: Layout
+    headings: list[Heading]
+    values: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def of(self, *channels: str) -> list[int]:
+        return [index for index in self.values if self.headings[index].channel in channels]
+
+    def key(self, index: int) -> tuple[object, ...]:
+        heading = self.headings[index]
+        return (*heading.label, heading.height)
+
+    def name(self, index: int) -> str:
+        name = self.layout.names[index]
+        return f"{name}#{index + 1}" if self.layout.names.count(name) > 1 else name
+
+
+def find_winds(
+    layout: Layout, *, time: Sequence[int], told: str | None = None
+) -> tuple[tuple[Wind, ...], tuple[str, ...], tuple[str, ...]]:
+    """The anemometers of a table, remarks on what was not taken, and warnings of what is odd.
+
+    Args:
+        time: columns that are the time.
+        told: unit of the wind by the user's word; it goes before the heading's.
+    """
+    headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
+    found = _Found(layout=layout, headings=headings)
+    for index, heading in enumerate(headings):
+        if index in time or not heading.quantity:
+            continue
+        parsed = numbers(layout.column(index), decimal=layout.decimal)
+        if float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
+            found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
+        elif bool((parsed.state == Cell.NUMBER).any()):
+            found.values[index] = parsed.value
+        elif not heading.spread:
+            found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
+    winds = [*_speeds(found, told), *_components(found, told)]
+    winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
+    _check_gusts(found, winds)
+    return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+
+
+def named_wind(layout: Layout, column: str, *, told: str | None) -> Wind | None:
+    """The anemometer whose speed is in the column that the user names, by heading or number; `None` without such."""
+    indices = [index for index, name in enumerate(layout.names) if name == column]
+    if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
+        indices = [int(column) - 1]
+    if len(indices) != 1:
+        return None
+    stated = understand(layout.names[indices[0]], layout.units[indices[0]])
+    known = stated.unit if fits("wind_speed", stated.unit) else None
+    speed = Column(index=indices[0], unit=told or known, told="as you said")
+    return Wind(label=column, height=stated.height, columns={"wind_speed": speed}, sure=True)
+
+
+def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
+    """The column that tells sites apart whose rows share their stamps, and the sites in the first rows."""
+    if len(set(stamps)) == len(stamps):
+        return None
+    for index, name in enumerate(layout.names):
+        if index in time or not set(words_of(name)) & _SITES or understand(name).quantity:
+            continue
+        cells = layout.column(index)
+        kinds = sorted({cell for cell in cells if cell})
+        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
+        if 2 <= len(kinds) <= 50 and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+            return index, tuple(kinds)
+    return None
+
+
+def _column(found: _Found, index: int, channel: str, told: str | None) -> Column:
+    """A column of a speed with its unit."""
+    stated = found.headings[index].unit
+    stated = stated if fits(channel, stated) else None
+    if told is None or told == stated:
+        return Column(index=index, unit=stated, told="" if stated is None else f"in {stated} by its heading")
+    if stated is not None:
+        name = found.layout.names[index]
+        found.warnings.append(f"the heading of {name!r} states {stated}; taken as {told}, as you said")
+    return Column(index=index, unit=told, told=f"in {told}, as you said")
+
+
+def _speeds(found: _Found, told: str | None) -> list[Wind]:
+    groups: dict[tuple[object, ...], dict[str, list[int]]] = {}
+    for index in found.of(*SPEEDS):
+        groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, []).append(index)
+    named = [i for i in found.of(*SPEEDS) if found.headings[i].sure]
+    moving = {word for name in found.layout.names for word in words_of(name)} & _POSITIONS
+    winds: list[Wind] = []
+    for by_channel in groups.values():
+        if named and not any(found.headings[i].sure for indices in by_channel.values() for i in indices):
+            found.remarks.extend(
+                f"column {found.layout.names[i]!r} is in {found.headings[i].unit}, but nothing says that it is a wind"
+                for indices in by_channel.values() for i in indices
+            )  # fmt: skip
+            continue
+        kept = {channel: _distinct(found, indices) for channel, indices in by_channel.items()}
+        for at in range(max(map(len, kept.values()))):
+            speeds = {channel: indices[at] for channel, indices in kept.items() if at < len(indices)}
+            columns = {channel: _column(found, index, channel, told) for channel, index in speeds.items()}
+            first = next(iter(speeds.values()))
+            for channel, index in speeds.items():
+                towards = _direction(found, index, _DIRECTION_OF[channel])
+                if towards is not None:
+                    columns[towards[0]] = towards[1]
+            said = set(words_of(found.layout.names[first]))
+            lone = bool(said & {"speed", "spd", "velocity", "vel"}) and not any("wind" in word for word in said)
+            winds.append(Wind(
+                label=found.name(first), height=found.headings[first].height, columns=columns,
+                sure=found.headings[first].sure and not (lone and moving),
+            ))  # fmt: skip
+    return winds
+
+
+def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
+    """Of columns with the same words, those that are readings of their own: not another unit, not the mean of one."""
+    order = sorted(
+        indices, key=lambda i: (found.headings[i].unit is None, found.headings[i].mean, found.headings[i].unit != "m/s")
+    )
+    kept: list[int] = []
+    for index in order:
+        heading = found.headings[index]
+        same = next((other for other in kept if _same(found, index, other)), None)
+        if same is None:
+            kept.append(index)
+        else:
+            found.remarks.append(
+                f"column {heading.name!r} is {found.layout.names[same]!r} again, averaged or in another unit"
+            )
+    return sorted(kept)
+
+
+def _same(found: _Found, index: int, other: int) -> bool:
+    one, two = found.headings[index], found.headings[other]
+    if one.mean != two.mean:
+        return True
+    if one.unit is None or two.unit is None or one.unit == two.unit:
+        return False
+    ratio = found.values[index] * unit(one.unit).scale, found.values[other] * unit(two.unit).scale
+    return bool(np.nanmedian(np.abs(ratio[0] - ratio[1])) <= 0.1 * np.nanmedian(np.abs(ratio[0])) + 0.3)
+
+
+def _components(found: _Found, told: str | None) -> list[Wind]:
+    groups: dict[tuple[object, ...], dict[str, int]] = {}
+    for index in found.of(*COMPONENTS):
+        groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, index)
+    winds: list[Wind] = []
+    speeds = found.of("wind_speed")
+    for key, indices in groups.items():
+        if not {"wind_x", "wind_y"} <= set(indices):
+            continue
+        if any(found.key(index) == key for index in speeds):
+            names = ", ".join(found.layout.names[index] for index in indices.values())
+            found.remarks.append(f"components {names} are left out beside the speed")
+            continue
+        columns = {
+            channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices
+        }
+        first = indices["wind_x"]
+        winds.append(Wind(label=found.name(first), height=found.headings[first].height, columns=columns, sure=True))
+    return winds
+
+
+def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | None:
+    """The direction that belongs to a speed, as a channel and a column."""
+    candidates = found.of(channel)
+    exact = [index for index in candidates if found.key(index) == found.key(speed)]
+    height = found.headings[speed].height
+    near = [i for i in candidates if height is not None and found.headings[i].height is not None
+            and abs(float(found.headings[i].height or 0) - height) <= max(5.0, 0.15 * height)]  # fmt: skip
+    near.sort(
+        key=lambda i: (
+            abs(float(found.headings[i].height or 0) - float(height or 0)),
+            found.headings[i].label != found.headings[speed].label,
+        )
+    )
+    lone = candidates if len(candidates) == 1 else []
+    plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
+    chosen = exact or near[:1] or lone or plain
+    if not chosen:
+        if candidates:
+            names = ", ".join(repr(found.layout.names[i]) for i in candidates)
+            found.remarks.append(f"none of the directions {names} is surely that of {found.name(speed)!r}: left out")
+        return None
+    index = next((i for i in chosen if not found.headings[i].magnetic), chosen[0])
+    heading, value = found.headings[index], found.values[index]
+    known = value[np.isfinite(value)]
+    if heading.unit is not None and not fits(channel, heading.unit):
+        return None
+    if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
+        found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
+        return None
+    if (
+        heading.unit in (None, "deg")
+        and float(known.max()) <= 16
+        and bool(np.all(known % 1 == 0))
+        and len(np.unique(known)) > 3
+    ):
+        found.remarks.append(
+            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out"
+        )
+        return None
+    if heading.unit is None and float(np.abs(known).max()) <= 6.3:
+        found.remarks.append(f"column {heading.name!r} may be in degrees or radians: left out")
+        return None
+    if heading.magnetic and channel == "wind_direction":
+        channel = "wind_direction_magnetic"
+    told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
+    return channel, Column(index=index, unit=heading.unit or "deg", told=told)
+
+
+def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
+    """The anemometer with temperature, humidity and pressure, each where one column is surely it."""
+    columns = dict(wind.columns)
+    first = next(iter(columns.values())).index
+    for channel in _WEATHER:
+        candidates = found.of(channel)
+        if channel == "sonic_temperature" and "wind_x" not in columns:
+            candidates = [i for i in candidates if found.headings[i].sure]
+        if channel == "sonic_temperature" and "wind_x" in columns:
+            candidates += [i for i in found.of("air_temperature") if words_of(found.layout.names[i])[:1] == ["t"]]
+        if channel == "air_temperature" and "wind_x" in columns:
+            candidates = [i for i in candidates if words_of(found.layout.names[i])[:1] != ["t"]]
+        known = [(i, column) for i in candidates if (column := _weather(found, i, channel)) is not None]
+        exact = [item for item in known if found.key(item[0]) == found.key(first)]
+        plain = [item for item in known if not found.headings[item[0]].label and found.headings[item[0]].height is None]
+        chosen = exact if len(exact) == 1 else plain if len(plain) == 1 else known if len(known) == 1 else []
+        if chosen:
+            columns[channel] = chosen[0][1]
+        elif len(known) > 1 and not many:
+            names = ", ".join(repr(found.layout.names[i]) for i, _ in known)
+            found.remarks.append(f"which of {names} is {channel} is not told: left out")
+    return Wind(label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site)
+
+
+def _weather(found: _Found, index: int, channel: str) -> Column | None:
+    heading, value = found.headings[index], found.values[index]
+    median = float(np.nanmedian(value))
+    if fits(channel, heading.unit):
+        return Column(index=index, unit=heading.unit, told=f"in {heading.unit} by its heading")
+    guess: str | None = None
+    if heading.unit is None and channel == "relative_humidity" and 1.5 < float(np.nanmax(value)) <= 115:
+        guess = "%"
+    if heading.unit is None and channel == "air_pressure":
+        guess = next((name for name, low, high in _PRESSURES if low <= median <= high), None)
+    if heading.unit is None and channel == "sonic_temperature" and 230 <= median <= 330:
+        guess = "K"
+    if guess is None:
+        remark = f"column {heading.name!r} looks like {channel}, but its unit is not stated: left out"
+        if remark not in found.remarks:
+            found.remarks.append(remark)
+        return None
+    return Column(index=index, unit=guess, told=f"in {guess} by its values, about {median:.4g}")
+
+
+def _check_gusts(found: _Found, winds: Sequence[Wind]) -> None:
+    """Remark gusts whose ratio to the mean no wind has: their units differ."""
+    gusts = [
+        i for i in found.values
+        if found.headings[i].spread and found.headings[i].quantity == "wind_speed"
+        and set(words_of(found.layout.names[i])) & {"gust", "gusts", "max", "maximum", "windgust", "peak"}
+    ]  # fmt: skip
+    for wind in winds:
+        speed = wind.columns.get("wind_speed")
+        mine = [i for i in gusts if speed is not None and found.key(i) == found.key(speed.index)]
+        if speed is None or not mine:
+            continue
+        own, other = unit(speed.unit or "m/s").scale, unit(found.headings[mine[0]].unit or speed.unit or "m/s")
+        if other.si != "m/s":
+            continue
+        ratio = unitcheck.gust_factor(found.values[speed.index] * own, found.values[mine[0]] * other.scale)
+        if ratio is not None:
+            found.warnings.append(
+                f"gusts {found.layout.names[mine[0]]!r} are {ratio:.2g} times the wind {wind.label!r}, which no wind "
+                "is: one of the two is in another unit"
+            )

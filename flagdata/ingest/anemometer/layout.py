@@ -1,0 +1,274 @@
+"""How an unknown table is laid out: its delimiter, where its rows begin, and which line names the columns."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from flagdata.ingest.anemometer.recipe import MISSING
+from flagdata.ingest.anemometer.rows import blank_cells
+from flagdata.units import spelled
+
+TAIL = 200
+"""Lines at the end of those looked at by which the delimiter is told; half of them where the file is short."""
+_CANDIDATES = (";", "\t", ",", "|", " ")
+_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
+_STAMP = re.compile(
+    r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,]+\d{1,2}(:\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
+    r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?)?"
+)
+_MONTH_STAMP = re.compile(r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*")
+_MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
+_MISSING = frozenset({*MISSING, "nan.", "inf", "-inf", "m", "///", "////"})
+_UNITS_OF_OTHERS = frozenset(
+    {
+        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
+        "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
+    }
+)  # fmt: skip
+"""What stands in a line of units below times, counts and quantities that are not read."""
+_HEADING_LINES = 10
+"""Lines that the heading, its units and blank lines below it may take."""
+
+CellKind = Literal["number", "stamp", "missing", "text"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """A table as its first lines show it.
+
+    Attributes:
+        delimiter: between cells; " " stands for any run of blanks.
+        decimal: "." or ",".
+        preamble: lines before the one that names the columns, or before the first row where none does.
+        header: lines from the one that names the columns to the last one before the rows; 0 where none does.
+        names: of the columns, as many as a row has cells; "" where there is none.
+        units: below the names, as many, "" where there is none.
+        by_name: whether a recipe can find the columns by these names (else by number).
+        rows: the first rows, each of as many cells.
+        lines: of `rows`, counted from 1.
+        strange: what of the heading is not understood.
+    """
+
+    delimiter: str
+    decimal: Literal[".", ","]
+    preamble: int
+    header: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    by_name: bool
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+    strange: tuple[str, ...] = ()
+
+    def column(self, index: int) -> list[str]:
+        """Cells of a column, trimmed."""
+        return [row[index].strip() for row in self.rows]
+
+    def number_of_columns(self) -> int:
+        return len(self.names)
+
+
+def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout | None:
+    """The table that `lines` hold, if any: at least two columns, of which a number of rows agree.
+
+    Args:
+        lines: the beginning of the file.
+        interest: how much a cell looks like the heading of a time or a wind, to tell the line of names.
+    """
+    filled = [(number, line) for number, line in enumerate(lines) if line.strip(" \t\x00\x1a")]
+    tail = min(TAIL, max(1, len(filled) // 2))
+    delimiter = _delimiter([line for _, line in filled[-tail:]])
+    if delimiter is None:
+        return None
+    table = [(number, cut(line, delimiter)) for number, line in filled]
+    width = _width([cells for _, cells in table[-tail:]])
+    typed = _typed([cells for _, cells in table[-tail:] if len(_trimmed(cells, width)) == width], width)
+    if width < 2 or not typed:
+        return None
+    fits = [_is_row(cells, width, typed) for _, cells in table]
+    first = next((at for at in range(len(table)) if fits[at] and _mostly(fits[at : at + 20])), None)
+    if first is None:
+        return None
+    start = table[first][0]
+    kept = [(number, _trimmed(cells, width)) for (number, cells), fit in zip(table, fits, strict=True) if fit]
+    kept = [(number, cells) for number, cells in kept if number >= start]
+    rows = tuple(tuple(cells) for _, cells in kept)
+    full = Counter(len(cells) for (_, cells), fit in zip(table, fits, strict=True) if fit).most_common(1)[0][0]
+    names, units, at, by_name, strange = _heading(lines, start, delimiter, (width, full), interest)
+    decimal: Literal[".", ","] = "," if delimiter != "," and _decimal_commas(rows) else "."
+    return Layout(
+        delimiter=delimiter, decimal=decimal, preamble=start if at is None else at,
+        header=0 if at is None else start - at, names=names, units=units, by_name=by_name, rows=rows,
+        lines=tuple(number + 1 for number, _ in kept), strange=strange,
+    )  # fmt: skip
+
+
+def cut(line: str, delimiter: str) -> list[str]:
+    """Cells of one line, trimmed; quotes bind where they are closed."""
+    if delimiter == " ":
+        return blank_cells(line)
+    if '"' in line and line.count('"') % 2 == 0:
+        return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")], delimiter=delimiter), [])]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def cell_kind(cell: str) -> CellKind:
+    """What a cell seems to hold."""
+    text = cell.strip().strip('"').strip()
+    if text.lower() in _MISSING:
+        return "missing"
+    if _NUMBER.fullmatch(text):
+        return "number"
+    if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text):
+        return "stamp"
+    return "text"
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell of a line of units spells one; brackets are looked through."""
+    bare = text.strip().strip("[]()<>").strip()
+    return bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
+
+
+def _delimiter(lines: Sequence[str]) -> str | None:
+    """The delimiter that cuts most lines into equally many cells of which most are numbers or stamps."""
+    best: tuple[float, str] | None = None
+    for delimiter in _CANDIDATES:
+        table = [cut(line, delimiter) for line in lines]
+        width = _width(table)
+        rows = [_trimmed(cells, width) for cells in table]
+        rows = [cells for cells in rows if len(cells) == width]
+        if width < 2 or not rows:
+            continue
+        kinds = Counter(cell_kind(cell) for cells in rows for cell in cells)
+        known = sum(kinds.values()) - kinds["missing"]
+        clean = (kinds["number"] + kinds["stamp"]) / known if known else 0.0
+        score = clean * len(rows) / len(lines)
+        # Blanks also stand inside a stamp: a delimiter that does as well goes before them.
+        if best is None or score > best[0] + (0.05 if delimiter == " " else 0.0):
+            best = (score, delimiter)
+    return best[1] if best is not None and best[0] > 0.1 else None
+
+
+def _width(table: Sequence[Sequence[str]]) -> int:
+    """The usual number of cells, less those at the end that are always empty."""
+    counts = Counter(len(cells) for cells in table)
+    if not counts:
+        return 0
+    usual = max(counts.items(), key=lambda item: (item[1], item[0]))[0]
+    rows = [cells for cells in table if len(cells) == usual]
+    width = usual
+    while width > 1 and all(not cells[width - 1].strip() for cells in rows):
+        width -= 1
+    return width
+
+
+def _trimmed(cells: Sequence[str], width: int) -> list[str]:
+    """A row without empty cells beyond `width`."""
+    kept = list(cells)
+    while len(kept) > width and not kept[-1].strip():
+        kept.pop()
+    return kept
+
+
+def _typed(rows: Sequence[Sequence[str]], width: int) -> list[int]:
+    """Columns that hold numbers or stamps in nine rows of ten, missing cells apart."""
+    found: list[int] = []
+    for index in range(width):
+        kinds = Counter(cell_kind(row[index]) for row in rows)
+        if kinds["number"] + kinds["stamp"] and kinds["text"] <= 0.1 * (len(rows) - kinds["missing"]):
+            found.append(index)
+    return found
+
+
+def _is_row(cells: Sequence[str], width: int, typed: Sequence[int]) -> bool:
+    row = _trimmed(cells, width)
+    if len(row) != width:
+        return False
+    kinds = Counter(cell_kind(row[index]) for index in typed)
+    return kinds["number"] + kinds["stamp"] > 0 and kinds["text"] <= 0.2 * (len(typed) - kinds["missing"])
+
+
+def _mostly(fits: Sequence[bool]) -> bool:
+    return sum(fits) >= 0.8 * len(fits)
+
+
+def _decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
+    return any(re.fullmatch(r"[-+]?\d+,\d+", cell.strip()) for row in rows for cell in row)
+
+
+def _heading(
+    lines: Sequence[str], start: int, delimiter: str, widths: tuple[int, int], interest: Callable[[str], int]
+) -> tuple[tuple[str, ...], tuple[str, ...], int | None, bool, tuple[str, ...]]:
+    """Names and units of the columns, the index of the line of names, whether it can be read as a recipe reads it.
+
+    Args:
+        widths: cells of a row, without and with those at its end that are always empty.
+    """
+    width = widths[0]
+    nothing = ("",) * width
+    candidates: list[tuple[int, list[str], bool]] = []
+    strange: list[str] = []
+    for number in range(start - 1, max(-1, start - 1 - _HEADING_LINES), -1):
+        line = lines[number].lstrip("\ufeff")
+        if not re.sub(r"[\s,;|]", "", line):
+            continue
+        cells, plain = _names(line, delimiter, *widths)
+        if cells is None:
+            if not candidates and any(interest(cell) for cell in cut(_MARK.sub("", line), delimiter)):
+                count = len(cut(_MARK.sub("", line), delimiter))
+                strange.append(f"line {number + 1} seems to name columns, but {count} for {width} cells a row")
+            if candidates:
+                break
+            continue
+        candidates.append((number, cells, plain))
+    if not candidates:
+        return nothing, nothing, None, False, tuple(strange)
+    scored = [(sum(map(interest, cells)), number, cells, plain) for number, cells, plain in candidates]
+    worded = [item for item in scored if _worded(item[2])]
+    if not worded:
+        return nothing, nothing, None, False, tuple(strange)
+    _, at, names, plain = max(worded, key=lambda item: (item[0], -item[1]))
+    units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), list(nothing))
+    # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
+    by_name = plain and len(lines[at]) > 0
+    return tuple(names), tuple(units), at, by_name, ()
+
+
+def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] | None, bool]:
+    """Cells of a line of names that fit `width`, and whether a recipe would cut it like this."""
+    plain = _trimmed(cut(line, delimiter), width)
+    if len(plain) == full > width:
+        return plain[:width], not _MARK.match(line)
+    if len(plain) == width and not _MARK.match(line):
+        return plain, True
+    bare = _MARK.sub("", line.strip())
+    ways = [cut(bare, delimiter), re.split(r"\t+|\s{2,}", bare), *(cut(bare, other) for other in (",", ";", "\t", " "))]
+    for way in ways:
+        cells = _trimmed(way, width)
+        if len(cells) == width:
+            return cells, False
+        # R writes the heading of its row names not at all.
+        if len(cells) == width - 1 and len(cells) > 1 and not any(cell_kind(c) == "missing" for c in cells):
+            return ["", *cells], False
+    # A title that a spreadsheet padded, or a heading that its writer did not pad.
+    if delimiter != " " and 1 < len(plain) < width and sum(map(bool, plain)) > 0.6 * width:
+        return [*plain, *[""] * (width - len(plain))], False
+    return None, False
+
+
+def _worded(cells: Sequence[str]) -> bool:
+    """Whether a line can name columns: most cells are filled, with words, not numbers."""
+    filled = [cell for cell in cells if cell]
+    words = [cell for cell in filled if cell_kind(cell) in ("text", "missing")]
+    return len(filled) >= 0.6 * len(cells) and len(words) >= 0.8 * len(filled)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    return bool(filled) and sum(map(is_unit, filled)) >= 0.5 * len(filled)

@@ -1,0 +1,42 @@
+"""The anemometers of one file, each of which becomes an artifact, and what a file is with what the user says of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flagdata.ingest.anemometer.delimited import drafted, guess, sites
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.sniff import recognise
+from flagdata.ingest.anemometer.sniffing import Guess
+from flagdata.ingest.anemometer.source import open_text
+
+
+def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[str, ...]:
+    """Labels of the anemometers of a table that no recipe describes, where it holds several; else none.
+
+    Each can be read by itself: `read_log(path, replace(options, wind=label))`.
+
+    Raises:
+        FlagdataError: the file cannot be read as text.
+    """
+    options = options or WindOptions()
+    if options.wind is not None or options.recipe is not None or options.format not in (None, "delimited"):
+        return ()
+    source = open_text(Path(path), limits=options.limits, encoding=options.encoding)
+    if options.format is None:
+        guesses = recognise(source)
+        if not guesses or guesses[0].format != "delimited" or guesses[0].recipe is not None:
+            return ()
+    proposal = drafted(source, options)
+    labels = sites(source, proposal) if proposal is not None else ()
+    return labels if len(labels) > 1 else ()
+
+
+def completed(path: Path | str, options: WindOptions) -> Guess | None:
+    """The guess at a table that no recipe describes, with the unit, anemometer and date order that the user names.
+
+    Raises:
+        FlagdataError: the file cannot be read as text.
+    """
+    proposal = drafted(open_text(Path(path), limits=options.limits, encoding=options.encoding), options)
+    return None if proposal is None else guess(proposal)

@@ -1,0 +1,314 @@
+"""Which columns of an unknown table are its time, in what format, and in which zone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from flagdata.errors import TimeError
+from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.dates import decide
+from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
+from flagdata.ingest.anemometer.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.stamps import Stamps
+
+_SHARE = 0.9
+"""Share of rows that must fit for a column to be what it seems."""
+_CLOCKS = (
+    "%H:%M:%S%f",
+    "%H:%M",
+    "%I:%M:%S %p",
+    "%I:%M %p",
+    "%I:%M:%S%p",
+    "%I:%M%p",
+    "%H%M%S",
+    "%H%M",
+    "%H.%M.%S",
+    "%H",
+)
+_MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
+_DATE = re.compile(
+    r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
+)
+_CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$")
+_STAMPLIKE = re.compile(
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
+)
+"""What a cell must have in it to be a date and a time."""
+_PARTS: tuple[tuple[str, str, int, int], ...] = (
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hr|hour|stunde", 0, 23),
+    ("%M", r"mi|min|mm|minute|m", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeChoice:
+    """The time of a table.
+
+    Attributes:
+        columns: their indices; they are joined with a blank.
+        form: as in a recipe's [time] format; `None` where two are possible.
+        zone: that the heading states; `None` where it states none.
+        zoned: whether the stamps state their zone themselves.
+        doubt: what the rows do not tell; `None` where nothing is in doubt.
+        fix: what the user can say.
+        score: how well it fits, for the choice among several.
+    """
+
+    columns: tuple[int, ...]
+    form: str | None
+    zone: str | None
+    zoned: bool
+    score: float
+    doubt: str | None = None
+    fix: str | None = None
+
+
+def find_time(layout: Layout, *, order: Literal["dmy", "mdy"] | None = None) -> TimeChoice | None:
+    """The columns that are the time; `None` where there are none.
+
+    Args:
+        order: of dates written with numbers only, as the user says.
+    """
+    best: TimeChoice | None = None
+    for choice in _choices(layout, order):
+        if best is None or choice.score > best.score + 1e-9:
+            best = choice
+    return best
+
+
+def _choices(layout: Layout, order: Literal["dmy", "mdy"] | None) -> Iterator[TimeChoice]:
+    columns = [layout.column(index) for index in range(layout.number_of_columns())]
+    if layout.decimal == ",":
+        columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
+    dates, clocks = [], []
+    for index, cells in enumerate(columns):
+        texts = [cell for cell in cells if cell]
+        if not texts:
+            continue
+        if _share(_DATE, texts):
+            dates.append(index)
+        elif _share(_CLOCK, texts) or (words_of(layout.names[index])[:1] in (["time"], ["hhmm"], ["hhmmss"], ["hour"])
+                                       and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
+            clocks.append(index)
+        found = _whole(layout, (index,), texts, order)
+        if found is not None:
+            yield found
+    for date in dates:
+        for clock in clocks:
+            if clock == date:
+                continue
+            texts = [f"{a} {b}" for a, b in zip(columns[date], columns[clock], strict=True) if a and b]
+            found = _whole(layout, (date, clock), texts, order) if texts else None
+            if found is not None:
+                yield found
+    parts = _parts(layout, columns)
+    if parts is not None:
+        yield parts
+    for index in clocks:
+        texts = [cell for cell in columns[index] if cell]
+        for form in _CLOCKS[:4]:
+            if _fits(counted.parse(texts, form)):
+                yield _choice(layout, (index,), form, counted.parse(texts, form), 1.0)
+                break
+    for index, cells in enumerate(columns):
+        yield from _counts(layout, index, [cell for cell in cells if cell])
+
+
+def _share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:
+    return sum(1 for text in texts if shape.match(text)) >= _SHARE * len(texts)
+
+
+def _fits(found: Stamps) -> bool:
+    return bool(len(found.valid)) and float(found.valid.mean()) >= _SHARE
+
+
+def _choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, score: float) -> TimeChoice:
+    names = [layout.names[index] for index in columns]
+    zones = [zone for name in (*names, *(layout.units[index] for index in columns)) if (zone := zone_of(name))]
+    zoned = bool(found.utc[found.valid].all())
+    ns = found.ns[found.valid]
+    varied = len(np.unique(ns)) / len(ns) if len(ns) > 1 else 1.0
+    words = {word for name in names for word in words_of(name)}
+    score += (0.6 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
+    score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & {"gust", "max", "min", "created", "updated", "start"})
+    return TimeChoice(
+        columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score
+    )
+
+
+def _whole(
+    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Literal["dmy", "mdy"] | None
+) -> TimeChoice | None:
+    """Date and time in `texts`."""
+    if not any(_STAMPLIKE.search(text) for text in texts[:5]):
+        return None
+    for form in ("iso", "epoch-s", "epoch-ms"):
+        found, _ = parse_with_bare_dates(texts, form)
+        if _fits(found):
+            return _choice(layout, columns, form, found, 2.0)
+    for form in ("epoch-us", "epoch-ns"):
+        found = counted.parse(texts, form)
+        if _fits(found):
+            return _choice(layout, columns, form, found, 2.0)
+    shape = next(re.sub(r"\d", "0", text.strip()) for text in texts if text.strip())
+    zoned = "%z" if re.search(r"(Z|UTC|GMT|[+-]00(:?00)?)$", shape) and len(shape) > 12 else ""
+    for form in _compact(shape):
+        found, _ = parse_with_bare_dates(texts, form + zoned)
+        if _fits(found):
+            return _choice(layout, columns, form + zoned, found, 2.0)
+    if re.search("[A-Za-z]{3}", shape):
+        if cell_kind(texts[0]) != "stamp":
+            return None
+        return _with_month_names(layout, columns, texts, zoned)
+    try:
+        date = decide(texts, told=order, where="")
+    except TimeError as error:
+        if "may be" not in error.what:
+            return None
+        found = next((f for f in _dated(texts, "%d", "%m", zoned) if f is not None), None)
+        if found is None:
+            return None
+        form, stamps = found
+        swapped = form.replace("%d", "%x").replace("%m", "%d").replace("%x", "%m")
+        chosen = _choice(layout, columns, form, stamps, 2.0)
+        return TimeChoice(
+            columns=columns, form=None, zone=chosen.zone, zoned=chosen.zoned, score=chosen.score,
+            doubt=f"dates may be {form!r} or {swapped!r}, and nothing in the first rows tells which",
+            fix="say which number is the day: --date-order dmy or mdy",
+        )  # fmt: skip
+    for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in _CLOCKS):
+        found, _ = parse_with_bare_dates(texts, form)
+        if _fits(found):
+            return _choice(layout, columns, form, found, 2.0)
+    return None
+
+
+def _gaps(shape: str) -> tuple[str, ...]:
+    """What may stand between date and time."""
+    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;-])0", shape)
+    return (found[1],) if found else (" ",)
+
+
+def _dated(texts: Sequence[str], first: str, second: str, zoned: str) -> Iterator[tuple[str, Stamps] | None]:
+    parts = re.match(r"\s*\d{1,2}([-/.])\d{1,2}[-/.](\d{4}|\d{2})(?!\d)", texts[0])
+    if parts is None:
+        return
+    year = "%Y" if len(parts[2]) == 4 else "%y"
+    for clock in _CLOCKS:
+        form = f"{first}{parts[1]}{second}{parts[1]}{year} {clock}{zoned}"
+        found, _ = parse_with_bare_dates(texts, form)
+        yield (form, found) if _fits(found) else None
+
+
+def _compact(shape: str) -> tuple[str, ...]:
+    """Formats of stamps without signs between their numbers, by the number of digits."""
+    bare = re.sub(r"(Z|UTC|GMT)$", "", shape)
+    forms = {
+        "00000000000000": "%Y%m%d%H%M%S%f", "000000000000": "%Y%m%d%H%M", "00000000T000000": "%Y%m%d %H%M%S%f",
+        "00000000 000000": "%Y%m%d %H%M%S", "00000000 0000": "%Y%m%d %H%M", "00000000 00:00:00": "%Y%m%d %H:%M:%S%f",
+        "00000000T0000": "%Y%m%d %H%M", "00000000_000000": "%Y%m%d_%H%M%S", "00000000 00:00": "%Y%m%d %H:%M",
+        "00000000-000000": "%Y%m%d-%H%M%S",
+    }  # fmt: skip
+    known = forms.get(bare.split(".")[0])
+    return (known,) if known else ()
+
+
+def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
+    dates = [form.format(s=sign) for sign in "- /" for form in _MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
+    for form in (f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in _CLOCKS[:6]):
+        found, _ = parse_with_bare_dates(texts[:20], form)
+        if _fits(found):
+            return _choice(layout, columns, form, found, 2.0)
+    return None
+
+
+def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
+    names = [" ".join(words_of(name)) for name in layout.names]
+    for index, name in enumerate(names):
+        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr)( utc)?", name) or not _whole_numbers(columns[index], 1990, 2100):
+            continue
+        chosen, form = [index], "%Y"
+        at = index + 1
+        if at < len(names) and re.fullmatch(r"doy|jday|julian|jd|day of year|j day|julian day|yday", names[at]):
+            if _part_at(names, columns, at + 1, _PARTS[0]) and _part_at(names, columns, at + 2, _PARTS[1]):
+                at += 1
+            else:
+                chosen, form, at = [index, at], "%Y %j", at + 1
+        for part in _PARTS if form == "%Y" else _PARTS[2:]:
+            if not _part_at(names, columns, at, part):
+                break
+            chosen, form, at = [*chosen, at], f"{form} {part[0]}", at + 1
+        if "%H" not in form:
+            continue
+        texts = [" ".join(cells) for cells in zip(*(columns[i] for i in chosen), strict=True)]
+        found, _ = parse_with_bare_dates(texts, form)
+        if _fits(found):
+            return _choice(layout, tuple(chosen), form, found, 2.2)
+    return None
+
+
+def _part_at(names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]) -> bool:
+    if at >= len(names):
+        return False
+    return bool(re.fullmatch(rf"({part[1]})( utc)?", names[at])) and _whole_numbers(columns[at], part[2], part[3])
+
+
+def _whole_numbers(cells: Sequence[str], low: int, high: int) -> bool:
+    value = numbers(cells).value
+    known = value[np.isfinite(value)]
+    return len(known) >= _SHARE * len(cells) > 0 and bool(np.all((known >= low) & (known <= high)))
+
+
+def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice]:
+    """Serial days, and counts since a start."""
+    name = layout.names[index]
+    parsed = numbers(texts)
+    if not texts or float((parsed.state == Cell.NUMBER).mean()) < _SHARE:
+        return
+    value = parsed.value[parsed.state == Cell.NUMBER]
+    steps = np.diff(value)
+    if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
+        return
+    words = words_of(name)
+    if names_time(name) and float(steps.max()) < 400:
+        for form, low, high in (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
+            if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
+                yield _choice(layout, (index,), form, counted.parse(texts, form), 1.5)
+                return
+    told = (*words, *words_of(layout.units[index]))
+    form = next((form for form, known in _COUNTERS if set(told) & known), None)
+    if form is None and not (names_time(name) or words[:1] == ["t"]):
+        return
+    if value[0] < 0 or value[-1] * _SECONDS[form or "elapsed-ms"] > 3.2e8:
+        return
+    found = counted.parse(texts, form or "elapsed-s")
+    choice = _choice(layout, (index,), form or "elapsed-s", found, 0.2)
+    if form is None:
+        usual = float(np.median(steps[steps > 0]))
+        unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"
+        yield TimeChoice(
+            columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1,
+            doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated (likely {unit})",
+            fix=f'save the draft, complete format = "elapsed-s" or "elapsed-ms" (likely elapsed-{unit}), and name it: '
+            "--recipe FILE.toml --start TIME",
+        )  # fmt: skip
+        return
+    yield choice
+
+
+_COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
+    ("elapsed-ms", frozenset({"ms", "millis", "milliseconds", "millisecond", "msec", "msecs"})),
+    ("elapsed-us", frozenset({"us", "micros", "microseconds", "usec", "µs", "μs"})),
+    ("elapsed-min", frozenset({"minutes", "mins", "minute"})),
+    ("elapsed-s", frozenset({"s", "sec", "secs", "second", "seconds"})),
+)
+_SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0}
+"""Seconds a count."""

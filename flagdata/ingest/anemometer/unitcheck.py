@@ -1,0 +1,150 @@
+"""Which unit the numbers of a wind speed speak for, and whether they contradict the one that is stated.
+
+Three kinds of evidence:
+
+- *Resolution.* A logger that measures in whole mph (or tenths of m/s, knots …) and writes another unit writes multiples
+  of the converted step: 1.6, 3.2, 4.8 km/h. That n distinct values all lie on such a grid of step g by chance, within a
+  tolerance t, has the probability (2 t / g)^n; below `CHANCE` it is evidence of the unit they are written in.
+- *Range.* The windiest station known, Cape Denison, has an annual mean of 19.4 m/s (Mawson 1915): a log of a day or
+  more whose median is above `WINDY` is more likely in another unit.
+- *Gust factor.* Gusts of 3 s within 10 minutes are 1.23 (at sea) to 1.66 (on land) times the mean (Harper et al. 2010,
+  WMO/TD-No. 1555, table 1.1), in light wind up to 3 times; another ratio shows that the two are in different units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding, Severity
+from flagdata.units import unit
+
+CHANCE = 1e-4
+"""Probability by chance below which a grid is evidence."""
+WINDY = 12.0
+"""Median of a day or more [m/s] above which a unit is doubted."""
+FASTEST = 60.0
+"""Speed [m/s] above which a value, other than a gust, is doubted; hurricanes of category 4 begin at 58 m/s."""
+DAY = 86_400.0
+_STEPS: tuple[tuple[str, tuple[float, ...]], ...] = (
+    ("mph", (1.0, 0.5, 0.1)), ("kn", (1.0, 0.5, 0.1)), ("km/h", (1.0, 0.1)), ("m/s", (1.0, 0.5, 0.1)),
+)  # fmt: skip
+_SHOWN = ("m/s", "km/h", "mph", "kn")
+_GUSTS = (1.0, 3.2)
+_FACTOR = 6e-4
+"""Relative error of the factors that loggers convert with (0.447, 0.514, 1.609)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What the values say: the unit they are likely in, and why."""
+
+    unit: str
+    reason: str
+
+
+def from_resolution(values: NDArray[np.float64]) -> Evidence | None:
+    """The unit that values are written in, where they are multiples of a converted step; `None` where they are not.
+
+    Args:
+        values: (n,) as written, NaN where missing.
+    """
+    known = np.unique(values[np.isfinite(values) & (values > 0)])
+    if len(known) < 4:
+        return None
+    rounding = _rounding(known)
+    best: tuple[float, Evidence] | None = None
+    for native, steps in _STEPS:
+        for shown in _SHOWN:
+            if shown == native:
+                continue
+            for step in steps:
+                grid = step * unit(native).scale / unit(shown).scale
+                tolerance = rounding / 2 * 1.02 + _FACTOR * known
+                usable = tolerance < grid / 5
+                if usable.sum() < 4:
+                    continue
+                off = np.abs(known - np.round(known / grid) * grid)
+                if float((off[usable] <= tolerance[usable]).mean()) < 0.98:
+                    continue
+                chance = float(np.log10(2 * tolerance[usable] / grid).sum())
+                # Rounded to whole steps of the tolerance, a value is on the grid with at least rounding / grid.
+                if chance > np.log10(CHANCE) or (best is not None and chance >= best[0]):
+                    continue
+                listed = ", ".join(f"{value:g}" for value in known[:4])
+                reason = f"the values ({listed} …) are multiples of {step:g} {native} written in {shown}"
+                best = chance, Evidence(unit=shown, reason=reason)
+    return best[1] if best is not None else None
+
+
+def _rounding(known: NDArray[np.float64]) -> float:
+    """The last digit that is used."""
+    for digits in range(6):
+        scaled = known * 10**digits
+        if np.all(np.abs(scaled - np.round(scaled)) < 1e-4):
+            return 10.0**-digits
+    return 1e-6
+
+
+def likely(values: NDArray[np.float64]) -> Evidence | None:
+    """The unit that unlabelled values are most likely in, as far as they tell."""
+    found = from_resolution(values)
+    if found is not None:
+        return found
+    known = values[np.isfinite(values)]
+    if len(known) < 10:
+        return None
+    median, high = float(np.median(known)), float(np.quantile(known, 0.99))
+    if high > FASTEST or median > WINDY:
+        return Evidence(unit="km/h", reason=_too_fast(median, high, "m/s"))
+    return None
+
+
+def contradiction(
+    values: NDArray[np.float64], stated: str, *, span: float, channel: str = "wind_speed"
+) -> Finding | None:
+    """The finding about a stated unit that the values speak against; `None` where they do not.
+
+    Args:
+        values: (n,) as written, NaN where missing.
+        stated: the unit, as `flagdata.units` spells it.
+        span: length of the log [s].
+    """
+    scale = unit(stated).scale
+    found = from_resolution(values)
+    if found is not None and abs(unit(found.unit).scale / scale - 1) > 1e-9:
+        return _finding(channel, stated, found)
+    known = np.abs(values[np.isfinite(values)]) * scale
+    if len(known) < 10 or scale < unit("km/h").scale:
+        return None
+    median, high = float(np.median(known)), float(np.quantile(known, 0.99))
+    if not (high > FASTEST or (median > WINDY and span >= DAY)):
+        return None
+    # Of the units that are smaller, the first in which the wind is an ordinary one.
+    others = [name for name in ("km/h", "mph", "kn") if unit(name).scale < 0.9 * scale]
+    if not others:
+        return None
+    return _finding(channel, stated, Evidence(unit=others[0], reason=_too_fast(median / scale, high / scale, stated)))
+
+
+def gust_factor(mean: NDArray[np.float64], gust: NDArray[np.float64]) -> float | None:
+    """The median ratio of gusts to means [1], both in SI, where it is none that wind has; else `None`."""
+    both = np.isfinite(mean) & np.isfinite(gust) & (mean > 1.0)
+    if both.sum() < 10:
+        return None
+    ratio = float(np.median(gust[both] / mean[both]))
+    return None if _GUSTS[0] <= ratio <= _GUSTS[1] else ratio
+
+
+def _too_fast(median: float, high: float, name: str) -> str:
+    return f"half of the values are above {median:.3g}, one in a hundred above {high:.3g}: in {name} an extreme wind"
+
+
+def _finding(channel: str, stated: str, found: Evidence) -> Finding:
+    return Finding(
+        kind="unit-doubtful", severity=Severity.WARNING,
+        what=f"{channel} is stated in {stated}, but looks like {found.unit}: {found.reason}",
+        fix=f"check the instrument's setting; if it is {found.unit}, say so: --unit {found.unit}, or the recipe's unit",
+    )  # fmt: skip

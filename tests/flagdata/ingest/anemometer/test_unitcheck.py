@@ -1,0 +1,83 @@
+"""Values that speak for a unit, or against the one that is stated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flagdata.ingest.anemometer import WindOptions, read_log, unitcheck
+from flagdata.units import unit
+
+WIND: NDArray[np.float64] = 5 * np.abs(np.random.default_rng(7).weibull(2.0, 400))
+"""m/s."""
+
+
+def written(native: str, step: float, shown: str, digits: int) -> NDArray[np.float64]:
+    """A wind measured in steps of a unit and written in another."""
+    counts = np.round(WIND / unit(native).scale / step)
+    return np.round(counts * step * unit(native).scale / unit(shown).scale, digits)
+
+
+@pytest.mark.parametrize(
+    ("native", "step", "shown", "digits"),
+    [
+        ("mph", 1.0, "km/h", 1), ("mph", 1.0, "m/s", 2), ("kn", 1.0, "m/s", 1), ("km/h", 1.0, "m/s", 2),
+        ("m/s", 1.0, "km/h", 1), ("m/s", 0.1, "km/h", 2), ("m/s", 0.1, "mph", 2), ("kn", 1.0, "km/h", 1),
+    ],
+)  # fmt: skip
+def test_multiples_of_a_converted_step_tell_the_unit_they_are_written_in(
+    native: str, step: float, shown: str, digits: int
+) -> None:
+    found = unitcheck.from_resolution(written(native, step, shown, digits))
+    assert found is not None
+    assert found.unit == shown
+    assert f"{step:g} {native}" in found.reason
+
+
+@pytest.mark.parametrize("digits", [0, 1, 2, 6])
+def test_decimal_steps_tell_no_unit(digits: int) -> None:
+    assert unitcheck.from_resolution(np.round(WIND, digits)) is None
+    assert unitcheck.from_resolution(np.round(3.6 * WIND, digits)) is None
+
+
+def test_a_stated_unit_that_the_steps_contradict_is_doubted() -> None:
+    found = unitcheck.contradiction(written("mph", 1.0, "km/h", 1), "m/s", span=600.0)
+    assert found is not None
+    assert (found.kind, "km/h" in found.what) == ("unit-doubtful", True)
+    assert unitcheck.contradiction(written("mph", 1.0, "m/s", 2), "m/s", span=600.0) is None
+
+
+def test_a_day_of_gales_in_metres_a_second_is_doubted_an_hour_is_not() -> None:
+    gale = np.round(18 + 8 * np.random.default_rng(3).random(400), 1)
+    assert unitcheck.contradiction(gale, "m/s", span=3600.0) is None
+    found = unitcheck.contradiction(gale, "m/s", span=2 * 86_400.0)
+    assert found is not None
+    assert "km/h" in found.what
+    assert unitcheck.contradiction(gale, "km/h", span=2 * 86_400.0) is None
+
+
+def test_gusts_below_the_mean_or_above_three_times_it_are_of_another_unit() -> None:
+    assert unitcheck.gust_factor(WIND, 1.6 * WIND) is None
+    assert unitcheck.gust_factor(WIND, 0.5 * WIND) == pytest.approx(0.5)
+    assert unitcheck.gust_factor(WIND, 1.6 * 3.6 * WIND) == pytest.approx(5.76)
+
+
+def test_a_file_whose_values_contradict_its_heading_warns(log_file: Callable[[str], str]) -> None:
+    values = written("mph", 1.0, "km/h", 1)[:200]
+    rows = "".join(f"2026-05-13 12:{i // 60:02d}:{i % 60:02d},{v:g}\n" for i, v in enumerate(values))
+    log = read_log(log_file("time,ws (m/s)\n" + rows), WindOptions(zone="UTC"))
+    doubt = next(f for f in log.findings if f.kind == "unit-doubtful")
+    assert "km/h" in doubt.what
+    assert doubt.fix is not None
+    assert "--unit km/h" in doubt.fix
+
+
+def test_a_column_without_a_unit_is_refused_with_the_likely_one(log_file: Callable[[str], str]) -> None:
+    values = written("mph", 1.0, "km/h", 1)[:200]
+    rows = "".join(f"2026-05-13 12:{i // 60:02d}:{i % 60:02d},{v:g}\n" for i, v in enumerate(values))
+    with pytest.raises(Exception, match="likely km/h") as caught:
+        read_log(log_file("time,wind\n" + rows), WindOptions(zone="UTC"))
+    assert "--unit km/h" in caught.value.fix  # type: ignore[attr-defined]
