@@ -135,7 +135,7 @@ class Selection:
     def total(self) -> int:
         """How many rows there are without the limit."""
         with _explained(self.request):
-            row = self._relation.aggregate("count(*)").fetchone()
+            row = self._relation.aggregate("count(*)").fetchone()  # pyright: ignore[reportCallIssue]  duckdb 1.5's stub
         return int(row[0]) if row else 0
 
     def batches(self, size: int = 65_536) -> pa.RecordBatchReader:

@@ -83,7 +83,7 @@ class Familiarity:
         x = np.asarray(summaries, dtype=np.float64)
         if x.ndim != 2 or x.shape[1] != len(self.centre):
             raise InputError(f"summaries of shape {x.shape}", fix=f"give (n, {len(self.centre)})")
-        finite = np.isfinite(x).all(axis=1)
+        finite = np.asarray(np.isfinite(x).all(axis=1))
         offset = np.where(finite[:, None], x, self.centre) - self.centre
         return np.where(finite, np.linalg.norm(offset @ self.whitening.T, axis=1), np.inf)
 

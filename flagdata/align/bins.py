@@ -84,7 +84,7 @@ class LagBins:
         finite = speed[np.isfinite(speed)]
         mean = float(np.mean(finite)) if len(finite) else 0.0
         return cls(
-            offsets=(lowest + np.arange(count)) * (step / NANOSECONDS),
+            offsets=np.asarray((lowest + np.arange(count)) * (step / NANOSECONDS), dtype=np.float64),
             wind=scores,
             motion=normal_scores(_means(motion, ends, period, period / spacing)),
             first=first,

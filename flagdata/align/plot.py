@@ -120,7 +120,7 @@ def _binned(time: Series, values: Series, period: float) -> tuple[Series, Series
     count = np.bincount(index - first)
     total = np.bincount(index - first, weights=values[finite])
     there = np.flatnonzero(count)
-    return (there + first + 0.5) * period, total[there] / count[there]
+    return np.asarray((there + first + 0.5) * period, dtype=np.float64), total[there] / count[there]
 
 
 def _broken(time: Series, values: Series, period: float) -> tuple[Series, Series]:

@@ -41,6 +41,6 @@ def kept(
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = target.with_suffix(f".{os.getpid()}.partial")
     with unfinished.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+        np.savez_compressed(stream, **arrays)  # pyright: ignore[reportArgumentType]
     unfinished.replace(target)
     return arrays

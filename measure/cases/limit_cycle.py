@@ -124,7 +124,8 @@ def simulate(
     track = np.stack(frames)
     track[~np.isfinite(track)] = np.nan
     return StripMotion(
-        time=(np.arange(kept) + 1) * interval, along=track[:, :, 0], across=track[:, :, 1],
+        time=np.asarray((np.arange(kept) + 1) * interval, dtype=np.float64), along=track[:, :, 0],
+        across=track[:, :, 1],
         arc=np.unique(np.round(x, 12)),
     )  # fmt: skip
 

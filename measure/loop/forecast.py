@@ -234,7 +234,7 @@ class SegmentWind:
     def of(cls, segments: Segments, *, dtype: torch.dtype, device: torch.device | str) -> SegmentWind:
         """Sampled at the frames of each segment."""
         count = len(segments.items[0].positions) + 1
-        own = np.arange(count) * segments.period
+        own = np.asarray(np.arange(count) * segments.period, dtype=np.float64)
         samples = np.stack([s.wind.at(s.start + own) for s in segments.items], axis=-1)
         return cls(period=segments.period, samples=torch.as_tensor(samples, dtype=dtype, device=device))
 

@@ -325,7 +325,7 @@ class Evidence:
         pull = PRIOR**-2 * np.asarray(centre)
         score[: len(THETA)] += pull
         energy += float(pull @ np.asarray(centre))
-        covariance = np.linalg.inv(curvature[np.ix_(active, active)])
+        covariance = np.asarray(np.linalg.inv(curvature[np.ix_(active, active)]), dtype=np.float64)
         value = covariance @ score[active]
         return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))
 

@@ -83,7 +83,7 @@ class Spectrum:
     @property
     def _frequency(self) -> Floats:
         """Of the transforms [Hz]."""
-        return np.fft.rfftfreq(_POINTS, self.period)
+        return np.asarray(np.fft.rfftfreq(_POINTS, self.period), dtype=np.float64)
 
     def _with_the_wind(self, values: Floats) -> Floats:
         """(segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the frames are

@@ -59,7 +59,7 @@ def fill_positions(positions: Floats, *, where: str) -> Filled:
     Raises:
         InputError: nothing was tracked, or more than half of the markers are lost.
     """
-    tracked = np.isfinite(positions).all(axis=2)
+    tracked = np.asarray(np.isfinite(positions).all(axis=2))
     if not tracked.any():
         raise InputError("no marker was tracked in any frame", where=where, fix="check the columns and their units")
     frames = _stretch(tracked)

@@ -59,7 +59,7 @@ def data_hash(segments: Segments) -> str:
     """SHA-256 of the markers, positions and wind of segments, hex."""
     digest = hashlib.sha256(np.ascontiguousarray(segments.markers, dtype="<f8").tobytes())
     for item in segments.items:
-        times = item.start + np.arange(len(item.positions)) * segments.period
+        times = np.asarray(item.start + np.arange(len(item.positions)) * segments.period, dtype=np.float64)
         for values in (item.positions, item.wind.at(times)):
             digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()

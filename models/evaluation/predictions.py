@@ -132,7 +132,7 @@ def save(predictions: Predictions, path: Path) -> None:
     if predictions.embedding is not None:
         content["embedding"] = predictions.embedding
     with path.open("wb") as target:
-        np.savez_compressed(target, **content)
+        np.savez_compressed(target, **content)  # pyright: ignore[reportArgumentType]
 
 
 def load(path: Path) -> Predictions:

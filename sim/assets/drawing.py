@@ -73,7 +73,7 @@ class Sheet:
         px, py = self._grid
         dx, dy = px - np.float32(x), py - np.float32(y)
         c, s = np.float32(math.cos(direction)), np.float32(math.sin(direction))
-        return dx * c + dy * s, dy * c - dx * s
+        return np.asarray(dx * c + dy * s, dtype=np.float32), np.asarray(dy * c - dx * s, dtype=np.float32)
 
     def inside(self, corners: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
         """(sub-rows, sub-columns) which samples a polygon covers, by the non-zero winding rule."""

@@ -80,7 +80,7 @@ class LoggedGusts(WindEffect):
             raise InputError("the mean wind is zero", where="logged gusts", fix="choose a stretch with wind")
         # Clockwise from above is a turn to the right: the conjugate.
         relative = np.conj(s * np.exp(1j * from_north) / mean) - 1
-        samples = np.stack([relative.real, relative.imag, np.zeros_like(s)])[..., None]
+        samples = np.stack([np.real(relative), np.imag(relative), np.zeros_like(s)])[..., None]
         return cls(share=share, times=tuple(t.tolist()), samples=torch.from_numpy(samples))
 
     @classmethod

@@ -73,7 +73,8 @@ def _apart(count: int) -> NDArray[np.float64]:
         tried = np.stack([points[:, 0], (rng.permutation(count) + 0.5) / count], axis=1)
         gap = np.abs(tried[:, None] - tried)
         gap = np.hypot(*np.moveaxis(np.minimum(gap, 1 - gap), 2, 0)) + 2 * np.eye(count)
-        score = round(float(gap.min() * math.sqrt(count)) - abs(float(np.corrcoef(tried.T)[0, 1])), 9)
+        correlation = np.asarray(np.corrcoef(tried.T))[0, 1]
+        score = round(float(gap.min() * math.sqrt(count)) - abs(float(correlation)), 9)
         if score > best:
             best, found = score, tried
     return found

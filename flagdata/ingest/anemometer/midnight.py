@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from flagdata.ingest.anemometer.stamps import EPOCH, Stamps, parse
 
@@ -28,7 +29,7 @@ def parse_with_bare_dates(texts: Sequence[str] | pa.StringArray, form: str) -> t
         return found, 0
     at = np.flatnonzero(~found.valid)
     text = texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
-    others = zip(at.tolist(), text.take(pa.array(at)).to_pylist(), strict=True)
+    others = zip(at.tolist(), pc.take(text, pa.array(at)).to_pylist(), strict=True)
     dates = {index: other.strip() for index, other in others if other.strip() and ":" not in other}
     if not dates:
         return found, 0

@@ -54,7 +54,8 @@ class Motion:
         step = stride / recording.rate
         at = onto(recording.markers, specimen.mesh.rest) @ recording.positions[::stride]
         return cls(
-            times=np.arange(1, len(at) - 1) * step, position=at[1:-1], velocity=(at[2:] - at[:-2]) / (2 * step),
+            times=np.asarray(np.arange(1, len(at) - 1) * step, dtype=np.float64), position=at[1:-1],
+            velocity=(at[2:] - at[:-2]) / (2 * step),
             acceleration=(at[2:] - 2 * at[1:-1] + at[:-2]) / step**2,
             mass=specimen.material.density * specimen.mesh.vertex_areas,
         )  # fmt: skip
