@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -27,7 +28,7 @@ def parse_with_bare_dates(texts: Sequence[str] | pa.StringArray, form: str) -> t
     if form in EPOCH or end is None or bool(found.valid.all()) or 2 * int(found.valid.sum()) <= len(texts):
         return found, 0
     at = np.flatnonzero(~found.valid)
-    text = texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
+    text: Any = texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
     others = zip(at.tolist(), text.take(pa.array(at)).to_pylist(), strict=True)
     dates = {index: other.strip() for index, other in others if other.strip() and ":" not in other}
     if not dates:
