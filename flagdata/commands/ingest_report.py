@@ -99,7 +99,9 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
         for note in guess["notes"]:
             click.echo(f"    not taken or odd: {note}")
         if len(guess["winds"]) > 1:
-            click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact: {', '.join(guess['winds'])}")
+            how = "" if guess is entry["guesses"][0] else f" with --as {guess['format']}"
+            winds = ", ".join(guess["winds"])
+            click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
             click.echo(f"    to say: {doubt}")
         if guess["draft"]:

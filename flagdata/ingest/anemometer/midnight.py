@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from flagdata.ingest.anemometer.stamps import EPOCH, Stamps, parse
 
@@ -28,8 +28,8 @@ def parse_with_bare_dates(texts: Sequence[str] | pa.StringArray, form: str) -> t
     if form in EPOCH or end is None or bool(found.valid.all()) or 2 * int(found.valid.sum()) <= len(texts):
         return found, 0
     at = np.flatnonzero(~found.valid)
-    text = texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
-    others = zip(at.tolist(), pc.take(text, pa.array(at)).to_pylist(), strict=True)
+    text: Any = texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
+    others = zip(at.tolist(), text.take(pa.array(at)).to_pylist(), strict=True)
     dates = {index: other.strip() for index, other in others if other.strip() and ":" not in other}
     if not dates:
         return found, 0

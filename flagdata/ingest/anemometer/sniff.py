@@ -8,7 +8,7 @@ from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import excel
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind, Head
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
@@ -50,7 +50,10 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
 
 
 def recognise(source: TextFile) -> tuple[Guess, ...]:
-    """Guesses of all anemometer formats at a text file, the likeliest first."""
+    """Guesses of all anemometer formats at a text file, the likeliest first.
+
+    Where a format knows the file, a draft with doubts has nothing to ask and is left out.
+    """
     head = Head(lines=tuple(source.head(HEAD_LINES)))
     found: list[Guess] = []
     for name in FORMATS:
@@ -58,7 +61,9 @@ def recognise(source: TextFile) -> tuple[Guess, ...]:
         guess = reader.recognise(head)
         if guess is not None:
             found.append(guess)
-    return tuple(sorted(found, key=lambda guess: -guess.score))
+    known = any(guess.score >= SURE and not guess.draft for guess in found)
+    told = [guess for guess in found if not (known and guess.doubts)]
+    return tuple(sorted(told, key=lambda guess: -guess.score))
 
 
 def _folder(path: Path) -> Guess:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import datetime as dt
+import gzip
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -185,3 +189,38 @@ def test_stamps_by_arrow_are_those_of_the_pattern(monkeypatch: pytest.MonkeyPatc
     for name in ("ns", "utc", "valid", "distant"):
         np.testing.assert_array_equal(getattr(quick, name), getattr(slow, name), err_msg=name)
     assert quick.step == slow.step
+
+
+EVENING = dt.datetime(2026, 5, 1, 23)  # noqa: DTZ001  a logger that writes no zone
+STAMPED: dict[str, tuple[str, Callable[[int], str], dict[str, Any]]] = {
+    "a row of another site": (
+        "time,station,wind [m/s]\n",
+        lambda i: f"2026-05-01 12:00:{i // 3:02d},{('north', 'south', 'west')[i % 3]},{3 + i / 10:.1f}",
+        {"wind": "south", "zone": "UTC"},
+    ),
+    "midnight as a bare date": (
+        "time,wind [m/s]\n",
+        lambda i: f"{(EVENING + dt.timedelta(minutes=2 * i)).isoformat(sep=' ').removesuffix(' 00:00:00')},{i}",
+        {"zone": "UTC"},
+    ),
+    "a counter": ("millis,wind [m/s]\n", lambda i: f"{i * 100 + 7},{3 + i / 10:.1f}", {"start": 1_777 * 10**15}),
+    "times of day": ("time,wind [m/s]\n", lambda i: f"23:59:{i:02d},{i}", {"date": dt.date(2026, 5, 1), "zone": "UTC"}),
+}
+
+
+@pytest.mark.parametrize("packed", [False, True], ids=["plain", "gzip"])
+@pytest.mark.parametrize("law", STAMPED)
+def test_a_drafted_table_is_read_by_columns_as_row_by_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, law: str, packed: bool
+) -> None:
+    heading, row, said = STAMPED[law]
+    text = (heading + "".join(f"{row(i)}\n" for i in range(60))).encode()
+    path = tmp_path / ("log.csv.gz" if packed else "log.csv")
+    path.write_bytes(gzip.compress(text) if packed else text)
+    fast = read_log(path, WindOptions(**said))
+    monkeypatch.setattr(RowReader, "blocks", RowReader.rows)
+    slow = read_log(path, WindOptions(**said))
+    assert len(fast.series.time) == (20 if law == "a row of another site" else 60)
+    assert fast.findings == slow.findings
+    np.testing.assert_array_equal(fast.series.time, slow.series.time)
+    np.testing.assert_array_equal(fast.series.channels["wind_speed"], slow.series.channels["wind_speed"])

@@ -47,11 +47,19 @@ PLAIN = [
 
 def test_a_sheet_with_dates_is_read_by_its_recipe(book: Book) -> None:
     path = book(Log=PLAIN)
-    assert sniff(path)[0].recipe == "generic-csv"
-    log = read_log(path, WindOptions(zone="UTC"))
+    log = read_log(path, WindOptions(recipe="generic-csv", zone="UTC"))
     assert [iso(int(t)) for t in log.series.time[1:3]] == ["2026-05-01T23:59:59Z", "2026-05-02T00:00:00Z"]
     assert log.series.channels["wind_speed"].tolist() == [3.0, 3.5, 4.0, 4.5]
     assert log.series.channels["air_temperature"][0] == pytest.approx(293.15)
+
+
+def test_a_sheet_that_no_recipe_describes_is_drafted_as_its_text_is(book: Book) -> None:
+    rows = [["time", "Wind speed [km/h]"], *([START + dt.timedelta(seconds=i), 36 + 3.6 * i] for i in range(4))]
+    path = book(Log=rows)
+    assert sniff(path)[0].doubts == ()
+    log = read_log(path, WindOptions(zone="UTC"))
+    assert log.series.channels["wind_speed"] == pytest.approx([10.0, 11.0, 12.0, 13.0])
+    assert sniff(book(Log=PLAIN))[0].doubts[0].startswith("the unit of column 'wind_speed' is not stated")
 
 
 def test_a_makers_export_in_a_sheet_is_told_as_its_text_is(book: Book) -> None:
@@ -66,7 +74,7 @@ def test_a_makers_export_in_a_sheet_is_told_as_its_text_is(book: Book) -> None:
 
 
 def test_the_first_sheet_with_a_table_is_read_and_the_others_are_named(book: Book) -> None:
-    log = read_log(book(Notes=[["made by hand"]], Log=PLAIN, More=PLAIN), WindOptions(zone="UTC"))
+    log = read_log(book(Notes=[["made by hand"]], Log=PLAIN, More=PLAIN), WindOptions(recipe="generic-csv", zone="UTC"))
     found = next(finding for finding in log.findings if finding.kind == "several-sheets")
     assert "'Log'" in found.what
     assert "'More'" in found.what
@@ -75,7 +83,7 @@ def test_the_first_sheet_with_a_table_is_read_and_the_others_are_named(book: Boo
 def test_line_numbers_are_those_of_the_sheets_rows(book: Book) -> None:
     rows = [list(row) for row in PLAIN]
     rows[3][1] = "broken"
-    log = read_log(book(Log=rows), WindOptions(zone="UTC"))
+    log = read_log(book(Log=rows), WindOptions(recipe="generic-csv", zone="UTC"))
     assert next(finding for finding in log.findings if finding.kind == "unreadable-values").where == "line 4"
 
 

@@ -23,7 +23,7 @@ def stamped(*lines: str) -> str:
 
 
 SAMPLES = {
-    "delimited": "time,wind_speed\n2026-05-01T12:00:00Z,3\n2026-05-01T12:00:01Z,4\n",
+    "delimited": "time,wind_speed [m/s]\n2026-05-01T12:00:00Z,3\n2026-05-01T12:00:01Z,4\n",
     "host-stamped": "laptop_time,raw_line\n" + stamped("3.1", "3.2", "3.3"),
     "nmea": "$GPRMC,120000,A,5310.8,N,00525.7,E,0.0,0.0,010526,,,A\n$WIMWV,214.8,R,0.1,K,A*28\n",
     "nmea-stamped": stamped("$WIMWV,214.8,R,0.1,K,A*28", "$WIMWV,214.8,R,0.1,K,A*28"),

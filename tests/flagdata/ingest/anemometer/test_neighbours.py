@@ -69,7 +69,7 @@ def test_the_second_log_of_a_session_is_compared_with_the_first(tmp_path: Path) 
         ]
         path = tmp_path / f"{name}.csv"
         rows = zip(local, one.channels["wind_speed"], strict=True)
-        path.write_text("time,wind_speed\n" + "".join(f"{at},{v:.2f}\n" for at, v in rows))
+        path.write_text("time,wind_speed [m/s]\n" + "".join(f"{at},{v:.2f}\n" for at, v in rows))
         options = WindIngest(wind=WindOptions(zone="+02:00"))
         result = ingest_wind(lake, path, options, labels=Labels(session="field"))
         kinds.append([f["kind"] for f in result.report["findings"]])

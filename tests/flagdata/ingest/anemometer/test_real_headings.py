@@ -152,10 +152,8 @@ TABLES: dict[str, Table] = {
         + rows("{t:%Y%m%d%H%M},{v},{d},11", step=60),
         lacks=("sonic_temperature", "air_temperature"),
     ),
-    "icos-without-unit": Table(
-        text="TIMESTAMP_START,TIMESTAMP_END,WS,WD\n" + rows("{t:%Y%m%d%H%M},{t:%Y%m%d%H%M},{v},{d}", step=60),
-        says=MS,
-        asks="--unit",
+    "compact-stamps-without-unit": Table(
+        text="TIMESTAMP,WS,WD\n" + rows("{t:%Y%m%d%H%M},{v},{d}", step=60), says=MS, asks="--unit"
     ),
     "no-unit": Table(text="time,wind_speed,wind_direction\n" + rows(T + ",{v},{d}"), says=MS, asks="--unit"),
     "no-unit-in-kmh": Table(
