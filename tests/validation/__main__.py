@@ -14,6 +14,7 @@ VALIDATIONS = {
     "flutter": "tests.validation.flutter",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
+    "real-flag": "tests.validation.real_flag",
     "renderers": "tests.validation.renderers",
     "verification": "tests.validation.verification",
 }

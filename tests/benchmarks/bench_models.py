@@ -1,0 +1,84 @@
+"""What a clip costs: the front end from pixels, a step of training, an estimate; one core, medians.
+
+The plain front end is the definition that tests hold the fast one to: SciPy's filters, torch's pooling and the
+periodogram layer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from scipy import ndimage
+from torch.nn import functional
+
+from models import estimator
+from models.frontend import FrontEnd, Maps, standardised
+from models.spectral import SpectralDecomposition
+from models.training.recipe import load
+
+_RUNS = 7
+_BATCH = 8
+_RECIPES = ("wave", "sdn", "sdn-112", "resnet18-1", "resnet18-10", "resnet18-20", "cardona", "yang")
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Milliseconds a clip of 30 × 224 × 224 (or what the recipe takes)."""
+    torch.set_num_threads(1)
+    generator = torch.Generator().manual_seed(seed)
+    clip = (torch.rand((1, 1, 30, 224, 224), generator=generator) * 255).to(torch.uint8)
+    kinds: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "handmade")
+    ends = {maps: _milliseconds(lambda maps=maps: FrontEnd(maps=maps)(clip)) for maps in kinds}
+    model = estimator.shipped()
+    film = (torch.rand((1, 30, 300, 300), generator=generator) * 255).to(torch.uint8).numpy()
+    return {
+        "front_end": ends,
+        "plain_front_end": _milliseconds(lambda: _plain(clip[0, 0]), runs=3),
+        "training_step": {name: _step(name, generator) for name in _RECIPES},
+        "estimate_from_pixels": _milliseconds(lambda: model.estimate(model.inputs(film))),
+    }
+
+
+def _milliseconds(work: Callable[[], object], *, runs: int = _RUNS) -> float:
+    work()
+    found = []
+    for _ in range(runs):
+        begun = time.perf_counter()
+        work()
+        found.append(time.perf_counter() - begun)
+    return round(1e3 * float(np.median(found)), 2)
+
+
+def _plain(clip: torch.Tensor) -> torch.Tensor:
+    video = ndimage.gaussian_filter1d(standardised(clip).numpy(), 1.0, axis=0, mode="nearest")
+    slopes = []
+    for along, across in ((2, 1), (1, 2)):
+        slope = ndimage.gaussian_filter1d(video, 2.0, axis=along, order=1, mode="nearest")
+        slopes.append(ndimage.gaussian_filter1d(slope, 2.0, axis=across, mode="nearest"))
+    pooled = functional.max_pool2d(torch.from_numpy(np.stack(slopes)), 2)[None]
+    return SpectralDecomposition(rate=25.0)(pooled)
+
+
+def _step(name: str, generator: torch.Generator) -> dict[str, float]:
+    """Of a clip in a batch of 8: forward and backward, and forward alone."""
+    recipe = load(name)
+    learner = recipe.learner()
+    inputs = torch.randn((_BATCH, *recipe.front_end.shape), generator=generator)
+    values = torch.full((_BATCH, len(recipe.loss.targets)), 5.0)
+    sequence = torch.arange(_BATCH)
+
+    def both() -> None:
+        learner.loss(inputs, values, sequence).backward()
+
+    @torch.no_grad()
+    def forward() -> None:
+        learner.network(inputs)
+
+    return {
+        "forward_backward": round(_milliseconds(both, runs=3) / _BATCH, 2),
+        "forward": round(_milliseconds(forward, runs=3) / _BATCH, 2),
+    }
