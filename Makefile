@@ -7,7 +7,7 @@ OUT ?= out
 # Without an NVIDIA driver the CPU build of torch is installed first; a looser range would pull in CUDA packages.
 TORCH := torch==2.13.0
 
-.PHONY: demo test lint bench validate clean
+.PHONY: demo test lint docs bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
@@ -19,6 +19,11 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+docs: $(STAMP)
+	$(BIN)/python -m docs.generate_cli
+	$(BIN)/python -m docs.generate_effects
+	$(BIN)/python -m mkdocs build --strict
 
 bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks --out docs/results
@@ -34,4 +39,4 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $(STAMP)
 
 clean:
-	rm -rf $(VENV) $(OUT) build *.egg-info
+	rm -rf $(VENV) $(OUT) build site *.egg-info

@@ -23,15 +23,18 @@ ALONE = ("sensors.md", "simulator.md", "models.md")
 RECIPE = FieldRecipe(seed=2026, duration=150, frame_rate=25)
 
 
-def write_small_film(path: Path, recipe: FieldRecipe) -> None:
-    """The demonstration's flag at half its size."""
+def write_small_field(folder: Path, recipe: FieldRecipe) -> None:
+    """The demonstration's field recording, its flag drawn at half the size."""
+    wind, at_frames, offset = film(recipe)
+    write_log(folder / "anemometer.csv", recipe, wind, offset)
+    (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
     flag = DrawnFlag(width=200, height=150, length=95)
-    with av.open(str(path), "w") as container:
+    with av.open(str(folder / "flag.mp4"), "w") as container:
         container.metadata["creation_time"] = START.isoformat()
         video = container.add_stream("libx264", rate=recipe.frame_rate, options={"preset": "ultrafast", "crf": "23"})
         video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
         video.codec_context.time_base = Fraction(1, recipe.frame_rate)
-        drawn = flag.frames(film(recipe)[1], recipe.frame_rate, stream(recipe.seed, "camera"))
+        drawn = flag.frames(at_frames, recipe.frame_rate, stream(recipe.seed, "camera"))
         for number, image in enumerate(drawn):
             frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
             frame.pts = number
@@ -56,9 +59,7 @@ def run_page(page: str) -> list[str]:
 def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the commands of start.md ran."""
     folder = tmp_path_factory.mktemp("started")
-    write_small_film(folder / "flag.mp4", RECIPE)
-    write_log(folder / "anemometer.csv", RECIPE)
-    (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
+    write_small_field(folder, RECIPE)
     with pytest.MonkeyPatch.context() as patch:
         enter(folder, patch, "start.md")
         assert "export FLAGDATA_LAKE=field.lake" in commands("start.md")
