@@ -47,19 +47,17 @@ def _section(name: str, effect: type[Parametrised]) -> str:
     about = inspect.getdoc(sys.modules[effect.__module__]) or ""
     equation, _, attributes = (inspect.getdoc(effect) or "").partition("\nAttributes:\n")
     meanings = _meanings(attributes)
-    rows = [
-        f"| `{label}` | {entry.role} | {entry.unit} | {_range(entry)} | {entry.null:g} | {_cell(meanings[label])} "
-        f"| {_cell(entry.source)} |"
-        for label, entry in effect.parameters().items()
-    ]
+    parameters = effect.parameters().items()
     return "\n".join(
         [
             f"### {name}\n",
             f"{_plain(about.split(chr(10) * 2)[0])}\n",
             f"{_plain(equation)}\n",
-            "| parameter | role | unit | prior | null | meaning | source of the prior |",
-            "|---|---|---|---|---|---|---|",
-            *rows,
+            "| parameter | role | unit | prior | null value |",
+            "|---|---|---|---|---|",
+            *(f"| `{label}` | {e.role} | {e.unit} | {_range(e)} | {e.null:g} |" for label, e in parameters),
+            "",
+            *(f"- `{label}`: {_plain(meanings[label])} Prior: {_plain(e.source)}." for label, e in parameters),
             "",
         ]
     )
@@ -87,10 +85,6 @@ def _plain(text: str) -> str:
     """Markdown in which no sign of an equation is taken for emphasis."""
     paragraphs = [" ".join(paragraph.split()) for paragraph in text.strip().split("\n\n")]
     return "\n\n".join(p.replace("*", "\\*").replace("_", "\\_").replace("<", "&lt;") for p in paragraphs if p)
-
-
-def _cell(text: str) -> str:
-    return _plain(text).replace("|", "\\|")
 
 
 if __name__ == "__main__":

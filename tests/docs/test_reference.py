@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import click
 import pytest
 
 from docs import generate_cli, generate_effects
+from flagdata.ingest.anemometer.recipe import (
+    ChannelLayout,
+    CheckLayout,
+    FileLayout,
+    QualityRules,
+    Recipe,
+    TimeLayout,
+)
+from flagdata.signals import Sensor
 from sim.effects import EFFECTS, SENSOR_EFFECTS
+from tests.docs.pages import DOCS
 
 COMMANDS = dict(generate_cli.commands())
 
@@ -35,3 +47,24 @@ def test_every_effect_and_each_of_its_parameters_is_on_the_page(name: str) -> No
         cells = [cell.strip() for cell in row.strip("|").split(" | ")]
         assert cells[2] == entry.unit
         assert all(cells)
+        (item,) = [line for line in section.splitlines() if line.startswith(f"- `{label}`: ")]
+        meaning, _, source = item.removeprefix(f"- `{label}`: ").partition(" Prior: ")
+        assert meaning
+        assert source.strip(" .")
+
+
+@pytest.mark.parametrize("table", [FileLayout, TimeLayout, ChannelLayout, Sensor, QualityRules, CheckLayout])
+def test_every_key_of_a_sensor_recipe_is_on_the_page(table: type) -> None:
+    page = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    keys = {key.strip(" `") for row in rows for key in row.split(",")}
+    assert {field.name.replace("_", "-") for field in fields(table)} <= keys
+
+
+def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:
+    page = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    tables = {"file": "[file]", "time": "[time]", "channels": "[channels.NAME]", "sensor": "[sensor]",
+              "quality": "[quality]", "checks": "[[check]]"}  # fmt: skip
+    for field in fields(Recipe):
+        shown = f"### `{tables[field.name]}`" if field.name in tables else f"| `{field.name}` |"
+        assert shown in page, field.name
