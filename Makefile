@@ -21,7 +21,7 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 SYSTEM := python3.11-venv g++ git libegl1 libgl1 libice6 libsm6 libx11-6 libxcb1 libxext6 libxfixes3 libxi6 \
   libxkbcommon0 libxrender1
 
-.PHONY: demo test test-oldest blender system lint bench validate clean
+.PHONY: demo test test-oldest blender system lint docs bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
@@ -41,6 +41,11 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+docs: $(STAMP)
+	$(BIN)/python -m docs.generate_cli
+	$(BIN)/python -m docs.generate_effects
+	$(BIN)/python -m mkdocs build --strict
 
 bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks --out docs/results
@@ -68,4 +73,4 @@ touch $(1)/.installed
 endef
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) $(OLDEST_VENV) $(OUT) build *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info

@@ -1,31 +1,34 @@
-"""The README's commands of closing the loop run: they read what they say, and write the report, the models, the lake.
+"""The commands of the pages about the loop run: they read what they say, and write the report, the models, the lake.
 
-The inference between is replaced by a made-up verdict: it takes minutes, and has tests of its own.
+The inference between is replaced by a made-up verdict or outcome: it takes minutes, and has tests of its own.
 """
 
 from __future__ import annotations
 
-import shlex
+import shutil
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from flagdata.cli import main
 from flagdata.ingest.meshes import write_folder
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence
 from flagdata.schema import Kind
 from measure.demo.tracked import TrackedRecipe, make_tracks
 from measure.loop.verdict import Conclusion, Estimate, Parameter, Verdict
+from measure.observe.recipe import load
 from measure.observe.trajectory import Experiment
+from measure.propose.ledger import entries
+from measure.propose.outcome import Decision, Outcome
 from sim.mesh import grid
+from tests.docs.pages import Shell, blocks, commands
 from tests.measure.observe.flags import HEIGHT, WIDTH, flutter
 from tests.measure.report.verdicts import Size, verdict
-from tests.test_readme import OF_THE_LOOP, commands
 
-COMMANDS = [command for command in commands() if command.startswith(OF_THE_LOOP)]
 SPEEDS = (4.0, 6.0)
 
 
@@ -71,9 +74,7 @@ def concluded() -> Verdict:
     return replace(verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2)), parameters=parameters)
 
 
-def test_every_command_of_closing_the_loop_runs(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     judged: list[Experiment] = []
 
     def instead(experiment: Experiment, *_: object, **__: object) -> Verdict:
@@ -82,13 +83,76 @@ def test_every_command_of_closing_the_loop_runs(
 
     monkeypatch.setattr("measure.loop.close.close_loop", instead)
     monkeypatch.chdir(folder)
-    assert len(COMMANDS) == 4
-    for command in COMMANDS:
-        with pytest.raises(SystemExit) as ended:
-            main(shlex.split(command)[1:])
-        assert ended.value.code == 0, (command, capsys.readouterr().err)
+    shell = Shell()
+    for command in commands("closing-the-loop.md"):
+        shell.run(command)
     speeds = [[round(r.wind.speed, 1) for r in experiment.recordings] for experiment in judged]
     assert speeds == [[4.0, 6.0], [4.0, 8.0], [5.3, 5.3]]
     assert all((folder / "loop" / name).exists() for name in ("report.html", "verdict.json", "base.toml", "model.toml"))
     kinds = [row["kind"] for row in Lake.open(folder / "lake").rows().to_pylist()]
     assert sorted(kinds) == sorted([Kind.MEASUREMENT, Kind.MODEL, Kind.MODEL, Kind.MESHES])
+
+
+def test_the_recipe_of_the_page_is_read(folder: Path, tmp_path: Path) -> None:
+    shutil.copy(folder / "tracks.csv", tmp_path)
+    (text,) = blocks("closing-the-loop.md", "toml")
+    path = tmp_path / "flag.toml"
+    path.write_text(text, encoding="utf-8")
+    recipe = load(path)
+    assert recipe.nulls == 160
+    assert [(source.take, source.rate) for source in recipe.recordings] == [("4 m-s", 25)]
+
+
+RISING_LOWER = """
+from dataclasses import dataclass
+from typing import Annotated
+
+import torch
+
+from sim.effects.effect import ForceEffect
+from sim.effects.parameter import Value, strength
+
+
+@dataclass(frozen=True, kw_only=True)
+class RisingLower(ForceEffect):
+    acceleration: Annotated[Value, strength(unit="m/s²", prior=(0.0, 5.0), source="made up for a test")] = 0.0
+
+    def force(self, cloth, time, position, velocity, wind):
+        return self.acceleration * cloth.mass[:, None, None] * torch.tensor([0.0, 0.0, 1.0])[:, None]
+"""
+
+
+def nothing_taken() -> Outcome:
+    return Outcome(
+        decision=Decision.REJECTED, reason="no term stands out", steps=(), tried=0, ranking=(), strengths=(),
+        retest=None, level=0.03, nulls="none", proposed_from="0", tested_on="0", known=(), seed=0,
+    )  # fmt: skip
+
+
+def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[Sequence[object], dict[str, Any]]] = []
+
+    def instead(experiment: Experiment, tried: Sequence[object], **given: Any) -> Outcome:
+        calls.append((tried, given))
+        return nothing_taken()
+
+    monkeypatch.setattr("measure.propose.propose.propose", instead)
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(folder / "tracks.csv", tmp_path)
+    for name in ("flag.toml", "other.toml"):
+        shutil.copy(folder / "tracked.toml", tmp_path / name)
+    (tmp_path / "bank").mkdir()
+    made = tmp_path / "out" / "close-loop" / "proposal"
+    made.mkdir(parents=True)
+    (made / "proposed_1f2e3d.py").write_text(RISING_LOWER, encoding="utf-8")
+    shell = Shell()
+    for command in commands("proposals.md"):
+        shell.run(command)
+    (first, plain), (_, known), (tried, tested) = calls
+    assert len(first) > 100
+    assert plain["options"].bank is None
+    assert str(known["options"].bank) == "bank"
+    assert [str(column.effect) for column in known["known"]] == ["vertical-wind"]
+    assert len(tried) == 1
+    assert len(tested["controls"]) == len(first)
+    assert len(entries(made / "ledger.json")) == 3

@@ -1,0 +1,95 @@
+"""The reference of the command line, docs/cli.md, from the commands themselves: `python -m docs.generate_cli`."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from flagdata.cli import VERBS, root
+
+PAGE = Path(__file__).with_name("cli.md")
+_HEAD = """\
+# Commands
+
+This page is generated from the commands; `flagdata VERB --help` prints the same.
+
+Results go to stdout and everything else to stderr. With `--json` the result is one JSON document. The exit code is 0
+when the command is done, 1 when it failed, 2 when it was called wrongly, and 3 when a gate was not met: an alignment
+that cannot be trusted, a lake that does not verify. The environment variable `FLAGDATA_LAKE` names the lake where
+`--lake` is not given.
+"""
+
+
+def commands() -> Iterator[tuple[str, click.Command]]:
+    """Every command with its full name, groups before what they hold."""
+    for verb in VERBS:
+        command = root.get_command(click.Context(root), verb)
+        if command is None:
+            raise LookupError(verb)
+        yield f"flagdata {verb}", command
+        if isinstance(command, click.Group):
+            for name, below in command.commands.items():
+                yield f"flagdata {verb} {name}", below
+
+
+def reference() -> str:
+    """The page."""
+    parts = [_HEAD, "| command | what it does |\n|---|---|"]
+    parts[-1] += "".join(f"\n| [`{verb}`](#flagdata-{verb}) | {about} |" for verb, (_, about) in VERBS.items()) + "\n"
+    parts += [_section(name, command) for name, command in commands()]
+    return "\n".join(parts)
+
+
+def _section(name: str, command: click.Command) -> str:
+    context = click.Context(command, info_name=name)
+    level = "##" if name.count(" ") == 1 else "###"
+    usage = " ".join([name, *command.collect_usage_pieces(context)])
+    lines = [f"{level} {name}", "", f"`{usage}`", "", _prose(inspect.cleandoc(command.help or ""))]
+    options = [entry for entry in command.params if isinstance(entry, click.Option)]
+    if options:
+        lines += ["| option | meaning |", "|---|---|"]
+        lines += [_row(option, context) for option in options]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _prose(text: str) -> str:
+    """The help text as Markdown: paragraphs that click keeps as they are (after \\b) become code."""
+    paragraphs: list[str] = []
+    for paragraph in text.split("\n\n"):
+        if paragraph.startswith("\b"):
+            lines = paragraph.splitlines()[1:]
+            paragraphs.append("```text\n" + inspect.cleandoc("\n".join(lines)) + "\n```")
+        else:
+            paragraphs.append(" ".join(paragraph.split()))
+    return "\n\n".join(paragraphs) + "\n"
+
+
+def _row(option: click.Option, context: click.Context) -> str:
+    names = ", ".join(f"`{name}`" for name in (*option.opts, *option.secondary_opts))
+    value = "" if option.is_flag else f" `{_cell(option.make_metavar(context))}`"
+    about = [_cell(option.help or "")]
+    if option.required:
+        about.append("Required.")
+    if option.multiple:
+        about.append("May be repeated.")
+    default = _default(option.to_info_dict()["default"]) if option.show_default else ""
+    if default:
+        about.append(f"Default: `{default}`.")
+    return f"| {names}{value} | {' '.join(about)} |"
+
+
+def _default(value: Any) -> str:
+    return "" if value is None or callable(value) else str(value)
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(reference(), encoding="utf-8")

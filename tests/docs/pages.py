@@ -1,0 +1,69 @@
+"""Pages as their reader sees them: the files they show, the commands they give, and a runner of these commands.
+
+Commands run in this process, because importing the package anew for each would take most of the time. The runner knows
+what the pages use of a shell: variables, `export`, and the last line of a command's output as a variable.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+from dataclasses import dataclass, field
+from pathlib import Path
+from string import Template
+
+from flagdata.cli import main
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+_ASSIGNED = re.compile(r"(\w+)=\$\((.+) \| tail -1\)")
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The fenced blocks of that language, without those that have a title."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def files(page: str) -> dict[str, str]:
+    """Name → text of the blocks whose title is a file's name."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return dict(re.findall(r"^```\w+ title=\"([^\"]+)\"\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE))
+
+
+def commands(page: str) -> list[str]:
+    """The lines that begin with a prompt."""
+    return [line[2:] for block in blocks(page, "console") for line in block.splitlines() if line.startswith("$ ")]
+
+
+@dataclass(kw_only=True)
+class Shell:
+    """Runs commands in the current folder.
+
+    Attributes:
+        variables: set by earlier commands.
+    """
+
+    variables: dict[str, str] = field(default_factory=dict)
+
+    def run(self, command: str) -> str:
+        """What a command printed to stdout.
+
+        Raises:
+            AssertionError: it did not exit with 0.
+        """
+        assigned = _ASSIGNED.fullmatch(command)
+        if assigned:
+            self.variables[assigned[1]] = self.run(assigned[2]).splitlines()[-1]
+            return ""
+        verb, *arguments = shlex.split(Template(command).substitute(self.variables))
+        assert verb == "flagdata", f"the runner knows no {verb!r}"
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                main(arguments)
+            except SystemExit as ended:
+                code = ended.code
+        assert code == 0, f"{command}\nended with {code}\n{out.getvalue()}{err.getvalue()}"
+        return out.getvalue()

@@ -1,0 +1,114 @@
+"""Every command of the pages runs, on small data made here, in the order in which a reader meets it."""
+
+from __future__ import annotations
+
+import shutil
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import pytest
+
+from flagdata.lake import Lake
+from flagdata.rng import stream
+from measure.demo.field import SENSOR, START, FieldRecipe, film, write_log
+from measure.demo.flag import DrawnFlag
+from tests.docs.pages import DOCS, Shell, blocks, commands, files
+from tests.models.conftest import fill
+
+OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
+"""Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the inference."""
+AFTER_START = ("alignment.md", "versions-and-recovery.md", "exports.md")
+ALONE = ("sensors.md", "simulator.md", "models.md")
+RECIPE = FieldRecipe(seed=2026, duration=150, frame_rate=25)
+
+
+def write_small_field(folder: Path, recipe: FieldRecipe) -> None:
+    """The demonstration's field recording, its flag drawn at half the size."""
+    wind, at_frames, offset = film(recipe)
+    write_log(folder / "anemometer.csv", recipe, wind, offset)
+    (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
+    flag = DrawnFlag(width=200, height=150, length=95)
+    with av.open(str(folder / "flag.mp4"), "w") as container:
+        container.metadata["creation_time"] = START.isoformat()
+        video = container.add_stream("libx264", rate=recipe.frame_rate, options={"preset": "ultrafast", "crf": "23"})
+        video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
+        video.codec_context.time_base = Fraction(1, recipe.frame_rate)
+        drawn = flag.frames(at_frames, recipe.frame_rate, stream(recipe.seed, "camera"))
+        for number, image in enumerate(drawn):
+            frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
+            frame.pts = number
+            container.mux(video.encode(frame))
+        container.mux(video.encode(None))
+
+
+def enter(folder: Path, patch: pytest.MonkeyPatch, page: str) -> None:
+    """Go into a folder, with the files that the page shows."""
+    patch.chdir(folder)
+    patch.setenv("FLAGDATA_LAKE", "field.lake")
+    for name, text in files(page).items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def run_page(page: str) -> list[str]:
+    shell = Shell()
+    return [shell.run(command) for command in commands(page) if not command.startswith("export ")]
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the commands of start.md ran."""
+    folder = tmp_path_factory.mktemp("started")
+    write_small_field(folder, RECIPE)
+    with pytest.MonkeyPatch.context() as patch:
+        enter(folder, patch, "start.md")
+        assert "export FLAGDATA_LAKE=field.lake" in commands("start.md")
+        run_page("start.md")
+    record = next(iter(Lake.open(folder / "field.lake").rows("kind = 'recording'").to_pylist()))
+    whole = Lake.open(folder / "field.lake").object_path(record["object"]).read_bytes()
+    (folder / "damaged.mcap").write_bytes(whole[: len(whole) // 2])
+    return folder
+
+
+def test_the_five_minute_start_ends_in_a_tagged_recording(started: Path) -> None:
+    lake = Lake.open(started / "field.lake")
+    (recording,) = lake.rows("kind = 'recording'", at="v1").to_pylist()
+    assert recording["clock_method"] == "estimated"
+    assert lake.rows("kind = 'clip'", at="v1").num_rows > 50
+
+
+def test_the_python_of_the_five_minute_start_runs(
+    started: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(started)
+    (program,) = blocks("start.md", "python")
+    exec(compile(program, "start.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("torch.Size([16, 1, 30, 300, 300])")
+
+
+@pytest.mark.parametrize("page", AFTER_START)
+def test_every_command_of_a_page_that_goes_on_from_the_start_runs(
+    page: str, started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(started, folder)
+    enter(folder, monkeypatch, page)
+    assert any(run_page(page))
+
+
+@pytest.mark.parametrize("page", ALONE)
+def test_every_command_of_a_page_that_stands_alone_runs(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    enter(tmp_path, monkeypatch, page)
+    if page == "models.md":
+        lake = Lake.create(tmp_path / "lake")
+        fill(lake, "flags")
+        lake.tag("v1")
+    assert any(run_page(page))
+
+
+def test_no_page_with_commands_is_forgotten() -> None:
+    tested = {"start.md", *AFTER_START, *ALONE, *OF_INFERENCE}
+    assert {page.name for page in DOCS.glob("*.md") if commands(page.name)} == tested
+    assert [page for page in tested if len(commands(page)) < 1] == []

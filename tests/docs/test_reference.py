@@ -1,0 +1,70 @@
+"""The generated pages are those of the code as it is, and nothing in them is without words."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import click
+import pytest
+
+from docs import generate_cli, generate_effects
+from flagdata.ingest.anemometer.recipe import (
+    ChannelLayout,
+    CheckLayout,
+    FileLayout,
+    QualityRules,
+    Recipe,
+    TimeLayout,
+)
+from flagdata.signals import Sensor
+from sim.effects import EFFECTS, SENSOR_EFFECTS
+from tests.docs.pages import DOCS
+
+COMMANDS = dict(generate_cli.commands())
+
+
+@pytest.mark.parametrize("module", [generate_cli, generate_effects], ids=["cli", "effects"])
+def test_a_generated_page_is_that_of_the_code(module: object) -> None:
+    name = module.__name__  # type: ignore[attr-defined]
+    fresh = module.reference() == module.PAGE.read_text(encoding="utf-8")  # type: ignore[attr-defined]
+    assert fresh, f"write the page anew: python -m {name}"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_and_every_option_has_a_sentence(name: str) -> None:
+    command = COMMANDS[name]
+    assert command.help
+    assert [p.name for p in command.params if isinstance(p, click.Option) and not (p.help or "").strip()] == []
+
+
+@pytest.mark.parametrize("name", [*EFFECTS, *SENSOR_EFFECTS])
+def test_every_effect_and_each_of_its_parameters_is_on_the_page(name: str) -> None:
+    effect = EFFECTS[name] if name in EFFECTS else SENSOR_EFFECTS[name]
+    page = generate_effects.PAGE.read_text(encoding="utf-8")
+    section = page.split(f"\n### {name}\n")[1].split("\n### ")[0]
+    for label, entry in effect.parameters().items():
+        (row,) = [line for line in section.splitlines() if line.startswith(f"| `{label}` |")]
+        cells = [cell.strip() for cell in row.strip("|").split(" | ")]
+        assert cells[2] == entry.unit
+        assert all(cells)
+        (item,) = [line for line in section.splitlines() if line.startswith(f"- `{label}`: ")]
+        meaning, _, source = item.removeprefix(f"- `{label}`: ").partition(" Prior: ")
+        assert meaning
+        assert source.strip(" .")
+
+
+@pytest.mark.parametrize("table", [FileLayout, TimeLayout, ChannelLayout, Sensor, QualityRules, CheckLayout])
+def test_every_key_of_a_sensor_recipe_is_on_the_page(table: type) -> None:
+    page = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    keys = {key.strip(" `") for row in rows for key in row.split(",")}
+    assert {field.name.replace("_", "-") for field in fields(table)} <= keys
+
+
+def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:
+    page = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    tables = {"file": "[file]", "time": "[time]", "channels": "[channels.NAME]", "sensor": "[sensor]",
+              "quality": "[quality]", "checks": "[[check]]"}  # fmt: skip
+    for field in fields(Recipe):
+        shown = f"### `{tables[field.name]}`" if field.name in tables else f"| `{field.name}` |"
+        assert shown in page, field.name
