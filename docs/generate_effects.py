@@ -20,7 +20,7 @@ leaves out. Each has a *null value*, at which it is exactly absent; a *prior*, t
 field; and the source of that range. A *strength* switches the effect on; a *shape* says how it looks once it is on.
 
 A recipe of a simulation names an effect by its table, for example `[effects.lift]` with `coefficient = 2.0`; the value
-`"prior"` draws one for each member. [Closing the loop](closing-the-loop.md) weighs the effects on the cloth, one by one.
+`"prior"` draws one for each member. [Closing the loop](closing-the-loop.md) weighs the effects on the cloth one by one.
 """
 
 
