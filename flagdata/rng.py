@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import torch
 
 
 def stream(seed: int, *names: str | int) -> np.random.Generator:
@@ -22,3 +28,23 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
 def child_seed(seed: int, *names: str | int) -> int:
     """A 63-bit seed for a library that wants an integer, from the same named stream."""
     return int(stream(seed, *names).integers(0, 2**63 - 1))
+
+
+def torch_generator(seed: int, *names: str | int, device: torch.device | str = "cpu") -> torch.Generator:
+    """A generator of torch's on a device, for the named stream."""
+    import torch
+
+    generator = torch.Generator(device=device)
+    generator.manual_seed(child_seed(seed, *names))
+    return generator
+
+
+@contextmanager
+def torch_draws(seed: int, *names: str | int) -> Iterator[None]:
+    """Within it, what draws from torch's own generator of the CPU, as layers do for their weights, draws from the named
+    stream; that generator is afterwards as it was."""
+    import torch
+
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(child_seed(seed, *names))
+        yield

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import CorruptError, InputError
-from flagdata.rng import child_seed
+from flagdata.rng import torch_generator
 from models.crops import Cropping
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
@@ -152,8 +152,7 @@ class Estimator:
         share = -(-draws // len(self.learners))
         found = []
         for place, (learner, embedding) in enumerate(zip(self.learners, embeddings, strict=True)):
-            generator = torch.Generator(device=embedding.device)
-            generator.manual_seed(child_seed(seed, "draws", place))
+            generator = torch_generator(seed, "draws", place, device=embedding.device)
             mixture = learner.mixture(embedding)
             found.append(mixture.sample(share, generator) * learner.spread + learner.centre)
         logits = torch.cat(found, dim=1)

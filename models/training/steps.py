@@ -24,7 +24,7 @@ from torch import distributed as ranks
 from torch.nn.parallel import DistributedDataParallel
 
 from flagdata.errors import FlagdataError
-from flagdata.rng import child_seed
+from flagdata.rng import torch_draws
 from models.learner import Learner, Loss
 from models.training import checkpoint
 from models.training.batches import Batch, Batches
@@ -119,8 +119,7 @@ class Training:
         )  # fmt: skip
 
     def _fresh(self) -> Learner:
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(child_seed(self.recipe.seed, "weights"))
+        with torch_draws(self.recipe.seed, "weights"):
             learner = self.recipe.learner()
         if self.recipe.loss.targets:
             learner.fit_scale(torch.from_numpy(self.train.truth(self.recipe.loss.targets)))
@@ -243,6 +242,6 @@ def _computing(precision: Precision, device: torch.device) -> Iterator[None]:
 
 def _share() -> tuple[int, int]:
     """(rank, ranks) of this process."""
-    if ranks.is_available() and ranks.is_initialized():
+    if ranks.is_initialized():
         return ranks.get_rank(), ranks.get_world_size()
     return 0, 1
