@@ -8,6 +8,7 @@ import uuid
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import cast
 from urllib.parse import unquote
@@ -217,10 +218,11 @@ class Lake:
         own = self.refs.view(branch, self.catalog.head())[0]
         if own.branch != branch or branch == into:
             raise UsageError(f"{branch!r} cannot be merged into {into!r}", fix="name two branches")
-        rows = self.table((own,)).to_pylist()
+        rows = {row["artifact"]: row for row in self.table((own,)).to_pylist()}
+        parents = {artifact: [p for p in row["parents"] if p in rows] for artifact, row in rows.items()}
         with self.transaction(message, branch=into) as transaction:
-            for row in rows:
-                transaction.add(Artifact.from_row(row))
+            for artifact in TopologicalSorter(parents).static_order():  # the table's order is by time, not by descent
+                transaction.add(Artifact.from_row(rows[artifact]))
         return cast(CommitResult, transaction.result)
 
     def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> Withdrawal:

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from string import Template
 
+import pytest
+
 from flagdata.cli import main
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -60,10 +62,11 @@ class Shell:
         verb, *arguments = shlex.split(Template(command).substitute(self.variables))
         assert verb == "flagdata", f"the runner knows no {verb!r}"
         out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                main(arguments)
-            except SystemExit as ended:
-                code = ended.code
-        assert code == 0, f"{command}\nended with {code}\n{out.getvalue()}{err.getvalue()}"
+        with (
+            pytest.raises(SystemExit) as ended,
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+        ):
+            main(arguments)
+        assert ended.value.code == 0, f"{command}\nended with {ended.value.code}\n{out.getvalue()}{err.getvalue()}"
         return out.getvalue()

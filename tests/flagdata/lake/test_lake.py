@@ -138,6 +138,18 @@ def test_a_merge_without_the_parents_is_refused_and_adds_nothing(lake: Lake, put
     assert lake.rows()["name"].to_pylist() == ["parent", "child"]
 
 
+def test_a_merge_brings_parents_before_their_children_whatever_begins_earlier(lake: Lake) -> None:
+    lake.branch("try")
+    wind = Artifact(kind=Kind.WIND, name="log", start=200, end=300)
+    recording = Artifact(kind=Kind.RECORDING, name="made of it", start=100, end=300, parents=(wind.id,))
+    with lake.transaction("both", branch="try") as tx:
+        tx.add(wind)
+        tx.add(recording)
+    assert lake.rows(at="try")["name"].to_pylist() == ["made of it", "log"]
+    assert len(lake.merge("try", "it worked").added) == 2
+    assert lake.rows()["name"].to_pylist() == ["made of it", "log"]
+
+
 def test_threads_that_share_a_lake_lose_no_row_and_repeat_none(lake: Lake, put_text: Put) -> None:
     texts = [f"{i}" for i in range(12)] * 3
     with ThreadPoolExecutor(max_workers=6) as pool:
