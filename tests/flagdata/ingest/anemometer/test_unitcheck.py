@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flagdata.ingest.anemometer import WindOptions, read_log, unitcheck
 from flagdata.units import unit
 
-WIND: NDArray[np.float64] = 5 * np.abs(np.random.default_rng(7).weibull(2.0, 400))
+WIND: NDArray[np.float64] = np.asarray(5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64)
 """m/s."""
 
 
