@@ -135,8 +135,8 @@ class Selection:
     def total(self) -> int:
         """How many rows there are without the limit."""
         with _explained(self.request):
-            row = self._relation.aggregate("count(*)").fetchone()  # pyright: ignore[reportCallIssue]  duckdb 1.5's stub
-        return int(row[0]) if row else 0
+            ((count,),) = self._relation.aggregate("count(*)").fetchall()
+        return int(count)
 
     def batches(self, size: int = 65_536) -> pa.RecordBatchReader:
         """The rows as a stream of record batches of at most `size` rows."""

@@ -44,6 +44,7 @@ class WaveNetwork(nn.Module):
         if unknown or not channels:
             raise InputError(f"wave maps {sorted(unknown)} are not known", fix="name some of WAVE_CHANNELS")
         self.dimension = dimension
+        self.channels = len(WAVE_CHANNELS)
         self._chosen = [WAVE_CHANNELS.index(name) for name in channels]
         self.standardise = nn.BatchNorm2d(len(channels), affine=False)
         ins = (len(channels), *widths[:-1])

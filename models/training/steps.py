@@ -46,7 +46,7 @@ Bars: TypeAlias = Callable[[int, str, str], AbstractContextManager[Callable[[int
 class DivergedError(FlagdataError):
     """The loss is no longer a number."""
 
-    kind = "diverged"
+    kind = "training-diverged"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -22,6 +22,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "sdn": {"widths": (8, 8, 16), "dimension": 12},
     "resnet18": {"frames": 3, "width": 4},
     "cardona": {"frames": 4, "width": 4, "hidden": 8},
+    "wave": {"widths": (6, 8, 8), "dimension": 5},
     "yang": {"frames": 4, "hidden": 8, "grid": 2, "features": 16},
 }
 """Arguments that make each network of the table small enough for a test."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import simplejpeg
 from PIL import Image
 
 from flagdata.errors import InputError
+from flagdata.record.writer import Coding
 from flagdata.tables import Range
 from sim.datasets.picture import filled, jpegs, settings
 from sim.datasets.recipe import CameraSpec
@@ -76,9 +78,13 @@ def test_a_film_with_a_frame_too_long_has_the_best_quality_at_which_all_fit() ->
 
 def test_each_setting_has_a_stream_of_its_own() -> None:
     spec = CameraSpec(
-        jpeg_quality=Range(low=70, high=90), read_noise=Range(low=0, high=2), shot_noise=1.0, frame_slot=1
-    )
-    fixed = CameraSpec(jpeg_quality=80, read_noise=Range(low=0, high=2), shot_noise=1.0, frame_slot=1)
+        coding=Coding.JPEG, jpeg_quality=Range(low=70, high=90), rate_factor=20.0, read_noise=Range(low=0, high=2),
+        shot_noise=1.0, frame_slot=1,
+    )  # fmt: skip
+    fixed = replace(spec, jpeg_quality=80)
+    video = replace(spec, coding=Coding.H264, rate_factor=Range(low=18, high=24))
+    assert settings(video, seed=5)["camera.read_noise"] == settings(spec, seed=5)["camera.read_noise"]
+    assert 18 <= settings(video, seed=5)["camera.rate_factor"] <= 24
     assert settings(spec, seed=5)["camera.read_noise"] == settings(fixed, seed=5)["camera.read_noise"]
     drawn = [settings(spec, seed=seed)["camera.jpeg_quality"] for seed in range(40)]
     assert all(70 <= value <= 90 and value == round(value) for value in drawn)
