@@ -95,6 +95,7 @@ def test_recurrent_networks_say_so() -> None:
         "sdn": False,
         "resnet18": False,
         "cardona": True,
+        "wave": False,
         "yang": True,
     }
 
