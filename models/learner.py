@@ -112,11 +112,6 @@ class Learner(nn.Module):
             raise InputError(f"a {self.objective.value} gives no distribution", fix="take a model of a posterior loss")
         return self.head(embedding)
 
-    def draws(self, embedding: Tensor, count: int, generator: torch.Generator) -> Tensor:
-        """(n, count, target) draws of the distributions, in the targets' units."""
-        drawn = self.mixture(embedding).sample(count, generator)
-        return self._values(drawn * self.spread + self.centre)
-
     def _learned(self, values: Tensor) -> Tensor:
         return self.scaling.learned(values) if self.objective is Loss.POSTERIOR else values.float()
 

@@ -3,20 +3,18 @@ networks."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
 from models.boosting import fit_boosting
 from models.crops import Cropping
-from models.evaluation.predict import DRAWS
+from models.evaluation.predict import DRAWS, milliseconds
 from models.evaluation.predictions import Predictions
 from models.frontend import FrontEnd
 from models.handmade import FEATURES, features
@@ -26,7 +24,6 @@ from models.training.inputs import Prepared, prepare_clips, prepare_films
 TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
 _FRONT_END = FrontEnd(maps="handmade")
 _VARIANTS = 4
-_TIMED = 12
 
 Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
@@ -43,19 +40,25 @@ def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed:
     x, y = _table(known, _VARIANTS), np.tile(known.truth(TARGETS), (_VARIANTS, 1))
     group = np.tile(known.sequence, _VARIANTS)
     wanted, truth = _table(asked, 1), asked.truth(TARGETS)
-    milliseconds = _milliseconds(judged, cropping)
+
+    def work(clip: NDArray[np.uint8]) -> None:
+        film = clip[0]
+        cut = cropping.cut(film, cropping.whole((film.shape[0], film.shape[1], film.shape[2])))
+        features(cut[None].float(), rate=_FRONT_END.rate)
+
+    spent = milliseconds(work, judged)
     ridge = fit_ridge(x, y, group=group)
     boosting = fit_boosting(x, y, seed=child_seed(seed, "boosting") % 2**32)
     common = {"targets": TARGETS, "truth": truth, "group": asked.sequence, "embedding": None}
     note = f"{len(FEATURES)} hand-made features, {_VARIANTS} crops of each film"
     return [
         Predictions(
-            label="ridge", mean=ridge.predict(wanted), samples=None, milliseconds=milliseconds, note=note,
+            label="ridge", mean=ridge.predict(wanted), samples=None, milliseconds=spent, note=note,
             parameters=ridge.weights.size + ridge.intercept.size, **common,
         ),
         Predictions(
             label="boosting", mean=boosting.predict(wanted), samples=boosting.samples(wanted, count=DRAWS),
-            milliseconds=milliseconds, note=note, parameters=0, **common,
+            milliseconds=spent, note=note, parameters=0, **common,
         ),
     ]  # fmt: skip
 
@@ -64,20 +67,3 @@ def _table(prepared: Prepared, variants: int) -> NDArray[np.float64]:
     entries = np.arange(len(prepared))
     parts = [prepared.batch(entries, np.full(len(entries), variant)).double().numpy() for variant in range(variants)]
     return np.concatenate(parts)
-
-
-def _milliseconds(pairs: Pairs, cropping: Cropping) -> float:
-    """From a clip's pixels to its features on one core: the median of some."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    found = []
-    try:
-        for index in range(min(_TIMED, len(pairs))):
-            clip = pairs[index].clip[0].numpy()
-            begun = time.perf_counter()
-            cut = cropping.cut(clip, cropping.whole((clip.shape[0], clip.shape[1], clip.shape[2])))
-            features(cut[None].float(), rate=_FRONT_END.rate)
-            found.append(time.perf_counter() - begun)
-    finally:
-        torch.set_num_threads(threads)
-    return 1e3 * float(np.median(found))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.dataset.pairs import Pairs
@@ -100,6 +102,17 @@ def _batch(prepared: Prepared, first: int) -> Tensor:
 @torch.no_grad()
 def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
     """Milliseconds a clip takes on one core from its pixels: the median of some clips, one at a time."""
+
+    def work(clip: NDArray[np.uint8]) -> None:
+        inputs = estimator.inputs(clip)
+        for learner in estimator.learners:
+            learner.head(learner.network(inputs))
+
+    return milliseconds(work, pairs)
+
+
+def milliseconds(work: Callable[[NDArray[np.uint8]], object], pairs: Pairs) -> float:
+    """What one clip (1, frames, height, width) costs on one core: the median of some, decoded before [ms]."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     clips = [pairs[index].clip.numpy() for index in range(min(_TIMED, len(pairs)))]
@@ -107,9 +120,7 @@ def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
     try:
         for clip in clips:
             begun = time.perf_counter()
-            inputs = estimator.inputs(clip)
-            for learner in estimator.learners:
-                learner.head(learner.network(inputs))
+            work(clip)
             found.append(time.perf_counter() - begun)
     finally:
         torch.set_num_threads(threads)

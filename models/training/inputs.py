@@ -250,11 +250,7 @@ def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> N
 
 
 def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:
-    return digest(canonical({"front_end": front_end.hash, "object": content, **{k: _plain(v) for k, v in key.items()}}))
-
-
-def _plain(value: Any) -> Any:
-    return str(value) if isinstance(value, str) else value
+    return digest(canonical({"front_end": front_end.hash, "object": content, **key}))
 
 
 def _fill(
