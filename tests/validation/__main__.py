@@ -8,6 +8,7 @@ from tests.validation.page import draw_page
 VALIDATIONS = {
     "arcsim": "tests.validation.arcsim",
     "arcsim-loop": "tests.validation.arcsim_loop",
+    "clip-information": "tests.validation.clip_information",
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
@@ -16,6 +17,7 @@ VALIDATIONS = {
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",
     "renderers": "tests.validation.renderers",
+    "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
 }
 
