@@ -1,4 +1,4 @@
-"""How well could wind and area weight be told from a clip at best? From the flag's true motion, with nothing to be seen.
+"""How well could wind and area weight be told from a clip at best? From the true motion, with nothing to be seen.
 
 Markers on each simulated flag are followed without error: in space, or in the picture of the camera that filmed them.
 Simple statistics of their motion go to gradient boosting, trained on the training side's flags and tested on the test
@@ -89,7 +89,7 @@ def _errors(features: NDArray[np.float64], wanted: NDArray[np.float64], test: ND
 
 
 def _followed(lake: Lake) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_]]:
-    """(n, 50, marker, 3) [m], (n, 50, marker, 2) in picture widths, (n, 2) wind and area weight, (n,) whether tested."""
+    """(n, 50, marker, 3) [m], (n, 50, marker, 2) in picture widths, (n, 2) wind and weight, (n,) whether tested."""
     objects = {row["artifact"]: row["object"] for row in lake.rows("kind = 'meshes'").to_pylist()}
     space, picture, truth, test = [], [], [], []
     for row in lake.rows("kind = 'recording'").to_pylist():
