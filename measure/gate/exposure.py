@@ -23,5 +23,5 @@ def contrast(seen: Seen) -> float:
 
 
 def noise(seen: Seen) -> float:
-    """Common logarithm of the still part's deviation in time over the contrast of the mean picture."""
+    """Common logarithm of the noise's deviation over the contrast of the mean picture."""
     return float(np.log10(max(seen.still, 1e-2) / max(seen.contrast, 1e-2)))

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from measure.gate.checks import measured
 from models.estimator import Estimator
+from models.handmade import FEATURES
 from models.handmade import features as handmade
+from models.outliers import Familiarity
 
 MOVES = ("mirrored", "cropped")
 """Changes that leave wind and cloth as they are: left and right exchanged, the middle nine tenths of the picture."""
@@ -37,10 +39,16 @@ class Features:
     distance: float
     moved: NDArray[np.float64]
 
-    def vector(self, whitened: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(f,) everything in one, the summary as the training clips' covariance whitens it."""
+    @property
+    def frequency(self) -> float:
+        """Dominant frequency of the motion, the mean over pixels by their power [Hz]."""
+        return float(self.handmade[FEATURES.index("local_frequency_mean")])
+
+    def vector(self, model: Estimator) -> NDArray[np.float64]:
+        """(f,) everything in one, the summary as the training clips' covariance whitens it, distances as logarithms."""
+        cloud = _cloud(model)
         logs = np.log10(np.maximum([self.distance, *self.moved], 1e-3))
-        return np.concatenate([self.checks, self.handmade, whitened, logs])
+        return np.concatenate([self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs])
 
 
 def features_of(model: Estimator, frames: NDArray[np.uint8]) -> Features:
@@ -53,12 +61,7 @@ def features_of(model: Estimator, frames: NDArray[np.uint8]) -> Features:
     Raises:
         InputError: frames that do not fit the model, a clip without contrast, or a model without a cloud.
     """
-    cloud = model.cloud
-    if cloud is None:
-        raise InputError(
-            "the model keeps no summaries of its training clips", where=f"model {model.name!r}",
-            fix="ship it by python -m models.shipping, which keeps them",
-        )  # fmt: skip
+    cloud = _cloud(model)
     side = min(frames.shape[1:])
     cut = round(side * (1 - _KEPT) / 2)
     top, left = (frames.shape[1] - side) // 2, (frames.shape[2] - side) // 2
@@ -73,3 +76,12 @@ def features_of(model: Estimator, frames: NDArray[np.uint8]) -> Features:
         summary=embeddings[0], distance=float(cloud.distance(embeddings[:1])[0]),
         moved=np.linalg.norm(moved, axis=1),
     )  # fmt: skip
+
+
+def _cloud(model: Estimator) -> Familiarity:
+    if model.cloud is None:
+        raise InputError(
+            "the model keeps no summaries of its training clips", where=f"model {model.name!r}",
+            fix="ship it by python -m models.shipping, which keeps them",
+        )  # fmt: skip
+    return model.cloud

@@ -10,7 +10,7 @@ calibrated, on clips that shaped no check. So the stated false-alarm rate is tha
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,7 @@ SCORES: tuple[Score, ...] = (
 _RESOLUTION = np.array(
     [*(CHECKS[name].resolution for name, *_ in _SIDED), 0.02, *(0.05 for _ in MOVES), 0.2, *(0.5 for _ in DISTORTIONS)]
 )
-_HANDMADE_FROM = len(CHECKS)
+_FREQUENCY = len(CHECKS) + FEATURES.index("local_frequency_mean")
 _LEARNING = 0.6
 """Share of the plain clips of the fit that covariances are learned from; the others tell the tails."""
 
@@ -86,6 +86,7 @@ class Gate:
         calibration: (n,) ascending joint scores of the calibration clips.
         statistics: (n, len(CHECKS)) of the calibration clips.
         summaries: (n, d) of the calibration clips.
+        frequencies: (n,) dominant frequency of the calibration clips' motion [Hz].
     """
 
     centre: Vector
@@ -97,6 +98,7 @@ class Gate:
     calibration: Vector
     statistics: Vector
     summaries: Vector
+    frequencies: Vector
 
     @classmethod
     def of(
@@ -140,13 +142,11 @@ class Gate:
         gate = cls(
             centre=centre, scale=scale, whitening=whitening, directions=np.array(directions),
             offsets=np.array(offsets), tails=blank, calibration=np.zeros(0),
-            statistics=calibration[:, : len(CHECKS)], summaries=summaries,
+            statistics=calibration[:, : len(CHECKS)], summaries=summaries, frequencies=calibration[:, _FREQUENCY],
         )  # fmt: skip
         return gate._calibrated(rest, calibration)
 
     def _calibrated(self, rest: Vector, calibration: Vector) -> Gate:
-        from dataclasses import replace
-
         gate = replace(self, tails=Tails.of(self.scores(rest), _RESOLUTION))
         return replace(gate, calibration=np.sort(gate.surprises(calibration).max(axis=1)))
 

@@ -28,7 +28,7 @@ def energy(seen: Seen) -> float:
 
 
 def strength(seen: Seen) -> float:
-    """Common logarithm of the strongest deviation in time (99.5 % of the pixels' lie below) over the still part's."""
+    """Common logarithm of the strongest deviation in time (99.5 % of the pixels' lie below) over the noise's."""
     return float(np.log10(max(float(np.quantile(seen.deviation, 0.995)), 1e-2) / max(seen.still, 0.1)))
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy import ndimage
 from torch.nn import functional
 
 from flagdata.errors import InputError
@@ -16,9 +17,13 @@ SIDE = 112
 """Height and width [px] that pictures are averaged down to; in px of this grid all lengths are given."""
 LEAST_FRAMES = 3
 _NOISES = 4.0
-"""Deviations of the still part's noise by which a pixel's must exceed it to be called moving."""
-_LEAST_DEVIATION = 1.0
-"""Gray levels below which no deviation is called motion: rounding alone leaves 0.3."""
+"""Deviations of the noise that a pixel's must have to be called moving."""
+_LEAST_DEVIATION = 1.5
+"""Gray levels below which no deviation is called motion: rounding and coding leave up to one."""
+_ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+"""The difference of two Laplacians; white noise of deviation σ leaves 6 σ."""
+_MEDIAN = 0.6745
+"""Median of the absolute value of a standard normal variable."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,8 +68,13 @@ class Seen:
 
     @cached_property
     def still(self) -> float:
-        """Deviation of the still part [gray levels]: the lower quartile over all pixels."""
-        return float(np.quantile(self.deviation, 0.25))
+        """Standard deviation of the noise [gray levels].
+
+        Immerkær's filter (Computer Vision and Image Understanding 64, 1996), which smooth pictures pass not, over the
+        changes from frame to frame, by the median: neither texture nor what moves counts as noise.
+        """
+        rough = ndimage.convolve(np.diff(self.gray, axis=0), _ROUGH[None], mode="nearest")
+        return float(np.median(np.abs(rough[:, 1:-1, 1:-1]))) / (_MEDIAN * 6 * np.sqrt(2))
 
     @cached_property
     def excess(self) -> NDArray[np.float32]:
