@@ -39,7 +39,7 @@ class Score:
     """What a score is.
 
     Attributes:
-        name: of the check, the distortion or the distance.
+        name: of the check, of the distance, or "like-" and the distortion's.
         reason: kind of `measure.gate.reasons` that a high value speaks for.
         sign: −1 where the statistic itself is suspicious when low.
         what: the figure in words.
@@ -60,7 +60,7 @@ SCORES: tuple[Score, ...] = (
     ),
     Score(name="all-features", reason="unlike-cloth", sign=1.0, what="distance of all features together"),
     *(
-        Score(name=name, reason=one.reason, sign=1.0, what=f"log-likelihood ratio of a clip made {name!r} to a plain one")
+        Score(name=f"like-{name}", reason=one.reason, sign=1.0, what=f"log-likelihood ratio of a clip made {name!r} to a plain one")
         for name, one in DISTORTIONS.items()
     ),
 )
