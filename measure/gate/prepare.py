@@ -1,6 +1,6 @@
 """Calibrate the gate of a model on the films of a lake: `python -m measure.gate.prepare --help`.
 
-It is run anew whenever a network is replaced. Training-side films shape the checks, half an hour of one core at most;
+It is run anew whenever a network is replaced. Training-side films shape the checks, some five minutes of one core;
 validation-side films alone, one of each simulation, decide where the gate refuses.
 """
 
@@ -22,7 +22,7 @@ from measure.gate.features import Features, features_of
 from measure.gate.gate import Gate
 from models.estimator import SHIPPED, Estimator, load
 
-PLAIN, DISTORTED = 500, 100
+PLAIN, DISTORTED = 360, 30
 """Training-side films that are taken as they are, and others of which every distortion is made."""
 _LEAST = 60
 Advance = Callable[[int], None]
