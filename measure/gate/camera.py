@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from measure.gate.seen import SIDE, Seen
 
@@ -55,10 +54,10 @@ def _phase_shift(one: NDArray[np.float32], other: NDArray[np.float32], noise: fl
     """How far the second picture lies below and right of the first [px]."""
     hann = np.hanning(_TILE)
     window = np.outer(hann, hann)
-    first, second = (fft.rfft2((picture - picture.mean()) * window) for picture in (one, other))
+    first, second = (np.fft.rfft2((picture - picture.mean()) * window) for picture in (one, other))
     cross = second * np.conj(first)
     floor = (1.0 + noise**2) * np.square(window).sum()
-    surface = fft.irfft2(cross / (np.abs(cross) + floor), s=(_TILE, _TILE))
+    surface = np.fft.irfft2(cross / (np.abs(cross) + floor), s=(_TILE, _TILE))
     y, x = (int(place) for place in np.unravel_index(surface.argmax(), surface.shape))
     return _refined(surface[:, x], y), _refined(surface[y], x)
 

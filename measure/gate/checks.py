@@ -66,7 +66,7 @@ CHECKS: dict[str, Check] = {
         measure=motion.around, what="share of the picture's rim that moves", high="moving-camera", resolution=0.05
     ),
     "off-centre": Check(
-        measure=motion.off_centre, what="distance of the motion from the middle [sides]", high="cut-off", resolution=0.02
+        measure=motion.off_centre, what="distance of the motion from the middle", high="cut-off", resolution=0.02
     ),
     "width": Check(
         measure=motion.width, what="width of what moves [sides]", high="scale", low="scale", resolution=0.03
@@ -83,7 +83,7 @@ CHECKS: dict[str, Check] = {
         resolution=0.03,
     ),
     "edges-moving": Check(
-        measure=motion.edges_moving, what="share of the picture's edges that move", high="moving-camera", resolution=0.03
+        measure=motion.edges_moving, what="share of edges that move", high="moving-camera", resolution=0.03
     ),
     "shift": Check(
         measure=camera.shift, what="shift of the picture's rim [1/112 of its side]", high="moving-camera",

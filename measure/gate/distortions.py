@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from measure.gate.seen import Seen
+from measure.gate.seen import SIDE, Seen
 
 Film = NDArray[np.uint8]
 Distort = Callable[[Film, Film, np.random.Generator, int], Film]
@@ -44,7 +44,7 @@ def _still(film: Film, other: Film, rng: np.random.Generator, count: int) -> Fil
 def _cut(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
     """The picture is cut through the moving part, on one side or two."""
     side = min(film.shape[1:])
-    mass = ndimage.zoom(np.sqrt(Seen.of(film).excess), side / 112, order=1)
+    mass = np.asarray(ndimage.zoom(np.sqrt(Seen.of(film).excess), side / SIDE, order=1))
     ends = []
     for profile in (mass.sum(axis=0), mass.sum(axis=1)):
         share = np.cumsum(profile) / max(float(profile.sum()), 1e-6)
@@ -69,7 +69,7 @@ def _camera(film: Film, other: Film, rng: np.random.Generator, count: int) -> Fi
     shake = rng.normal(0, rng.uniform(0.001, 0.01) * side, (2, count))
     path = drift + swing + shake
     margin = int(np.ceil(np.abs(path).max())) + 1
-    moved = np.stack([ndimage.shift(film[k], path[:, k], order=1, mode="nearest") for k in range(count)])
+    moved = np.stack([_shifted(film[k], path[:, k]) for k in range(count)])
     margin = min(margin, side // 4)
     return moved[:, margin:-margin, margin:-margin]
 
@@ -119,7 +119,7 @@ def _pair(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film
 def _small(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
     """The flag far away: the picture small before a still one, which is its own surroundings, mirrored."""
     share = rng.uniform(0.2, 0.45)
-    small = np.stack([ndimage.zoom(frame, share, order=1) for frame in film[:count]])
+    small = np.stack([np.asarray(ndimage.zoom(frame, share, order=1)) for frame in film[:count]])
     high, wide = small.shape[1:]
     full = int(min(film.shape[1:]))
     free_y, free_x = full - high, full - wide
@@ -167,6 +167,10 @@ def _patchwork(film: Film, other: Film, rng: np.random.Generator, count: int) ->
     return clip
 
 
+def _shifted(frame: Film, offset: NDArray[np.float64]) -> Film:
+    return np.asarray(ndimage.shift(frame, offset, order=1, mode="nearest"), dtype=np.uint8)
+
+
 def _noisy(clip: Pixels | Film, sigma: float, rng: np.random.Generator) -> Film:
     noise = rng.standard_normal(clip.shape, dtype=np.float32) * np.float32(sigma)
     return np.clip(np.round(clip + noise), 0, 255).astype(np.uint8)
@@ -177,7 +181,7 @@ def _squared(clip: Film) -> Film:
     side = min(clip.shape[1:])
     zoom = (1, side / clip.shape[1], side / clip.shape[2])
     blurred = ndimage.gaussian_filter(clip.astype(np.float32), (0, 0.4 * (1 / zoom[1] - 1), 0.4 * (1 / zoom[2] - 1)))
-    return np.clip(ndimage.zoom(blurred, zoom, order=1), 0, 255).astype(np.uint8)
+    return np.clip(np.asarray(ndimage.zoom(blurred, zoom, order=1)), 0, 255).astype(np.uint8)
 
 
 DISTORTIONS: dict[str, Distortion] = {

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
-from measure.gate.features import MOVES, Features
+from measure.gate.features import MOVES
 from measure.gate.tails import Tails, joint_p
 from models.handmade import FEATURES
 from models.outliers import shrunk_covariance
@@ -60,7 +60,12 @@ SCORES: tuple[Score, ...] = (
     ),
     Score(name="all-features", reason="unlike-cloth", sign=1.0, what="distance of all features together"),
     *(
-        Score(name=f"like-{name}", reason=one.reason, sign=1.0, what=f"log-likelihood ratio of a clip made {name!r} to a plain one")
+        Score(
+            name=f"like-{name}",
+            reason=one.reason,
+            sign=1.0,
+            what=f"log-likelihood ratio of a clip made {name!r} to a plain one",
+        )
         for name, one in DISTORTIONS.items()
     ),
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -54,8 +56,10 @@ def off_centre(seen: Seen) -> float:
     """Distance of the motion's centre of mass from the picture's middle, in sides of the picture."""
     if not seen.moving.any():
         return 0.0
-    y, x = ndimage.center_of_mass(np.sqrt(seen.excess))
-    return float(np.hypot(y - (SIDE - 1) / 2, x - (SIDE - 1) / 2)) / SIDE
+    amplitude = np.sqrt(seen.excess)
+    places = (np.arange(SIDE) - (SIDE - 1) / 2) / SIDE
+    y, x = (float(amplitude.sum(axis=axis) @ places / amplitude.sum()) for axis in (1, 0))
+    return float(np.hypot(y, x))
 
 
 def width(seen: Seen) -> float:
@@ -73,26 +77,27 @@ def second_region(seen: Seen) -> float:
     amplitude = ndimage.gaussian_filter(np.sqrt(seen.excess), _SMOOTHING)
     if amplitude.max() <= 0:
         return 0.0
-    labels, count = ndimage.label(amplitude > _REGION * amplitude.max())
-    if count < 2:
-        return 0.0
-    masses = np.sort(ndimage.sum_labels(amplitude, labels, np.arange(1, count + 1)))
-    return float(masses[-2] / masses[-1])
+    masses = _masses(amplitude > _REGION * amplitude.max(), amplitude)
+    return float(masses[-2] / masses[-1]) if len(masses) > 1 else 0.0
 
 
 def scatter(seen: Seen) -> float:
     """Share of the motion outside of the largest region of moving pixels that touch."""
-    labels, count = ndimage.label(seen.moving)
-    if count == 0:
-        return 0.0
-    masses = ndimage.sum_labels(np.sqrt(seen.excess), labels, np.arange(1, count + 1))
-    return 1 - float(masses.max() / masses.sum())
+    masses = _masses(seen.moving, np.sqrt(seen.excess))
+    return 1 - float(masses[-1] / masses.sum()) if len(masses) else 0.0
 
 
 def edges_moving(seen: Seen) -> float:
     """Share of the mean picture's edges, its steepest tenth, that move: all of them where the camera does."""
     steep = seen.slope >= np.quantile(seen.slope, 0.9)
     return float(seen.moving[steep].mean())
+
+
+def _masses(inside: NDArray[np.bool_], amplitude: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Sums of the amplitude over the connected regions, ascending."""
+    found: Any = ndimage.label(inside)
+    labels, count = found
+    return np.sort(np.asarray(ndimage.sum_labels(amplitude, labels, np.arange(1, count + 1)), dtype=np.float64))
 
 
 def _extent(profile: NDArray[np.float32]) -> float:

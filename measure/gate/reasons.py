@@ -33,7 +33,8 @@ REASONS: dict[str, Reason] = {
     ),
     "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
     "low-frame-rate": Reason(
-        sentence="frames are held: the true frame rate is lower than the model's", fix="film at the model's rate or more"
+        sentence="frames are held: the true frame rate is lower than the model's",
+        fix="film at the model's rate or more",
     ),
     "too-dark": Reason(
         sentence="the picture is darker, flatter or noisier than those known", fix="film by daylight, or expose longer"

@@ -57,9 +57,9 @@ def joint_p(calibration: NDArray[np.float64], score: float) -> float:
 def level(count: int, false_alarm: float, confidence: float) -> float:
     """The p at or below which a clip is refused, so that the false-alarm rate keeps to what is stated.
 
-    Given the calibration clips, the rate at which familiar clips have p ≤ k/(n + 1) is distributed as Beta(k, n + 1 − k)
-    (Vovk, Asian Conference on Machine Learning 2012, proposition 2a). k is the largest at which this rate is at most
-    `false_alarm` with probability `confidence`.
+    Given the calibration clips, the rate at which familiar clips have p ≤ k/(n + 1) is distributed as Beta(k,
+    n + 1 − k) (Vovk, Asian Conference on Machine Learning 2012, proposition 2a). k is the largest at which this rate
+    is at most `false_alarm` with probability `confidence`.
 
     Args:
         count: n, of the calibration clips.

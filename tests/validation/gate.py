@@ -1,4 +1,4 @@
-"""How often the gate refuses simulated clips, and what it says of 60 clips that are not what the network was trained on.
+"""How often the gate refuses simulated clips, and what it says of 60 clips unlike those the network was trained on.
 
 The lake is named by FLAGDATA_LAKE and holds the data set `flagsim-wide`. The model is the one that comes with the
 package; its gate is read from its folder, or calibrated from the lake where it has none. False alarms are counted on
@@ -111,7 +111,7 @@ def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
     if not path.exists():
         return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
     with av.open(str(path)) as container:
-        film = np.stack([frame.to_ndarray(format="gray") for frame in container.decode(video=0)])
+        film = np.array([frame.to_ndarray(format="gray") for frame in container.decode(video=0)], dtype=np.uint8)
     count = model.front_end.frames
     windows = [film[first : first + count] for first in range(0, len(film) - count + 1, count)]
     return {"clip": _CLIP, "windows": [_window(window, model, gate) for window in windows]}
@@ -138,22 +138,30 @@ def _page(result: dict[str, Any]) -> str:
         for name, kind in clips["kinds"].items()
     ]
     examples = [f"- {name}: {kind['example']}" for name, kind in clips["kinds"].items() if kind["example"]]
-    text = [
-        "# The gate", "",
+    stated = (
         f"Model {result['model']}; {result['calibration_clips']} calibration clips; stated: at most "
         f"{result['false_alarm']:.0%} false alarms, with confidence {result['confidence']:.0%} "
-        f"(refused at p ≤ {result['level']:.3g}).", "",
+        f"(refused at p ≤ {result['level']:.3g})."
+    )
+    false = (
         f"False alarms: {alarms['hits']} of {alarms['count']} clips of the test side, {alarms['value']:.1%} "
-        f"[{alarms['low']:.1%}, {alarms['high']:.1%}] 90 %.", "",
+        f"[{alarms['low']:.1%}, {alarms['high']:.1%}] 90 %."
+    )
+    caught = (
         f"Of {clips['clips']} clips that are not what it was trained on, {refusals['hits']} were refused, "
-        f"{refusals['value']:.0%} [{refusals['low']:.0%}, {refusals['high']:.0%}] 90 %; {clips['right_first_reason']} with the right first "
-        f"reason, {clips['right_among_reasons']} with it among the reasons.", "",
-        "| kind | refused | right first reason | first reasons |", "|---|---|---|---|", *rows, "",
-        "First reasons of one clip of each kind:", "", *examples, "",
-    ]  # fmt: skip
+        f"{refusals['value']:.0%} [{refusals['low']:.0%}, {refusals['high']:.0%}] 90 %; "
+        f"{clips['right_first_reason']} with the right first reason, {clips['right_among_reasons']} with it among "
+        "the reasons."
+    )
+    text = ["# The gate", "", stated, "", false, "", caught, ""]
+    text += ["| kind | refused | right first reason | first reasons |", "|---|---|---|---|", *rows, ""]
+    text += ["First reasons of one clip of each kind:", "", *examples, ""]
     real = result["real_clip"]
     if "windows" in real:
         refused = sum(not window["familiar"] for window in real["windows"])
-        text += [f"The real recording {real['clip']}: {refused} of {len(real['windows'])} windows refused. The first:", ""]
+        text += [
+            f"The real recording {real['clip']}: {refused} of {len(real['windows'])} windows refused. The first:",
+            "",
+        ]
         text += [f"- {sentence}" for sentence in real["windows"][0]["reasons"]]
     return "\n".join(text).rstrip() + "\n"

@@ -138,7 +138,7 @@ def tree(films: Films, rng: np.random.Generator) -> Film:
 
 
 def sheet(films: Films, rng: np.random.Generator) -> Film:
-    """A simulated sheet held by its four corners, more or less slack, that billows in the wind and hardly moves then."""
+    """A simulated sheet held by its four corners, more or less slack, that billows and then hardly moves."""
     mesh = grid(width=1.4, height=1.0, columns=21, rows=15)
     start = upright(mesh)
     corners = [
@@ -256,8 +256,10 @@ def _tree(
     draw = ImageDraw.Draw(picture)
 
     def grow(x: float, y: float, angle: float, length: float, width: float, depth: int) -> None:
-        swing = gust * (7 - depth) ** 0.8 * math.sin(
-            2 * math.pi * rng.uniform(0.3, 1.0) * (7 - depth) ** 0.7 * time + rng.uniform(0, 6.3)
+        swing = (
+            gust
+            * (7 - depth) ** 0.8
+            * math.sin(2 * math.pi * rng.uniform(0.3, 1.0) * (7 - depth) ** 0.7 * time + rng.uniform(0, 6.3))
         )
         angle += swing
         end_x, end_y = x + length * math.cos(angle), y - length * math.sin(angle)

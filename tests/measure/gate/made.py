@@ -24,7 +24,7 @@ def background(seed: int = 0) -> NDArray[np.float64]:
 
     rng = np.random.default_rng(seed)
     noise = rng.normal(size=(SIZE, SIZE))
-    picture = sum(ndimage.gaussian_filter(noise, s, mode="wrap") * s for s in (1.5, 4, 12))
+    picture = np.sum([ndimage.gaussian_filter(noise, s, mode="wrap") * s for s in (1.5, 4, 12)], axis=0)
     return 60 + 130 * (picture - picture.min()) / np.ptp(picture)
 
 

@@ -94,6 +94,6 @@ def test_every_score_has_a_reason_with_words() -> None:
 
 
 def test_a_distortion_without_clips_is_an_error() -> None:
+    made = {kind: distorted(1, 30, kind) for kind in KINDS if kind != "camera"}
     with pytest.raises(InputError, match="no clips of camera"):
-        made = {kind: distorted(1, 30, kind) for kind in KINDS if kind != "camera"}
         Gate.of(plain(1, 100), made, plain(2, 50), summaries=plain(2, 50)[:, :4])

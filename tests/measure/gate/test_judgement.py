@@ -75,9 +75,7 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     assert all(finding.fix and finding.kind.startswith("gate-") for finding in judged.findings())
 
 
-def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(
-    model: Estimator, gate: Gate
-) -> None:
+def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(model: Estimator, gate: Gate) -> None:
     short = judge(clip(1)[:10], model, gate)
     assert [one.kind for one in short.reasons] == ["too-few-frames"]
     assert "10 instead of 12" in short.sentence
