@@ -151,16 +151,19 @@ def judge(
 
 
 def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float) -> tuple[Told, ...]:
-    """Each kind once, by its weightiest score, of those scores that would refuse the clip alone.
+    """Each kind once, of those whose scores would refuse the clip alone.
 
     A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
     as a share of the clip's largest, and, by `_LIKENESS`, the log-likelihood ratio of the kind's likeliest distortion
-    as a share of the largest.
+    as a share of the largest. The figure that is told is that of the picture's weightiest statistic, where one refuses.
     """
     weightiest: dict[str, int] = {}
+    pictured: dict[str, int] = {}
     for place in np.argsort(-surprises):
         if gate.p_value(float(surprises[place])) <= at:
             weightiest.setdefault(SCORES[place].reason, int(place))
+            if SCORES[place].name in CHECKS:
+                pictured.setdefault(SCORES[place].reason, int(place))
     ratios = dict.fromkeys(weightiest, 0.0)
     for place in range(len(SCORES) - len(DISTORTIONS), len(SCORES)):
         kind = SCORES[place].reason
@@ -172,7 +175,7 @@ def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float) -> tuple[
     )
     return tuple(
         _told(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
-        for place in (weightiest[kind] for kind in order)
+        for place in (pictured.get(kind, weightiest[kind]) for kind in order)
     )
 
 

@@ -72,6 +72,7 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     assert judged.reasons[0].sentence in judged.sentence
     assert len({one.kind for one in judged.reasons}) == len(judged.reasons)
     assert all(one.p <= judged.level for one in judged.reasons)
+    assert not next(one for one in judged.reasons if one.kind == kind).check.startswith("like-")
     assert all(finding.fix and finding.kind.startswith("gate-") for finding in judged.findings())
 
 
