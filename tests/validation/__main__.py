@@ -13,6 +13,7 @@ VALIDATIONS = {
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
+    "gate": "tests.validation.gate",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",
