@@ -17,7 +17,7 @@ from measure.refine.peers.gaussian import fitted, signed
 from measure.refine.peers.library import library
 
 _FIRST = 2  # evaluations that a Gaussian process needs to be standardised
-_RESTARTS, _RAW = 4, 128
+_RESTARTS, _RAW, _STEPS = 4, 128, 100
 
 
 class BayesianOptimisation:
@@ -53,7 +53,7 @@ class BayesianOptimisation:
                 acquisition = logei.qLogExpectedImprovement(model, best_f=best, sampler=sampler)
             found, _ = optim.optimize_acqf(
                 acquisition, bounds=bounds, q=self._batch, num_restarts=_RESTARTS, raw_samples=_RAW,
-                options={"seed": child_seed(self._seed, "peers", "bayesian", "starts", count) % 2**31},
+                options={"maxiter": _STEPS, "seed": child_seed(self._seed, "peers", "bayesian", "starts", count) % 2**31},
             )  # fmt: skip
         return signed(found)
 

@@ -18,6 +18,7 @@ from torch import Tensor
 from measure.refine.peers.library import library
 
 _OF = "botorch"
+_STEPS = 100  # of the fit; more change the length scales by little, and a noise-free surface takes them all
 
 
 def fitted(points: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
@@ -47,7 +48,10 @@ def fitted(points: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the linear algebra's jitter, and the deprecations of torch's own tracing
         model = models.SingleTaskGP(x, y, covar_module=kernel, outcome_transform=transforms.Standardize(m=1))
-        fit.fit_gpytorch_mll(likelihoods.ExactMarginalLogLikelihood(model.likelihood, model))
+        fit.fit_gpytorch_mll(
+            likelihoods.ExactMarginalLogLikelihood(model.likelihood, model),
+            optimizer_kwargs={"options": {"maxiter": _STEPS}},
+        )
     return model
 
 
