@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 import torch
@@ -175,9 +176,9 @@ def _write(path: Path, made: Evaluated) -> None:
 
 def _read(path: Path) -> Evaluated:
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise CorruptError(f"a kept evaluation cannot be read: {error}", where=str(path), fix="delete it") from None
     return Evaluated(
         embedding=embedding, frame=frame if frame.size else None, seconds=dict(zip(STAGES, seconds, strict=True))

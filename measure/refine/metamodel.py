@@ -91,8 +91,8 @@ class Metamodel:
         )  # fmt: skip
 
     def log_density(self, regressors: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of an observed summary (k,) at regressors (m, p − 1): (m,)."""
-        k, freedom = len(observed), self.freedom
+        """Of an observed summary (k,), or one each (m, k), at regressors (m, p − 1): (m,)."""
+        k, freedom = observed.shape[-1], self.freedom
         x = _design(regressors, self.centre, self.spread)
         stretch = 1 + np.einsum("mi,ij,mj->m", x, self.inverse, x, optimize=True)
         offset = observed - x @ self.coefficients
