@@ -69,9 +69,7 @@ class ReplicateMetric:
             for i in range(len(group))
             for j in range(i)
         ]
-        return cls(
-            whitening=whitening, shrinkage=shrinkage, floor=float(np.median(between)), pairs=len(between)
-        )
+        return cls(whitening=whitening, shrinkage=shrinkage, floor=float(np.median(between)), pairs=len(between))
 
     def squared(self, embedding: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
         """Squared distance of embeddings (…, d) to one (d,): (…), infinite where a simulation failed."""

@@ -155,9 +155,7 @@ def fingerprint(estimator: Estimator) -> str:
 def _together(found: list[Evaluated | None]) -> Evaluated:
     there = [entry for entry in found if entry is not None]
     width = max(entry.embedding.shape[1] for entry in there)
-    rows = [
-        entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan) for entry in there
-    ]
+    rows = [entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan) for entry in there]
     seconds = {stage: sum(entry.seconds[stage] for entry in there) for stage in STAGES}
     return Evaluated(embedding=np.concatenate(rows), frame=there[0].frame, seconds=seconds)
 

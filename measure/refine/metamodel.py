@@ -6,8 +6,8 @@ new row at x* has the multivariate Student-t density
     y* ~ t_ν(B̂ᵀx*, (1 + x*ᵀ(XᵀX)⁻¹x*) S/ν),   ν = n − p − k + 1
 
 (Geisser, Annals of Mathematical Statistics 36, 1965; Zellner, An Introduction to Bayesian Inference in Econometrics,
-1971, section 8.4), S being the residuals' scatter. It is a synthetic likelihood (Wood, Nature 466, 2010) whose mean is a
-regression over parameters, and which knows how few evaluations it is from. What parameters that are no regressors do,
+1971, section 8.4), S being the residuals' scatter. It is a synthetic likelihood (Wood, Nature 466, 2010) whose mean is
+a regression over parameters, and which knows how few evaluations it is from. What parameters that are no regressors do,
 as single bending coefficients, is a part of ε: they are drawn from their prior, and so marginalised.
 
 Replicates of one θ share that part. Their rows count by Kish's design effect, 1/(1 + (R − 1) ρ), ρ being their

@@ -1,4 +1,4 @@
-"""Pictures of a refinement, as in the paper's figures: the trace, the target beside simulated frames, the two in motion."""
+"""Pictures of a refinement, as in the paper's figures: the trace, and the target beside simulated clips."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) 
 
 
 def trace_picture(refinement: Refinement, clip: int = 0) -> str:
-    """Distance and wind over evaluations, as a PNG in a data URL: figure 8 of the paper, with intervals and the floor."""
+    """Distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8, intervals, the floor."""
     trace, target = refinement.traces[clip], refinement.targets[clip]
     figure = Figure(figsize=(9.5, 3.1), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -74,7 +74,9 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
             count, [w.low for w in winds], [w.high for w in winds], color=_OWN, alpha=0.25, linewidth=0,
             label=f"{refinement.level:.0%} interval",
         )  # fmt: skip
-        right.plot(count, [w.median for w in winds], color=_OWN, linewidth=1.4, marker="o", markersize=3, label="median")
+        right.plot(
+            count, [w.median for w in winds], color=_OWN, linewidth=1.4, marker="o", markersize=3, label="median"
+        )
     if "wind_speed" in target.truth:
         right.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
     right.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))

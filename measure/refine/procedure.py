@@ -8,8 +8,8 @@
 4. Further θ are draws of that posterior, widened, until the budget is spent, or the nearest θ has reached the floor and
    the wind's interval has settled.
 
-The network's own posterior holds for any ζ; the refined one for the target's, which is what it gains. It uses no draw of
-the network's posterior as a probability: that would count the clip twice.
+The network's own posterior holds for any ζ; the refined one for the target's, which is what it gains. It uses no draw
+of the network's posterior as a probability: that would count the clip twice.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ class Settings:
             )  # fmt: skip
         if self.budget < self.fewest:
             raise InputError(
-                f"{self.budget} evaluations tell no interval of {_REGRESSORS} regressors", where="budget",
+                f"{self.budget} evaluations tell no interval of {_REGRESSORS} regressors",
+                where="budget",
                 fix=f"give at least {self.fewest}",
             )
 

@@ -16,8 +16,8 @@ from measure.refine.target import Target
 from measure.refine.trace import Trace
 
 METHOD = (
-    "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in replicates, and filmed "
-    "as the target was. The network's mean logits are regressed on the parameters; the regression's predictive "
+    "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in replicates, and "
+    "filmed as the target was. The network's mean logits are regressed on the parameters; the regression's predictive "
     "Student-t density is the likelihood of the target's (synthetic likelihood, Wood 2010), and weighs draws of the "
     "prior."
 )

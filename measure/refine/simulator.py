@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -75,7 +75,7 @@ class Simulator:
     view: View
     renderer: str = "raster"
     batch: int = 8
-    assets: Assets = Assets()
+    assets: Assets = field(default_factory=Assets)
 
     @classmethod
     def of(
@@ -152,7 +152,5 @@ class Simulator:
         material = replace(
             scene.material, density=float(values[DENSITY]), bending=values[:DENSITY].reshape(BENDING_SHAPE)
         )
-        flag = replace(
-            scene, position=scene.position + noise, material=material, wind=(float(values[WIND]), 0.0, 0.0)
-        )
+        flag = replace(scene, position=scene.position + noise, material=material, wind=(float(values[WIND]), 0.0, 0.0))
         return replace(self._template, scene=flag, seed=request.seed, parameters={})

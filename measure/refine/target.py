@@ -48,9 +48,7 @@ def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: Vie
     """
     content = json.loads(recording.parameters) if recording.parameters else {}
     stated = of_parameters(content, where=f"recording {recording.name!r}") if content else None
-    return Target(
-        name=recording.name, clip=clip, view=stated or otherwise, truth=_truth(content, space)
-    )
+    return Target(name=recording.name, clip=clip, view=stated or otherwise, truth=_truth(content, space))
 
 
 def knows_view(target: Target) -> bool:

@@ -41,5 +41,3 @@ class Trace:
         if seconds is not None:
             count = min(count, int(np.searchsorted(self.seconds, seconds, side="right")))
         return int(self.best[max(count, 1) - 1])
-
-

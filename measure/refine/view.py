@@ -103,7 +103,9 @@ class DrawnView:
 
     @property
     def identity(self) -> str:
-        return digest(canonical({"prior": self.prior.identity(), "camera": {k: r.as_dict() for k, r in RANGES.items()}}))
+        return digest(
+            canonical({"prior": self.prior.identity(), "camera": {k: r.as_dict() for k, r in RANGES.items()}})
+        )
 
 
 def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedView | None:
@@ -121,9 +123,7 @@ def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedVi
         return None
     known = {entry.name for entry in fields(RenderParameters)}
     if unknown := sorted(set(stated) - known):
-        raise InputError(
-            f"render parameters {', '.join(unknown)} are not known", where=where, fix="update flagdata"
-        )
+        raise InputError(f"render parameters {', '.join(unknown)} are not known", where=where, fix="update flagdata")
     whole = {name: round(value) if isinstance(getattr(RenderParameters, name, None), int) else value
              for name, value in stated.items()}  # fmt: skip
     camera = {name: float(content[f"camera.{name}"]) for name in RANGES if f"camera.{name}" in content}

@@ -1,7 +1,7 @@
 """The Gaussian process under Bayesian optimisation and TuRBO: BoTorch's, with a Matérn-5/2 kernel.
 
-Matérn 5/2 with a length scale for each dimension (Snoek, Larochelle and Adams 2012, as the paper), fitted by the marginal
-likelihood with BoTorch's priors, which scale with the dimension (Hvarfner, Hellsten and Nardi 2024).
+Matérn 5/2 with a length scale for each dimension (Snoek, Larochelle and Adams 2012, as the paper), fitted by the
+marginal likelihood with BoTorch's priors, which scale with the dimension (Hvarfner, Hellsten and Nardi 2024).
 """
 
 from __future__ import annotations

@@ -17,9 +17,7 @@ from sim.assets import Assets
 from sim.render.prior import named
 
 
-def test_an_evaluation_does_not_depend_on_what_is_evaluated_beside_it(
-    evaluator: Evaluator, points: np.ndarray
-) -> None:
+def test_an_evaluation_does_not_depend_on_what_is_evaluated_beside_it(evaluator: Evaluator, points: np.ndarray) -> None:
     together = evaluator.evaluate(points, 2)
     alone = replace(evaluator, folder=None, _kept={}).evaluate(points[[2]], 2)[0]
     np.testing.assert_array_equal(together[2].embedding, alone.embedding)

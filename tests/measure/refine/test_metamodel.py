@@ -49,7 +49,9 @@ def test_replicates_that_share_their_deviation_count_as_one() -> None:
     rng = np.random.default_rng(3)
     x = np.repeat(rng.normal(size=(200, 1)), 2, axis=0)
     shared = np.repeat(rng.normal(size=(200, 2)), 2, axis=0)
-    model = Metamodel.fit(x, x @ np.ones((1, 2)) + shared + 1e-3 * rng.normal(size=(400, 2)), np.repeat(np.arange(200), 2))
+    model = Metamodel.fit(
+        x, x @ np.ones((1, 2)) + shared + 1e-3 * rng.normal(size=(400, 2)), np.repeat(np.arange(200), 2)
+    )
     assert model.correlation == pytest.approx(1.0, abs=0.02)
     assert model.rows == pytest.approx(200, rel=0.02)
 

@@ -10,7 +10,9 @@ from measure.refine.posterior import posterior, regressors
 from measure.refine.space import Space
 from sim.run.recipe import Recipe
 
-SLOPES = np.array([[1.2, 0.3, 0.0], [0.2, 0.8, 0.1], [0.0, 0.1, 0.4], [0.1, 0.0, 0.2], [0.0, 0.3, 0.0], [0.05, 0.0, 0.0]])
+SLOPES = np.array(
+    [[1.2, 0.3, 0.0], [0.2, 0.8, 0.1], [0.0, 0.1, 0.4], [0.1, 0.0, 0.2], [0.0, 0.3, 0.0], [0.05, 0.0, 0.0]]
+)
 NOISE = 0.4
 
 

@@ -32,7 +32,9 @@ def test_normalising_undoes_what_denormalising_did(recipe: Recipe, points: np.nd
 
 def test_the_prior_is_uniform_in_the_factor_where_the_recipe_is(recipe: Recipe) -> None:
     space = Space.of(recipe)
-    drawn = space.values(space.prior(np.random.default_rng(0), 20_000))[:, :15] / named("camel-ponte-roma").bending.ravel()
+    drawn = (
+        space.values(space.prior(np.random.default_rng(0), 20_000))[:, :15] / named("camel-ponte-roma").bending.ravel()
+    )
     # a uniform variable on [0.1, 10] has mean 5.05 and standard deviation 9.9/√12; 4 standard errors of 300,000 draws
     assert abs(drawn.mean() - 5.05) < 4 * 9.9 / np.sqrt(12 * drawn.size)
     assert abs(drawn.std() - 9.9 / np.sqrt(12)) < 0.02
