@@ -22,7 +22,7 @@ from measure.refine.metamodel import Metamodel
 from measure.refine.space import BENDING, WIND, Space
 from measure.refine.start import TOLD, logits
 
-CLOTHS, WINDS, DRAWS = 4000, 161, 4000
+CLOTHS, WINDS, DRAWS = 2000, 121, 4000
 
 
 def regressors(reported: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import binom, norm
 
 from measure.refine.metamodel import Metamodel
-from measure.refine.posterior import posterior, regressors
+from measure.refine.posterior import CLOTHS, posterior, regressors
 from measure.refine.space import Space
 from sim.run.recipe import Recipe
 
@@ -23,13 +23,13 @@ def _rows(space: Space, rng: np.random.Generator, count: int) -> tuple[np.ndarra
 
 
 def test_with_many_evaluations_it_is_the_exact_posterior(recipe: Recipe) -> None:
-    """Exact by brute force: 400,000 prior draws weighted by the true Gaussian likelihood."""
+    """Exact by brute force: 50,000 prior draws weighted by the true Gaussian likelihood."""
     space, rng = Space.of(recipe), np.random.default_rng(0)
     points, summaries = _rows(space, rng, 4000)
     _, observed = _rows(space, rng, 1)
     model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(4000))
     found = posterior(space, [model], [observed[0]], seed=1)
-    drawn = space.reported(space.prior(rng, 100_000))
+    drawn = space.reported(space.prior(rng, 50_000))
     weight = norm.logpdf(observed[0], regressors(drawn) @ SLOPES, NOISE).sum(axis=1)
     weight = np.exp(weight - weight.max())
     middle = weight @ drawn / weight.sum()
@@ -66,8 +66,8 @@ def test_two_clips_of_one_cloth_tell_more_of_it_than_one(recipe: Recipe) -> None
     several = np.repeat(truth, 8, axis=0)
     several[:, 16] = np.linspace(-0.7, 0.7, 8)
     observed = regressors(space.reported(several)) @ SLOPES + rng.normal(0, NOISE, (8, 3))
-    one = posterior(space, [model], [observed[0]], seed=2)
-    all_ = posterior(space, [model] * 8, list(observed), seed=2)
+    one = posterior(space, [model], [observed[0]], seed=2, cloths=1000, winds=61)
+    all_ = posterior(space, [model] * 8, list(observed), seed=2, cloths=1000, winds=61)
     spread = [space.reported(found.points)[:, 1].std() for found in (one, all_)]
     assert spread[1] < 0.8 * spread[0]
     # each wind is its own: the medians rise with the true winds
@@ -82,7 +82,7 @@ def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
     told = space.reported(found.points)
     prior = space.reported(space.prior(rng, 4000))
     np.testing.assert_allclose(told.std(axis=0), prior.std(axis=0), rtol=0.1)
-    assert found.effective > 3000
+    assert found.effective > 0.75 * CLOTHS
 
 
 def test_the_same_seed_gives_the_same_draws(recipe: Recipe) -> None:
