@@ -66,7 +66,7 @@ def posterior(
     prior = space.prior(stream(seed, "posterior", "prior"), cloths)
     low, high = space.wind.low, space.wind.high
     step = (high - low) / winds
-    grid = low + step * (np.arange(winds) + 0.5)
+    grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
     own = space.reported(prior)
     found = np.stack([_likelihood(model, own, grid, y) for model, y in zip(models, observed, strict=True)])
     marginal = logsumexp(found, axis=2).sum(axis=0)
@@ -88,7 +88,7 @@ def posterior(
 
 
 def _likelihood(
-    model: Metamodel, own: NDArray[np.float64], grid: NDArray[np.float64], observed: NDArray[np.float64]
+    model: Metamodel, own: NDArray[np.float64], grid: NDArray[np.floating], observed: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(cloth, wind) logarithm of the density of what was observed."""
     rows = np.repeat(own, len(grid), axis=0)

@@ -85,8 +85,10 @@ class Space:
         spec, speed = recipe.material, recipe.wind.speed
         factor, density, wind = spec.bending_each, spec.density, speed
         alone = len(spec.bases) == 1 and not recipe.effects and recipe.scene.shape is Shape.FLAG
-        ranged = isinstance(factor, Range) and isinstance(density, Range) and isinstance(wind, Range)
-        if not (ranged and alone and spec.bending == 1.0) or factor.low <= 0:
+        if not (
+            isinstance(factor, Range) and isinstance(density, Range) and isinstance(wind, Range)
+            and alone and spec.bending == 1.0 and factor.low > 0
+        ):  # fmt: skip
             raise InputError(
                 "the scene is not a flag of one material with ranges of bending factors (above 0), density and wind",
                 where=f"recipe {recipe.name!r}", fix='take "flag-wide", or a recipe of the same form',

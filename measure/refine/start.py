@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from flagdata.errors import InputError
@@ -91,7 +91,7 @@ def completed(space: Space, told: NDArray[np.float64], *, seed: int) -> NDArray[
     pool = space.prior(stream(seed, "refine", "pool"), _POOL)
     offered, wanted = space.reported(pool)[:, 2:4], told[:, 2:4]
     spread = offered.std(axis=0)
-    tree = cKDTree(offered / spread)
+    tree = KDTree(offered / spread)
     taken: set[int] = set()
     out = np.empty((len(told), DIMENSION))
     for i, row in enumerate(wanted / spread):
