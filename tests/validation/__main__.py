@@ -17,6 +17,7 @@ VALIDATIONS = {
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",
+    "refinement": "tests.validation.refinement",
     "renderers": "tests.validation.renderers",
     "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
