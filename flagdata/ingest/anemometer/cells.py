@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from flagdata.ingest.anemometer.recipe import MISSING
+from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 
 _NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?$"
 _INFINITE = r"^[+-]?(inf|infinity|1\.#inf0*)$"
@@ -49,6 +49,7 @@ def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missin
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
     """
     text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
+    written = text
     if decimal == ",":
         pointed = pc.match_substring(text, ".")
         text = pc.if_else(pointed, "?", pc.replace_substring(text, ",", "."))
@@ -61,7 +62,7 @@ def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missin
         absent = pc.is_in(lower, pa.array([*MISSING, *missing], pa.string()))
         endless = pc.match_substring_regex(lower, _INFINITE)
         state[~_mask(readable)] = Cell.UNREADABLE
-        state[_mask(absent)] = Cell.MISSING
+        state[_mask(pc.or_(absent, pc.match_substring_regex(written, MISSING_SIGNS)))] = Cell.MISSING
         state[_mask(endless)] = Cell.INFINITE
         parsed = pc.cast(pc.if_else(readable, text, None), pa.float64())
     value = parsed.to_numpy(zero_copy_only=False).astype(np.float64)

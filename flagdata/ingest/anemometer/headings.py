@@ -26,7 +26,7 @@ _SPEED = frozenset(
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
         "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
-        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots",
+        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength", "fkl",
     }
 )  # fmt: skip
 _DIRECTION = frozenset(
@@ -43,6 +43,7 @@ _OTHER = frozenset(
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
         "load", "density", "elevation", "vertical", "gyro", "acc", "accel", "course", "heading", "track", "duration",
+        "id", "unit", "units",
     }
 )  # fmt: skip
 _SPREAD = frozenset(
@@ -288,7 +289,7 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
         for word, channel in _ABBREVIATED.items():
             if word in known and (si == "m/s") <= channel.endswith("speed"):
                 return channel, True, {word}
-        named = known & _SPEED
+        named = known & _SPEED or (known & {"strength"} if windy else set())
         if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
             return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
         if windy and len(known - _WIND - _MEAN - _PLAIN) == 0:

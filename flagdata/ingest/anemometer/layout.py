@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from flagdata.ingest.anemometer.recipe import MISSING
+from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.rows import blank_cells
 from flagdata.units import spelled
 
@@ -23,7 +23,7 @@ _STAMP = re.compile(
 )
 _MONTH_STAMP = re.compile(r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*")
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
-_MISSING = frozenset({*MISSING, "nan.", "inf", "-inf", "m", "///", "////"})
+_MISSING = frozenset({*MISSING, "nan.", "inf", "-inf"})
 _UNITS_OF_OTHERS = frozenset(
     {
         "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
@@ -120,7 +120,7 @@ def cut(line: str, delimiter: str) -> list[str]:
 def cell_kind(cell: str) -> CellKind:
     """What a cell seems to hold."""
     text = cell.strip().strip('"').strip()
-    if text.lower() in _MISSING:
+    if text.lower() in _MISSING or re.match(MISSING_SIGNS, text):
         return "missing"
     if _NUMBER.fullmatch(text):
         return "number"

@@ -37,8 +37,10 @@ SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "|": "|", "space": " "}
 COLUMNS_LIMIT = 10_000
 """Highest number of a column."""
-MISSING = ("", "-", "--", "---", "nan", "na", "n/a", "null", "none", "***")
+MISSING = ("", "nan", "na", "n/a", "n.a.", "#n/a", "#value!", "null", "none", "m", "mm", "missing", "no data")
 """Spellings of "no value" that every recipe knows, lower-case."""
+MISSING_SIGNS = r"^[-–—_./*#]+$"
+"""Cells of signs alone ("----", "--.-", "/////", "***") are no value either."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, TimeError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import counted, possible, unitcheck
+from flagdata.ingest.anemometer import counted, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
@@ -280,10 +280,13 @@ def read_table(
     if zone_name is not None and gathered.host is None and gathered.clock.stated():
         text = f"the stamps state their own zone: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
-    zone_name = zone_name or recipe.time.zone
+        zone_name = None
+    told, zone_name = zone_name, zone_name or recipe.time.zone
     given = given or Given()
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
+    if told is not None and recipe.time.zone is not None:
+        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, told, time))
     host_time = None
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
@@ -387,7 +390,7 @@ def instants(
         return wall, ()
     if zone_name is None:
         at = int(np.flatnonzero(~utc)[0])
-        raise TimeError(
+        raise ZoneMissingError(
             "the stamps carry no time zone", where=f"{where}, line {line[at]}", fix=zone_advice(wall, line)
         )  # fmt: skip
     time = wall.copy()
