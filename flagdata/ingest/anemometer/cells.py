@@ -41,14 +41,19 @@ class Numbers:
     state: NDArray[np.uint8]
 
 
-def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missing: Sequence[str] = ()) -> Numbers:
+def numbers(
+    cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missing: Sequence[str] = (), suffix: str = ""
+) -> Numbers:
     """Read a column of cells.
 
     Args:
         decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
+        suffix: what stands behind each number, such as its unit; a number without it is unreadable.
     """
     text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
+    if suffix:
+        text = _without(text, suffix)
     written = text
     if decimal == ",":
         pointed = pc.match_substring(text, ".")
@@ -72,6 +77,13 @@ def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missin
         state[(value == code) & (state == Cell.NUMBER)] = Cell.MISSING
     value[state != Cell.NUMBER] = np.nan
     return Numbers(value=value, state=state)
+
+
+def _without(text: pa.StringArray, suffix: str) -> pa.StringArray:
+    """Trimmed cells without the suffix that each number must have; numbers without it become "?"."""
+    known = pc.ends_with(text, suffix)
+    bare = pc.utf8_trim_whitespace(pc.if_else(known, pc.utf8_slice_codeunits(text, 0, -len(suffix)), text))
+    return pc.if_else(pc.and_(pc.invert(known), pc.match_substring_regex(bare, r"\d")), "?", bare)
 
 
 def _mask(array: pa.BooleanArray) -> NDArray[np.bool_]:

@@ -69,7 +69,8 @@ class Delimited:
             raise UsageError("the format delimited needs a recipe", where=where, fix="name one by --recipe")
         if proposal.doubts:
             what = "; ".join(doubt.what for doubt in proposal.doubts)
-            raise InputError(what, where=where, fix="; ".join(doubt.fix for doubt in proposal.doubts))
+            open_needs = [need.fix for need in proposal.needs if need.without(options)]
+            raise InputError(what, where=where, fix="; ".join([*(doubt.fix for doubt in proposal.doubts), *open_needs]))
         if len(proposal.winds) > 1 and options.wind is None:
             names = ", ".join(proposal.winds)
             raise InputError(
@@ -84,7 +85,8 @@ class Delimited:
         if proposal.remarks:
             text = "; ".join(proposal.remarks)
             found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, what=text))
-        return replace(reading, findings=(*reading.findings, *found), drafted=proposal.toml)
+        findings = (*reading.findings, *found)
+        return replace(reading, findings=findings, drafted=proposal.toml, understood=proposal.understood)
 
 
 def guess(proposal: Draft) -> Guess:
@@ -94,6 +96,7 @@ def guess(proposal: Draft) -> Guess:
         reasons=proposal.understood, notes=(*proposal.warnings, *proposal.remarks),
         doubts=tuple(f"{doubt.what}: {doubt.fix}" for doubt in proposal.doubts), winds=proposal.winds,
         fix="; ".join(doubt.fix for doubt in proposal.doubts) or None, draft=proposal.toml or None,
+        needs=tuple(f"{need.what}: {need.fix}" for need in proposal.needs),
     )  # fmt: skip
 
 

@@ -13,13 +13,16 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, unitcheck
+from flagdata.ingest.anemometer import counted, unitcheck, zones
 from flagdata.ingest.anemometer.cells import numbers
-from flagdata.ingest.anemometer.headings import interest
-from flagdata.ingest.anemometer.instruments import Wind, find_winds, named_wind, sites
+from flagdata.ingest.anemometer.headings import interest, understand
+from flagdata.ingest.anemometer.instruments import COMPONENTS, Column, Wind, beaufort, find_winds, named_wind, sites
 from flagdata.ingest.anemometer.layout import Layout, lay_out
+from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
+from flagdata.ingest.anemometer.unitcheck import FASTEST
+from flagdata.units import unit as unit_of
 
 CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
 """Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
@@ -35,6 +38,19 @@ class Doubt:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Need:
+    """What a table's stamps do not tell and no recipe can: what, how to say it, and the option that says it."""
+
+    what: str
+    fix: str
+    option: Literal["zone", "date", "start"]
+
+    def without(self, options: WindOptions) -> bool:
+        """Whether the user has not said it yet."""
+        return getattr(options, self.option) is None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Draft:
     """What a table is, as far as its first lines tell.
 
@@ -44,6 +60,8 @@ class Draft:
         remarks: what was left out, and why.
         warnings: what is odd, but does not keep the table from being read.
         doubts: what must be said before it can be read.
+        needs: what must be said beside, since its stamps do not tell it.
+        unsure: labels of the anemometers that may be something else, such as the speed of a vehicle.
         winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
         site: index of the column that tells sites apart, `None` where there is one site.
         delimiter: of the cells.
@@ -54,6 +72,8 @@ class Draft:
     remarks: tuple[str, ...]
     warnings: tuple[str, ...]
     doubts: tuple[Doubt, ...]
+    needs: tuple[Need, ...] = ()
+    unsure: tuple[str, ...] = ()
     winds: tuple[str, ...] = ()
     site: int | None = None
     delimiter: str = ","
@@ -77,8 +97,8 @@ def draft(
     columns = time.columns if time is not None else ()
     winds, remarks, warnings = find_winds(layout, time=columns, told=unit)
     if wind is not None and wind not in {one.label for one in winds}:
-        said = named_wind(layout, wind, told=unit)
-        winds = (*winds, *((said,) if said is not None else ()))
+        said, odd = named_wind(layout, wind, told=unit)
+        winds, warnings = (*winds, *said), (*warnings, *odd)
     if time is None and not winds:
         return None
     mixed = sites(layout, time=columns, stamps=_stamps(layout, columns)) if time is not None else None
@@ -103,12 +123,30 @@ def draft(
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+        doubts=tuple(doubts), needs=_needs(lines, time), unsure=tuple(one.label for one in winds if not one.sure),
+        winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
     )  # fmt: skip
 
 
 def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
     return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
+
+
+def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
+    """What the stamps of a time leave open: its start, its day, its zone."""
+    if time is None:
+        return ()
+    if time.form is not None and counted.is_elapsed(time.form):
+        return (Need(what="its rows count from a start", fix="give the instant of the first: --start TIME", option="start"),)
+    found: list[Need] = []
+    if time.form is not None and counted.is_time_of_day(time.form):
+        found.append(Need(what="its stamps have no date", fix="give the day of the first row: --date DATE", option="date"))
+    if not time.zoned and time.zone is None:
+        statement = zones.stated(lines)
+        fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
+        fix = f"{fix}; {statement.advice()}" if statement is not None else fix
+        found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
+    return tuple(found)
 
 
 def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None) -> list[Doubt]:
@@ -119,7 +157,11 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
         found.append(Doubt(what=time.doubt, fix=time.fix))
-    if not winds:
+    classes = beaufort(layout)
+    if not winds and classes:
+        what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
+        found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
+    elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
     for wind in (chosen,) if chosen is not None else winds:
@@ -221,10 +263,23 @@ def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
     for channel, column in (wind.columns if wind is not None else {}).items():
         lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
         lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
+        suffix = layout.suffixes[column.index]
+        lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
+    for column in {other for one in (wind.columns.values() if wind is not None else ()) for other in _beside(layout, one)}:
+        text = next(row[column].strip() for row in layout.rows if row[column].strip())
+        lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
+        lines += ['about = "unit"']
     lines += ["", "[sensor]", f"name = {_quoted(label)}"]
     if wind is not None and wind.height is not None:
         lines.append(f"height = {wind.height:g}")
     return "\n".join([*lines, ""])
+
+
+def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
+    """The column that spells a column's unit in every row, where that is how the unit is known."""
+    other = layout.unit_columns[column.index]
+    alone = understand(layout.names[column.index]).unit is None
+    return (other,) if other is not None and alone else ()
 
 
 def _codes(layout: Layout, wind: Wind | None) -> list[float]:
@@ -233,6 +288,11 @@ def _codes(layout: Layout, wind: Wind | None) -> list[float]:
     for channel, column in (wind.columns if wind is not None else {}).items():
         value = numbers(layout.column(column.index), decimal=layout.decimal).value
         known = value[np.isfinite(value)]
+        if channel in COMPONENTS and column.unit is not None:
+            # What no component can be in m/s, -99, it can be in cm/s.
+            codes = [code for code in codes if abs(code) * unit_of(column.unit).scale > FASTEST]
+        if channel.endswith("direction") and bool(np.any((known < 0) & ~np.isin(known, CODES))):
+            codes = [code for code in codes if code < -180]
         for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
             others = known[known != code]
             if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:

@@ -26,7 +26,7 @@ _SPEED = frozenset(
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
         "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
-        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength", "fkl",
+        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
     }
 )  # fmt: skip
 _DIRECTION = frozenset(

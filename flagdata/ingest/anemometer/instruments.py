@@ -27,6 +27,7 @@ _SITES = frozenset(
         "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
     }
 )  # fmt: skip
+_CLASSES = frozenset({"bft", "beaufort", "bf"})
 _UNREADABLE = 0.1
 
 
@@ -111,17 +112,29 @@ def find_winds(
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
 
 
-def named_wind(layout: Layout, column: str, *, told: str | None) -> Wind | None:
-    """The anemometer whose speed is in the column that the user names, by heading or number; `None` without such."""
+def beaufort(layout: Layout) -> tuple[str, ...]:
+    """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
+    return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def named_wind(layout: Layout, column: str, *, told: str | None) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
+    """The anemometer whose speed is in the column that the user names by heading or number, if any, and what is odd."""
     indices = [index for index, name in enumerate(layout.names) if name == column]
     if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
         indices = [int(column) - 1]
-    if len(indices) != 1:
-        return None
-    stated = understand(layout.names[indices[0]], layout.units[indices[0]])
+    if len(indices) != 1 or layout.names[indices[0]] in beaufort(layout):
+        return (), ()
+    name = layout.names[indices[0]]
+    stated = understand(name, layout.units[indices[0]])
     known = stated.unit if fits("wind_speed", stated.unit) else None
-    speed = Column(index=indices[0], unit=told or known, told="as you said")
-    return Wind(label=column, height=stated.height, columns={"wind_speed": speed}, sure=True)
+    odd = (_otherwise(name, known, told),) if told is not None and known is not None and told != known else ()
+    how = f"in {told}, as you said" if told else f"in {known} by its heading" if known else ""
+    speed = Column(index=indices[0], unit=told or known, told=how)
+    return (Wind(label=column, height=stated.height, columns={"wind_speed": speed}, sure=True),), odd
+
+
+def _otherwise(name: str, stated: str, told: str) -> str:
+    return f"the heading of {name!r} states {stated}; taken as {told}, as you said"
 
 
 def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
@@ -147,7 +160,7 @@ def _column(found: _Found, index: int, channel: str, told: str | None) -> Column
         return Column(index=index, unit=stated, told="" if stated is None else f"in {stated} by its heading")
     if stated is not None:
         name = found.layout.names[index]
-        found.warnings.append(f"the heading of {name!r} states {stated}; taken as {told}, as you said")
+        found.warnings.append(_otherwise(name, stated, told))
     return Column(index=index, unit=told, told=f"in {told}, as you said")
 
 
@@ -180,6 +193,12 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
                 label=found.name(first), height=found.headings[first].height, columns=columns,
                 sure=found.headings[first].sure and not (lone and moving),
             ))  # fmt: skip
+    if any(wind.sure for wind in winds):
+        found.remarks.extend(
+            f"column {wind.label!r} is a speed, but beside positions nothing says that it is the wind's: left out"
+            for wind in winds if not wind.sure
+        )  # fmt: skip
+        winds = [wind for wind in winds if wind.sure]
     return winds
 
 

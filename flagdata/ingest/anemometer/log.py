@@ -75,6 +75,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
         host_time=reading.host_time,
     )  # fmt: skip
+    reasons = reading.understood or reasons
     return WindLog(series=series, format=name, findings=findings, reasons=reasons, drafted=reading.drafted)
 
 

@@ -73,6 +73,7 @@ class _Column:
     """One column as its blocks come in."""
 
     index: int
+    suffix: str = ""
     values: list[NDArray[np.float64]] = field(default_factory=list)
     states: list[NDArray[np.uint8]] = field(default_factory=list)
 
@@ -205,7 +206,10 @@ class _Gathered:
         self.distant += int(stamps.distant.sum())
         self.lines.append(line[keep])
         for column in self.columns():
-            parsed = numbers(_cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing)
+            parsed = numbers(
+                _cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing,
+                suffix=column.suffix,
+            )  # fmt: skip
             column.values.append(parsed.value[keep])
             column.states.append(parsed.state[keep])
         for check in self.checks:
@@ -262,7 +266,10 @@ def read_table(
     gathered = _Gathered(
         clock=_Clock(form=recipe.time.format, columns=own) if own or host is None else host,
         host=host if own else None,
-        channels={name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()},
+        channels={
+            name: _Column(index=i, suffix=recipe.channels[name].suffix)
+            for name, i in _channel_columns(recipe, rows, where).items()
+        },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
         checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
         rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
