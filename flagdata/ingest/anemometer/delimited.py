@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform
 from flagdata.ingest.anemometer import recipe as recipes
@@ -77,7 +77,11 @@ class Delimited:
                 f"the file holds {len(proposal.winds)} anemometers: {names}", where=where,
                 fix=f"name the one to read: --wind {_argument(proposal.winds[0])}; ingest takes each by itself",
             )  # fmt: skip
-        reading = _read(source, recipes.parse(proposal.toml, where=f"the draft for {where}"), options, where)
+        try:
+            reading = _read(source, recipes.parse(proposal.toml, where=f"the draft for {where}"), options, where)
+        except TimeError as error:
+            rest = [n.fix for n in proposal.needs if n.without(options) and f"--{n.option}" not in error.fix]
+            raise type(error)(error.what, where=error.where, fix="; ".join([error.fix, *rest])) from None
         found = [
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in proposal.warnings

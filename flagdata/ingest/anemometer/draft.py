@@ -18,6 +18,7 @@ from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import COMPONENTS, Column, Wind, beaufort, find_winds, named_wind, sites
 from flagdata.ingest.anemometer.layout import Layout, lay_out
+from flagdata.ingest.anemometer.long_table import winds_by_name
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
@@ -96,12 +97,16 @@ def draft(
     time = find_time(layout, order=order)
     columns = time.columns if time is not None else ()
     winds, remarks, warnings = find_winds(layout, time=columns, told=unit)
-    if wind is not None and wind not in {one.label for one in winds}:
+    named = () if winds else winds_by_name(layout, time=columns, told=unit)
+    winds = winds or named
+    if wind is not None and not named and wind not in {one.label for one in winds}:
         said, odd = named_wind(layout, wind, told=unit)
         winds, warnings = (*winds, *said), (*warnings, *odd)
     if time is None and not winds:
         return None
-    mixed = sites(layout, time=columns, stamps=_stamps(layout, columns)) if time is not None else None
+    mixed = None
+    if time is not None and not named:
+        mixed = sites(layout, time=columns, stamps=_stamps(layout, columns))
     if mixed is not None:
         winds = tuple(
             replace(one, site=(mixed[0], site), label=site if len(winds) == 1 else f"{site}:{one.label}")
