@@ -124,7 +124,7 @@ def draft(
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
     chosen = chosen or (winds[0] if winds else None)
-    toml = _toml(layout, time, chosen) if time is not None else ""
+    toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
@@ -186,6 +186,10 @@ def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
     column = wind.columns[missing[0]].index
     value = numbers(layout.column(column), decimal=layout.decimal).value
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
+    known = value[np.isfinite(value)]
+    if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
+        fix = "give it, as the file's description says: --unit '0.1 m/s' (as weather services write), --unit km/h or another"
+        return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
     likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
     name = layout.names[column] or f"number {column + 1}"
     fix = (
@@ -244,7 +248,21 @@ def _reference(layout: Layout, index: int) -> str:
     return _quoted(name) if layout.by_name and name and layout.names.count(name) == 1 else str(index + 1)
 
 
-def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
+def skeleton(lines: Sequence[str]) -> tuple[str, str] | None:
+    """Of a table of which nothing is known but its columns: what it is, and a recipe to complete; `None` for no table."""
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
+        return None
+    names = ", ".join(repr(name) for name in layout.names if name)
+    first = ", ".join(layout.rows[0])[:200]
+    what = (
+        f"a table of {layout.number_of_columns()} columns divided by {delimiter_name(layout.delimiter)!r}, "
+        f"{f'called {names}' if names else 'which no line names'}, the first row {first}"
+    )
+    return what, _toml(layout, None, None)
+
+
+def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
     preamble = layout.preamble if layout.by_name else layout.preamble + layout.header
     label = wind.label if wind is not None else "anemometer"
     lines = [
@@ -252,12 +270,15 @@ def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
         "[file]", f"delimiter = {_quoted(delimiter_name(layout.delimiter))}", f"decimal = {_quoted(layout.decimal)}",
         f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
         f"missing = [{', '.join(_quoted(f'{code:g}') for code in _codes(layout, wind))}]", "",
-        "[time]", f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]",
-        f"format = {_quoted(time.form or '?')}",
+        "[time]",
     ]  # fmt: skip
-    if time.form is None:
-        lines[-1] += f"  # {time.doubt}"
-    if time.zone is not None:
+    if time is None:
+        lines += ['columns = ["?"]  # names, or numbers from 1', 'format = "?"  # such as "%Y %j %H%M" or "epoch-s"']
+    else:
+        lines.append(f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]")
+        doubt = f"  # {time.doubt}" if time.form is None else ""
+        lines.append(f"format = {_quoted(time.form or '?')}{doubt}")
+    if time is not None and time.zone is not None:
         lines.append(f"zone = {_quoted(time.zone)}")
     if wind is not None and wind.site is not None:
         lines += ["", "[rows]", f"column = {_reference(layout, wind.site[0])}", f"value = {_quoted(wind.site[1])}"]

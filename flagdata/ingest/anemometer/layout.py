@@ -274,7 +274,7 @@ def _heading(
         candidates.append((number, cells, plain))
     if not candidates:
         return nothing, nothing, None, False, tuple(strange)
-    scored = [(sum(map(interest, cells)), number, cells, plain) for number, cells, plain in candidates]
+    scored = [(sum(map(interest, set(cells))), number, cells, plain) for number, cells, plain in candidates]
     worded = [item for item in scored if _worded(item[2])]
     if not worded:
         return nothing, nothing, None, False, tuple(strange)
@@ -301,6 +301,9 @@ def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] 
         # R writes the heading of its row names not at all.
         if len(cells) == width - 1 and len(cells) > 1 and not any(cell_kind(c) == "missing" for c in cells):
             return ["", *cells], False
+    # Names beyond the cells of a row, as LabVIEW's "Comment"; not with commas, which also stand inside of names.
+    if delimiter in ("\t", ";") and width < len(plain) <= width + 2 and all(plain):
+        return plain[:width], False
     # A title that a spreadsheet padded, or a heading that its writer did not pad.
     if delimiter != " " and 1 < len(plain) < width and sum(map(bool, plain)) > 0.6 * width:
         return [*plain, *[""] * (width - len(plain))], False

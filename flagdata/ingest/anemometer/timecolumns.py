@@ -42,8 +42,8 @@ _STAMPLIKE = re.compile(
 )
 """What a cell must have in it to be a date and a time."""
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hr|hour|stunde", 0, 23),
-    ("%M", r"mi|min|mm|minute|m", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hh 24|hr|hour|stunde", 0, 23),
+    ("%M", r"mi|min|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
 )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def _choices(layout: Layout, order: Literal["dmy", "mdy"] | None) -> Iterator[Ti
             continue
         if _share(_DATE, texts):
             dates.append(index)
-        elif _share(_CLOCK, texts) or (words_of(layout.names[index])[:1] in (["time"], ["hhmm"], ["hhmmss"], ["hour"])
+        elif _share(_CLOCK, texts) or (words_of(layout.names[index])[:1] in (["time"], ["hhmm"], ["hhmmss"], ["hour"], ["hh"], ["hr"], ["uur"])
                                        and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
             clocks.append(index)
         found = _whole(layout, (index,), texts, order)
@@ -214,7 +214,7 @@ def _compact(shape: str) -> tuple[str, ...]:
         "00000000000000": "%Y%m%d%H%M%S%f", "000000000000": "%Y%m%d%H%M", "00000000T000000": "%Y%m%d %H%M%S%f",
         "00000000 000000": "%Y%m%d %H%M%S", "00000000 0000": "%Y%m%d %H%M", "00000000 00:00:00": "%Y%m%d %H:%M:%S%f",
         "00000000T0000": "%Y%m%d %H%M", "00000000_000000": "%Y%m%d_%H%M%S", "00000000 00:00": "%Y%m%d %H:%M",
-        "00000000-000000": "%Y%m%d-%H%M%S",
+        "00000000-000000": "%Y%m%d-%H%M%S", "00000000 00": "%Y%m%d %H", "00000000 0": "%Y%m%d %H",
     }  # fmt: skip
     known = forms.get(bare.split(".")[0])
     return (known,) if known else ()
@@ -233,7 +233,7 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
     names = [" ".join(words_of(name)) for name in layout.names]
     for index, name in enumerate(names):
-        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr)( utc)?", name) or not _whole_numbers(columns[index], 1990, 2100):
+        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not _whole_numbers(columns[index], 1990, 2100):
             continue
         chosen, form = [index], "%Y"
         at = index + 1
