@@ -139,7 +139,7 @@ def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
 
 def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
     """What the stamps of a time leave open: its start, its day, its zone."""
-    if time is None:
+    if time is None or time.counts:
         return ()
     if time.form is not None and counted.is_elapsed(time.form):
         return (Need(what="its rows count from a start", fix="give the instant of the first: --start TIME", option="start"),)
@@ -213,7 +213,9 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         zone = "which state their zone" if time.zoned else f"in {time.zone}" if time.zone else "without a zone"
         if time.form is not None and (counted.is_elapsed(time.form) or counted.is_time_of_day(time.form)):
             zone = "without a date"
-        found.append(f"column {stamps} is the time, as {time.form or 'a date in an order that is not told'}, {zone}")
+        unknown = "a count in a unit that is not told" if time.counts else "a date in an order that is not told"
+        zone = "from a start" if time.counts else zone
+        found.append(f"column {stamps} is the time, as {time.form or unknown}, {zone}")
     for wind in winds:
         height = f" at {wind.height:g} m" if wind.height is not None else ""
         site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""

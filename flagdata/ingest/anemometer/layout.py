@@ -22,7 +22,7 @@ _STAMP = re.compile(
     r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?)?"
 )
 _MONTH_STAMP = re.compile(r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*")
-_QUANTITY = re.compile(rf"({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:;+-]\s?){{1,8}}(?:-1)?)")
+_QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:;+-]\s?){{1,8}}(?:-1)?)")
 _BEHIND = frozenset({"m/s", "rad", "K", "Pa", "1"})
 """SI units of quantities that tables write with their unit in every cell ("4.3 mph", "210°")."""
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")

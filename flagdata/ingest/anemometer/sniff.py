@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
@@ -13,6 +14,7 @@ from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKi
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+_METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
 _MESHES = {".obj", ".ply", ".stl", ".off"}
 
 
@@ -50,6 +52,10 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         text = "this is XML or HTML, not a table of text"
         fix = "convert it to CSV with one row a reading, its time and its wind (a GPX file: with the program that wrote it)"
         return (Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix),)
+    if sum(bool(_METAR.search(line)) for line in source.head()) > len(source.head()) / 3:
+        text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"
+        fix = "decode them to a table with one row a report: its time, speed and direction, each with its unit"
+        return (Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix),)
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
         what, recipe = table

@@ -59,6 +59,7 @@ class TimeChoice:
         doubt: what the rows do not tell; `None` where nothing is in doubt.
         fix: what the user can say.
         score: how well it fits, for the choice among several.
+        counts: whether it counts from a start, by a unit that may not be known.
     """
 
     columns: tuple[int, ...]
@@ -68,6 +69,7 @@ class TimeChoice:
     score: float
     doubt: str | None = None
     fix: str | None = None
+    counts: bool = False
 
 
 def find_time(layout: Layout, *, order: Literal["dmy", "mdy"] | None = None) -> TimeChoice | None:
@@ -295,7 +297,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         usual = float(np.median(steps[steps > 0]))
         unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"
         yield TimeChoice(
-            columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1,
+            columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
             doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated (likely {unit})",
             fix=f'save the draft, complete format = "elapsed-s" or "elapsed-ms" (likely elapsed-{unit}), and name it: '
             "--recipe FILE.toml --start TIME",
