@@ -97,7 +97,7 @@ def find_winds(
     headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
     found = _Found(layout=layout, headings=headings)
     for index, heading in enumerate(headings):
-        if index in time or not heading.quantity:
+        if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
         if float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
@@ -115,6 +115,15 @@ def find_winds(
 def beaufort(layout: Layout) -> tuple[str, ...]:
     """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
     return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def _day_of_month(layout: Layout, index: int) -> bool:
+    """Whether a column DD stands in a date written in parts, so that it is no direction."""
+    names = [name.strip().upper() for name in layout.names]
+    if names[index] not in ("DD", "D"):
+        return False
+    before, after = names[index - 1] if index else "", names[index + 1] if index + 1 < len(names) else ""
+    return before in ("MM", "MO", "M", "MONTH") or after.startswith("HH")
 
 
 def named_wind(layout: Layout, column: str, *, told: str | None) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
@@ -266,7 +275,7 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     )
     lone = candidates if len(candidates) == 1 else []
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
-    chosen = exact or near[:1] or lone or plain
+    chosen = sorted(exact, key=lambda i: found.headings[i].unit is None) or near[:1] or lone or plain
     if not chosen:
         if candidates:
             names = ", ".join(repr(found.layout.names[i]) for i in candidates)
