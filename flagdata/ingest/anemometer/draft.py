@@ -16,7 +16,16 @@ import numpy as np
 from flagdata.ingest.anemometer import counted, unitcheck, zones
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
-from flagdata.ingest.anemometer.instruments import COMPONENTS, Column, Wind, beaufort, find_winds, named_wind, sites
+from flagdata.ingest.anemometer.instruments import (
+    COMPONENTS,
+    Column,
+    Wind,
+    beaufort,
+    find_winds,
+    mixed_units,
+    named_wind,
+    sites,
+)
 from flagdata.ingest.anemometer.layout import Layout, lay_out
 from flagdata.ingest.anemometer.long_table import winds_by_name
 from flagdata.ingest.anemometer.options import WindOptions
@@ -27,7 +36,7 @@ from flagdata.units import unit as unit_of
 
 CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
 """Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
-_ORDER = Literal["dmy", "mdy"]
+_ORDER = Literal["dmy", "mdy", "ymd"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +178,11 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
+    for wind in winds if chosen is None else (chosen,):
+        changing = mixed_units(layout, next(iter(wind.columns.values())).index)
+        if changing:
+            what = f"the rows of {wind.label!r} are in different units: {', '.join(changing)}"
+            found.append(Doubt(what=what, fix="make a file of the rows in each unit, and ingest them apart"))
     for wind in (chosen,) if chosen is not None else winds:
         missing = wind.without_unit()
         if missing:

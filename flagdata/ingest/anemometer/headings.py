@@ -10,7 +10,9 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
+from flagdata.errors import FlagdataError
 from flagdata.schema import CHANNELS
+from flagdata.timebase import zone
 from flagdata.units import UNITS, spelled
 
 _WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
@@ -20,6 +22,7 @@ _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
+_PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
 _WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
 _SPEED = frozenset(
     {
@@ -192,6 +195,9 @@ def names_time(name: str) -> bool:
 
 def zone_of(name: str) -> str | None:
     """The zone that the heading of a time states: "UTC", or an offset."""
+    place = _PLACE.search(name)
+    if place is not None and _is_zone(place[0]):
+        return place[0]
     found = _ZONE.search(re.sub(r"_", " ", name))
     if found is None and re.search(r"utc|gmt", name, re.IGNORECASE):
         return "UTC"
@@ -202,6 +208,14 @@ def zone_of(name: str) -> str | None:
     sign, digits = found[1][0], found[1][1:].strip().replace(":", "")
     hours, minutes = (digits[:-2], digits[-2:]) if len(digits) > 2 else (digits, "00")
     return f"{sign}{int(hours):02d}:{minutes}"
+
+
+def _is_zone(name: str) -> bool:
+    try:
+        zone(name)
+    except FlagdataError:
+        return False
+    return True
 
 
 def words_of(name: str) -> list[str]:

@@ -12,7 +12,7 @@ from flagdata.ingest.anemometer import unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout
-from flagdata.units import unit
+from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -28,6 +28,7 @@ _SITES = frozenset(
     }
 )  # fmt: skip
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
+_VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 _UNREADABLE = 0.1
 
 
@@ -108,8 +109,35 @@ def find_winds(
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     winds = [*_speeds(found, told), *_components(found, told)]
     winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
+    _doubt_headings(found, winds)
     _check_gusts(found, winds)
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+
+
+def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
+    """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
+    words = [set(words_of(name)) for name in found.layout.names]
+    windy = any("wind" in word for name in words for word in name) or any(found.of("wind_direction", *COMPONENTS))
+    for wind in winds:
+        speed = wind.columns.get("wind_speed")
+        if speed is not None and not windy and words[speed.index] & {"speed", "velocity", "vel"}:
+            found.warnings.append(f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind")
+        afloat = [name for name, said in zip(found.layout.names, words, strict=True) if said & _VESSEL]
+        relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
+        if speed is not None and afloat and not relative:
+            found.warnings.append(
+                f"{afloat[0]!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over "
+                "ground or apparent wind: taken as over ground"
+            )
+
+
+def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
+    """The units that the column next to a column of numbers spells, where they change from row to row."""
+    if index + 1 >= layout.number_of_columns():
+        return ()
+    cells = sorted({cell for cell in layout.column(index + 1) if cell})
+    names = {spelled(cell) for cell in cells[:50]}
+    return tuple(cells) if len(names) > 1 and None not in names else ()
 
 
 def beaufort(layout: Layout) -> tuple[str, ...]:

@@ -278,7 +278,7 @@ def _heading(
     worded = [item for item in scored if _worded(item[2])]
     if not worded:
         return nothing, nothing, None, False, tuple(strange)
-    _, at, names, plain = max(worded, key=lambda item: (item[0], -item[1]))
+    _, at, names, plain = max(worded, key=lambda item: (item[0], item[3], -item[1]))
     units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), list(nothing))
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
     by_name = plain and len(lines[at]) > 0

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.headings import fits, understand
+from flagdata.ingest.anemometer.headings import fits, understand, words_of
 from flagdata.ingest.anemometer.instruments import SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 
+_VALUES = frozenset({"value", "val", "state", "payload", "reading", "measurement", "wert"})
 _MOST = 500
 """Names of quantities beyond which a column of words is something else."""
 
@@ -25,6 +26,8 @@ def winds_by_name(layout: Layout, *, time: Sequence[int], told: str | None) -> t
     """
     rest = [index for index in range(layout.number_of_columns()) if index not in time]
     values = [index for index in rest if _most(layout, index, "number") and not understand(layout.names[index]).quantity]
+    told_values = [index for index in values if set(words_of(layout.names[index])) & _VALUES]
+    values = told_values if len(told_values) == 1 else values
     for column in rest:
         cells = layout.column(column)
         names = sorted({cell for cell in cells if cell_kind(cell) == "text"})

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import Cell, numbers
-from flagdata.ingest.anemometer.dates import decide
+from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
@@ -72,7 +71,7 @@ class TimeChoice:
     counts: bool = False
 
 
-def find_time(layout: Layout, *, order: Literal["dmy", "mdy"] | None = None) -> TimeChoice | None:
+def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | None:
     """The columns that are the time; `None` where there are none.
 
     Args:
@@ -85,7 +84,7 @@ def find_time(layout: Layout, *, order: Literal["dmy", "mdy"] | None = None) -> 
     return best
 
 
-def _choices(layout: Layout, order: Literal["dmy", "mdy"] | None) -> Iterator[TimeChoice]:
+def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     columns = [layout.column(index) for index in range(layout.number_of_columns())]
     if layout.decimal == ",":
         columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
@@ -146,7 +145,7 @@ def _choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, 
 
 
 def _whole(
-    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Literal["dmy", "mdy"] | None
+    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None
 ) -> TimeChoice | None:
     """Date and time in `texts`."""
     if not any(_STAMPLIKE.search(text) for text in texts[:5]):
@@ -174,6 +173,8 @@ def _whole(
     except TimeError as error:
         if "may be" not in error.what:
             return None
+        if "ymd" in error.fix:
+            return TimeChoice(columns=columns, form=None, zone=None, zoned=False, score=2.5, doubt=error.what, fix=error.fix)
         found = next((f for f in _dated(texts, "%d", "%m", zoned) if f is not None), None)
         if found is None:
             return None
