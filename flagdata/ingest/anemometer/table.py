@@ -16,6 +16,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import counted, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
+from flagdata.ingest.anemometer.growing import Growing
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
@@ -74,18 +75,18 @@ class _Column:
 
     index: int
     suffix: str = ""
-    values: list[NDArray[np.float64]] = field(default_factory=list)
-    states: list[NDArray[np.uint8]] = field(default_factory=list)
+    values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
+    states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
     def value(self, order: slice) -> NDArray[np.float64]:
-        """All values; the blocks are let go, so that a long log is not held twice."""
-        blocks, self.values = self.values, []
-        return np.concatenate(blocks)[order]
+        """All values; they are let go, so that a long log is not held twice."""
+        found, self.values = self.values.view()[order], Growing(np.float64)
+        return found
 
     def state(self, order: slice) -> NDArray[np.uint8]:
         """All states; likewise."""
-        blocks, self.states = self.states, []
-        return np.concatenate(blocks)[order]
+        found, self.states = self.states.view()[order], Growing(np.uint8)
+        return found
 
 
 @dataclass
@@ -114,8 +115,8 @@ class _Clock:
     columns: list[int]
     step: int = 2**62
     bare_dates: int = 0
-    ns: list[NDArray[np.int64]] = field(default_factory=list)
-    utc: list[NDArray[np.bool_]] = field(default_factory=list)
+    ns: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
+    utc: Growing[np.bool_] = field(default_factory=lambda: Growing(np.bool_))
 
     def parse(self, block: Block) -> Stamps:
         if len(self.columns) == 1:
@@ -131,17 +132,17 @@ class _Clock:
         return stamps
 
     def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
-        self.ns.append(stamps.ns[keep])
-        self.utc.append(stamps.utc[keep])
+        self.ns.add(stamps.ns[keep])
+        self.utc.add(stamps.utc[keep])
         self.step = min(self.step, stamps.step)
 
     def stated(self) -> bool:
         """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
-        return counted.is_elapsed(self.form) or all(bool(utc.all()) for utc in self.utc)
+        return counted.is_elapsed(self.form) or bool(self.utc.view().all())
 
     def order(self) -> slice:
         """The rows from the oldest on, for logs that list the newest first."""
-        steps = np.diff(np.concatenate(self.ns))
+        steps = np.diff(self.ns.view())
         turned = len(steps) > 1 and float((steps < 0).mean()) > NEWEST_FIRST
         return slice(None, None, -1) if turned else slice(None)
 
@@ -149,8 +150,8 @@ class _Clock:
         self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
     ) -> tuple[Instants, tuple[Finding, ...]]:
         """The instants and what was found; the blocks are let go."""
-        wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
-        self.ns, self.utc = [], []
+        wall, utc = self.ns.view()[order], self.utc.view()[order]
+        self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
         if counted.is_elapsed(self.form):
             return counted.since_start(wall, self.form, start=given.start, line=line, where=where)
         found: tuple[Finding, ...] = ()
@@ -177,7 +178,7 @@ class _Gathered:
     extra: dict[str, _Column]
     checks: list[_Check]
     rows: int | None = None
-    lines: list[NDArray[np.int64]] = field(default_factory=list)
+    lines: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
 
@@ -204,20 +205,20 @@ class _Gathered:
         self.clock.add(stamps, keep)
         self.bad_stamps.extend(line[~keep].tolist())
         self.distant += int(stamps.distant.sum())
-        self.lines.append(line[keep])
+        self.lines.add(line[keep])
         for column in self.columns():
             parsed = numbers(
                 _cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing,
                 suffix=column.suffix,
             )  # fmt: skip
-            column.values.append(parsed.value[keep])
-            column.states.append(parsed.state[keep])
+            column.values.add(parsed.value[keep])
+            column.states.add(parsed.state[keep])
         for check in self.checks:
             right = _among(block, check.index, check.layout.values)
             check.right.append(right[keep])
 
     def line(self) -> NDArray[np.int64]:
-        return np.concatenate(self.lines) if self.lines else np.zeros(0, dtype=np.int64)
+        return self.lines.view()
 
 
 def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
@@ -280,7 +281,6 @@ def read_table(
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
     order = gathered.clock.order()
     line = gathered.line()[order]
-    gathered.lines = [line]
     if order.step == -1:
         text = "the newest row comes first: read from the end"
         findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))
