@@ -107,7 +107,8 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
         for need in guess["needs"]:
             click.echo(f"    to say when it is ingested: {need}")
         if guess["draft"]:
-            state = "complete it where it says ?" if guess["doubts"] or guess["kind"] == "other" else "nothing is missing"
+            unfinished = guess["doubts"] or guess["kind"] == "other"
+            state = "complete it where it says ?" if unfinished else "nothing is missing"
             click.echo(f"    the recipe ({state}; name it by --recipe FILE.toml to change anything):")
             click.echo("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
     if "problem" in entry:

@@ -151,10 +151,12 @@ def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
     if time is None or time.counts:
         return ()
     if time.form is not None and counted.is_elapsed(time.form):
-        return (Need(what="its rows count from a start", fix="give the instant of the first: --start TIME", option="start"),)
+        fix = "give the instant of the first: --start TIME"
+        return (Need(what="its rows count from a start", fix=fix, option="start"),)
     found: list[Need] = []
     if time.form is not None and counted.is_time_of_day(time.form):
-        found.append(Need(what="its stamps have no date", fix="give the day of the first row: --date DATE", option="date"))
+        fix = "give the day of the first row: --date DATE"
+        found.append(Need(what="its stamps have no date", fix=fix, option="date"))
     if not time.zoned and time.zone is None:
         statement = zones.stated(lines)
         fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
@@ -202,7 +204,7 @@ def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]
     if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
-        fix = "give it, as the file's description says: --unit '0.1 m/s' (as weather services write), --unit km/h or another"
+        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), --unit km/h or another"
         return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
     likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
     name = layout.names[column] or f"number {column + 1}"
@@ -265,7 +267,7 @@ def _reference(layout: Layout, index: int) -> str:
 
 
 def skeleton(lines: Sequence[str]) -> tuple[str, str] | None:
-    """Of a table of which nothing is known but its columns: what it is, and a recipe to complete; `None` for no table."""
+    """What a table is of which nothing is known but its columns, and a recipe to complete; `None` for no table."""
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
@@ -307,7 +309,8 @@ def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
         lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
         suffix = layout.suffixes[column.index]
         lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
-    for column in {other for one in (wind.columns.values() if wind is not None else ()) for other in _beside(layout, one)}:
+    own = wind.columns.values() if wind is not None else ()
+    for column in dict.fromkeys(other for one in own for other in _beside(layout, one)):
         text = next(row[column].strip() for row in layout.rows if row[column].strip())
         lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
         lines += ['about = "unit"']

@@ -1,8 +1,8 @@
 """FLUXNET, AmeriFlux and ICOS ecosystem tables: TIMESTAMP_START, TIMESTAMP_END and variables with fixed units.
 
 ICOS stations' raw files have one TIMESTAMP (YYYYMMDDHHMMSS) and the same variables and units (Sabbatini et al., ICOS
-Ecosystem Instructions for Raw Data Format for Meteorological Measurements, doi 10.18160/tpp4-4smp); they are as sampled,
-so their rows are no averages.
+Ecosystem Instructions for Raw Data Format for Meteorological Measurements, doi 10.18160/tpp4-4smp); their rows are as
+sampled, no averages.
 
 Source: AmeriFlux, "Half-hourly and hourly data upload format" and "Data variables": stamps YYYYMMDDHHMM of local
 standard time without daylight saving, WS [m/s], WD [deg], TA [°C], PA [kPa], RH [%], -9999 for no value, position as
@@ -44,7 +44,7 @@ class Fluxnet:
     uses = frozenset({"zone"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """A heading that begins with TIMESTAMP_START,TIMESTAMP_END, or with TIMESTAMP and holds WS_1_1_1 or the like."""
+        """A heading that begins with TIMESTAMP_START,TIMESTAMP_END, or with TIMESTAMP and holds WS_1_1_1."""
         at = _heading(head.lines)
         if at is None:
             return None
@@ -64,7 +64,10 @@ class Fluxnet:
         ]
         raw = columns[0].name == "TIMESTAMP"
         assigned = assign(
-            columns[1 if raw else 2 :], _NAMES, where=f"{where}, line {at + 1}", fix="give a table that holds WS, not WS_F alone"
+            columns[1 if raw else 2 :],
+            _NAMES,
+            where=f"{where}, line {at + 1}",
+            fix="give a table that holds WS, not WS_F alone",
         )
         export = Export(
             name=self.name,

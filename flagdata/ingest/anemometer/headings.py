@@ -190,7 +190,8 @@ def names_time(name: str) -> bool:
         "utc", "tijd", "tid", "dato", "data", "dt", "timestamps", "isotime", "when", "year", "month", "day", "hour",
         "doy", "jday", "tstamp", "ora", "tmstamp", "dateutc", "ms", "observed", "obs",
     }  # fmt: skip
-    return bool(words & known) or bool(re.search(r"time|date", "".join(words))) or name.strip() == "X_Value"  # LabVIEW's
+    labview = name.strip() == "X_Value"
+    return bool(words & known) or labview or bool(re.search(r"time|date", "".join(words)))
 
 
 def zone_of(name: str) -> str | None:

@@ -1,7 +1,7 @@
-"""Meteorological files of ICOS' atmosphere stations (.MTO): comment lines, a heading that begins with #Site, semicolons.
+"""Meteorological files of ICOS' atmosphere stations (.MTO): comments, a heading that begins with #Site, semicolons.
 
-Source: ICOS Atmosphere Thematic Centre, release files "ATC MTO", as their own comment lines and the Carbon Portal's list
-of variables describe them: UTC in columns of year to minute, WS [m/s], WD [deg], AT [°C], RH [%], AP [hPa], each with
+Source: ICOS Atmosphere Thematic Centre, release files "ATC MTO", as their comment lines and the Carbon Portal's list of
+variables describe them: UTC in columns of year to minute, WS [m/s], WD [deg], AT [°C], RH [%], AP [hPa], each with
 Stdev, NbPoints and Flag; -999.99 for no value; flags U, O and R are data found correct (automatically, by hand, and
 carried over), N, K and H are not. Written by this description; no such file was at hand.
 """

@@ -121,7 +121,9 @@ def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
     for wind in winds:
         speed = wind.columns.get("wind_speed")
         if speed is not None and not windy and words[speed.index] & {"speed", "velocity", "vel"}:
-            found.warnings.append(f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind")
+            found.warnings.append(
+                f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind"
+            )
         afloat = [name for name, said in zip(found.layout.names, words, strict=True) if said & _VESSEL]
         relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
         if speed is not None and afloat and not relative:

@@ -17,7 +17,6 @@ import io
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 from flagdata.errors import LimitError
@@ -113,7 +112,8 @@ def _before(text: str) -> dict[str, str]:
     """Cells of what stands before an object: a stamp, a topic."""
     found: dict[str, str] = {}
     for number, word in enumerate(text.split(), start=1):
-        found["logged time" if cell_kind(word) == "stamp" or re.fullmatch(r"\d{10}(\.\d+)?", word) else f"topic{number}"] = word
+        stamp = cell_kind(word) == "stamp" or re.fullmatch(r"\d{10}(\.\d+)?", word)
+        found["logged time" if stamp else f"topic{number}"] = word
     return found
 
 

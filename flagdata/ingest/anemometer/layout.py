@@ -152,7 +152,7 @@ def is_unit(text: str) -> bool:
 def _unit_behind(text: str) -> str:
     """The unit that is written behind a number, as written; "" where there is none."""
     match = _QUANTITY.fullmatch(text[:60])
-    if match is None or match["unit"].isalpha() and len(match["unit"]) == 1:
+    if match is None or (match["unit"].isalpha() and len(match["unit"]) == 1):
         return ""
     name = spelled(match["unit"])
     return match["unit"].strip() if name is not None and UNITS[name].si in _BEHIND else ""
@@ -244,7 +244,8 @@ def _mostly(fits: Sequence[bool]) -> bool:
 
 
 def _decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
-    return any(re.match(r"[-+]?\d+,\d+(?![\d,])", cell.strip()) and cell_kind(cell) == "number" for row in rows for cell in row)
+    cells = (cell.strip() for row in rows for cell in row)
+    return any(re.match(r"[-+]?\d+,\d+(?![\d,])", cell) and cell_kind(cell) == "number" for cell in cells)
 
 
 def _heading(

@@ -25,7 +25,9 @@ def winds_by_name(layout: Layout, *, time: Sequence[int], told: str | None) -> t
         told: unit of the wind by the user's word, for names that state none.
     """
     rest = [index for index in range(layout.number_of_columns()) if index not in time]
-    values = [index for index in rest if _most(layout, index, "number") and not understand(layout.names[index]).quantity]
+    values = [
+        index for index in rest if _most(layout, index, "number") and not understand(layout.names[index]).quantity
+    ]
     told_values = [index for index in values if set(words_of(layout.names[index])) & _VALUES]
     values = told_values if len(told_values) == 1 else values
     for column in rest:

@@ -130,9 +130,7 @@ class TimeLine:
     def _kind(self, where: str) -> str:
         counts = {kind: len(lines) for kind, lines in self.line.items()}
         if max(counts.values(), default=0) < 2:
-            raise TimeError(
-                NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX
-            )
+            raise TimeError(NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX)
         if counts.get("TAG", 0) >= 2:
             return "TAG"
         enough = max(counts.values()) / 2

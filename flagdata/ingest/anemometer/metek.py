@@ -62,7 +62,8 @@ class Metek:
         """Read speed and direction or components, stamped by the computer or else by the instrument."""
         instrument = Instrument(
             name="a METEK sonic", channels=CHANNELS, parse=parse, split=_Clock(),
-            sensor=Sensor(name="METEK sonic", resolution=0.01), described_by="METEK's manuals of uSonic-2 and USA-1, or a published sample",
+            sensor=Sensor(name="METEK sonic", resolution=0.01),
+            described_by="METEK's manuals of uSonic-2 and USA-1, or a published sample",
         )  # fmt: skip
         reading = read_lines(source, instrument, zone_name=options.zone)
         return turned(reading, options.azimuth, where=str(source.path))

@@ -47,7 +47,8 @@ class WindOptions:
         zone: of wall-clock stamps: IANA name or fixed offset; goes before the recipe's.
         encoding: of the text, a Python codec name; `None` decides by byte-order mark and validity as UTF-8.
         date: of the first sentence, for streams that carry the time of day alone.
-        date_order: "dmy", "mdy" or "ymd" for dates that are written with numbers only; `None` decides by evidence or refuses.
+        date_order: "dmy", "mdy" or "ymd" for dates that are written with numbers only; `None` decides by evidence or
+            refuses.
         platform: "fixed" for a mast, "moving" for a boat or vehicle; `None` where the log shows it or does not need it.
         talker: NMEA talker whose wind is read, for streams with several instruments.
         azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative

@@ -50,7 +50,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     start = next((line for line in source.head() if line.strip()), "")
     if start.lstrip("\ufeff \t").startswith(("<?xml", "<gpx", "<html", "<!DOCTYPE")):
         text = "this is XML or HTML, not a table of text"
-        fix = "convert it to CSV with one row a reading, its time and its wind (a GPX file: with the program that wrote it)"
+        fix = "convert it to CSV with one row a reading: its time and its wind (GPX: with the program that wrote it)"
         return (Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix),)
     if sum(bool(_METAR.search(line)) for line in source.head()) > len(source.head()) / 3:
         text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"

@@ -408,7 +408,10 @@ def instants(
 
 def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
     """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
-    return unit(layout.unit).to_si(value * layout.gain + layout.offset)
+    if layout.gain != 1.0 or layout.offset != 0.0:
+        value = value * layout.gain + layout.offset
+    stated = unit(layout.unit)
+    return value if stated.scale == 1.0 and stated.offset == 0.0 else stated.to_si(value)
 
 
 def turned(angle: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:

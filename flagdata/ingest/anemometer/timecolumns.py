@@ -32,6 +32,7 @@ _CLOCKS = (
     "%H",
 )
 _MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
+_CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
 )
@@ -41,7 +42,8 @@ _STAMPLIKE = re.compile(
 )
 """What a cell must have in it to be a date and a time."""
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hh 24|hr|hour|stunde", 0, 23),
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31),
+    ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 23),
     ("%M", r"mi|min|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
 )  # fmt: skip
 
@@ -95,7 +97,7 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             continue
         if _share(_DATE, texts):
             dates.append(index)
-        elif _share(_CLOCK, texts) or (words_of(layout.names[index])[:1] in (["time"], ["hhmm"], ["hhmmss"], ["hour"], ["hh"], ["hr"], ["uur"])
+        elif _share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
                                        and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
             clocks.append(index)
         found = _whole(layout, (index,), texts, order)
@@ -144,9 +146,7 @@ def _choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, 
     )
 
 
-def _whole(
-    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None
-) -> TimeChoice | None:
+def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None) -> TimeChoice | None:
     """Date and time in `texts`."""
     if not any(_STAMPLIKE.search(text) for text in texts[:5]):
         return None
@@ -174,7 +174,9 @@ def _whole(
         if "may be" not in error.what:
             return None
         if "ymd" in error.fix:
-            return TimeChoice(columns=columns, form=None, zone=None, zoned=False, score=2.5, doubt=error.what, fix=error.fix)
+            return TimeChoice(
+                columns=columns, form=None, zone=None, zoned=False, score=2.5, doubt=error.what, fix=error.fix
+            )
         found = next((f for f in _dated(texts, "%d", "%m", zoned) if f is not None), None)
         if found is None:
             return None
@@ -236,7 +238,9 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
     names = [" ".join(words_of(name)) for name in layout.names]
     for index, name in enumerate(names):
-        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not _whole_numbers(columns[index], 1990, 2100):
+        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not _whole_numbers(
+            columns[index], 1990, 2100
+        ):
             continue
         chosen, form = [index], "%Y"
         at = index + 1

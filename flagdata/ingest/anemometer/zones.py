@@ -22,11 +22,12 @@ LINES = 100
 _LONGEST = 300
 """Characters of a line that are looked at."""
 _KEY = (
-    r"(?:time[ _-]?zone(?:[ _]name)?|(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|zeitzone|"
-    r"fuseau(?: horaire)?|zona horaria|tijdzone)"
+    r"(?:time[ _-]?zone(?:[ _]name)?|(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|"
+    r"zeitzone|fuseau(?: horaire)?|zona horaria|tijdzone)"
 )
 _STATED = re.compile(
-    rf"(?<![A-Za-z]){_KEY}(?P<count>[ _]?(?:in[ _])?\(?(?:seconds|minutes|hours)\)?)?[\"']?\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?"
+    rf"(?<![A-Za-z]){_KEY}(?P<count>[ _]?(?:in[ _])?\(?(?:seconds|minutes|hours)\)?)?[\"']?"
+    r"\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?"
     r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?|(?:UTC|GMT)?\s?[+-]?\d{1,5}(?::?\d{2})?|UTC|GMT|Z)"
     r"(?![A-Za-z/\d.])",
     re.IGNORECASE,
@@ -56,7 +57,7 @@ class Statement:
 
 
 def stated(lines: Sequence[str]) -> Statement | None:
-    """The zone that the first lines of a file state first; `None` where none does, or another contradicts it all year."""
+    """The zone that the first lines of a file state first; `None` where none does, or another always contradicts it."""
     found: list[Statement] = []
     for number, line in enumerate(lines[:LINES], start=1):
         text = line[:_LONGEST]
@@ -120,10 +121,8 @@ def _name(text: str, count: str) -> str | None:
     if number is not None:
         size = {"s": 1, "m": 60}.get(re.sub(r"[^a-z]", "", count.lower()).removeprefix("in")[:1], 3600)
         digits = int(number[2])
-        if size == 3600 and len(number[2]) > 2:  # +0530
-            seconds = (digits // 100) * 3600 + (digits % 100) * 60
-        else:
-            seconds = digits * size
+        together = size == 3600 and len(number[2]) > 2  # +0530
+        seconds = digits // 100 * 3600 + digits % 100 * 60 if together else digits * size
         if seconds > _HOURS * 3600 or seconds % 60:
             return None
         sign = "-" if number[1] == "-" else "+"

@@ -35,7 +35,7 @@ def test_members_are_columns_by_their_keys(read: Read, text: str) -> None:
 
 def test_members_within_members_are_named_by_their_path_and_need_a_unit(read: Read) -> None:
     text = lines([{"t": START + at, "data": {"wind": {"speed": speed}}} for at, speed in enumerate(SPEEDS)])
-    with pytest.raises(InputError, match="unit of column 'data.wind.speed' is not stated"):
+    with pytest.raises(InputError, match=r"unit of column 'data.wind.speed' is not stated"):
         read(text)
     assert read(text, unit="m/s").series.channels["wind_speed"].tolist() == SPEEDS
 

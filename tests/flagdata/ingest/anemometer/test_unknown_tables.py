@@ -126,7 +126,7 @@ def test_a_day_of_the_month_is_no_direction(read: Read) -> None:
 
 def test_tenths_of_metres_a_second_are_a_unit_and_not_taken_for_kilometres_an_hour(log_file: Write) -> None:
     path = log_file(table("FF", [str(speed) for speed in (30, 40, 55, 20, 10, 30, 40, 50, 60, 70, 20)]))
-    with pytest.raises(InputError, match="0.1 m/s") as caught:
+    with pytest.raises(InputError, match=r"0\.1 m/s") as caught:
         read_log(path, WindOptions())
     assert "likely km/h" not in caught.value.what
     assert read_log(path, WindOptions(unit="0.1 m/s")).series.channels["wind_speed"][0] == pytest.approx(3.0)

@@ -47,7 +47,8 @@ def test_a_zone_that_lines_above_the_rows_state_is_found(text: str, name: str) -
 
 
 @pytest.mark.parametrize(
-    "text", ["Time zone: local", "UTC Offset,99", "zone 5 of the site", "Time Zone: UTC\nGMT Offset: -5", "Timestamp,UTC"]
+    "text",
+    ["Time zone: local", "UTC Offset,99", "zone 5 of the site", "Time Zone: UTC\nGMT Offset: -5", "Timestamp,UTC"],
 )
 def test_what_names_no_zone_or_two_states_none(text: str) -> None:
     assert stated(text.split("\n")) is None
