@@ -51,6 +51,8 @@ def is_json(lines: Sequence[str]) -> bool:
         return False
     if filled[0].lstrip("\ufeff \t").startswith("["):
         return bool(re.match(r"\s*\[\s*\{\s*\"", "".join(filled).lstrip("\ufeff")))
+    if filled[0].strip("\ufeff \t\r") == "{":
+        return bool(re.match(r"\s*\"[^\"]*\"\s*:", "".join(filled[1:])))
     objects = [match for line in filled if (match := _LINE.fullmatch(line)) is not None and _object(match["object"])]
     messages = sum('"pgn":' in match["object"] for match in objects)
     return len(objects) > len(filled) / 2 > messages
@@ -62,10 +64,15 @@ def as_table(source: TextFile, *, limits: Limits) -> TableText | None:
     Raises:
         LimitError: more than `WIDEST` columns.
     """
+    whole = _whole(source)
+    columns = _columns(whole) if isinstance(whole, dict) else None
+    before: list[tuple[str, str]] = []
+    if isinstance(whole, dict) and columns is not None:
+        before = [(key, _text(value)) for key, value in whole.items() if not isinstance(value, dict | list)]
     table: list[dict[str, str]] = []
     names: dict[str, None] = {}
     broken = 0
-    for row in _rows(source, limits):
+    for row in _rows(source, whole) if columns is None else columns:
         broken += row is None
         table.append(row or {})
         names.update(dict.fromkeys(row or {}))
@@ -76,6 +83,7 @@ def as_table(source: TextFile, *, limits: Limits) -> TableText | None:
         return None
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
+    writer.writerows(before)
     writer.writerow(names)
     writer.writerows([row.get(name, "") for name in names] for row in table if row)
     text = f"JSON, read as a table of {len(names)} columns; lines are counted with its heading as the first"
@@ -88,12 +96,33 @@ def as_table(source: TextFile, *, limits: Limits) -> TableText | None:
     return TableText(**{**vars(plain), "text": lines})
 
 
-def _rows(source: TextFile, limits: Limits) -> Iterator[dict[str, str] | None]:
+def _whole(source: TextFile) -> Any:
+    """What a file holds that is one list or one object; `None` for objects in lines."""
+    filled = [line for line in source.head(_LOOKED_AT) if line.strip()]
+    first = filled[0].lstrip("\ufeff \t") if filled else ""
+    if not first.startswith("[") and first.strip() != "{" and len(filled) > 1:
+        return None
+    return _parsed("\n".join(line for _, lines in source.blocks() for line in lines).lstrip("\ufeff"))
+
+
+def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
+    """Rows of an object that holds its columns as lists of one length, with their units in a member "…_units"."""
+    for name, member in [("", item), *item.items()]:
+        lists = {k: v for k, v in member.items() if isinstance(v, list)} if isinstance(member, dict) else {}
+        if len(lists) < 2 or len({len(values) for values in lists.values()}) > 1:
+            continue
+        units = item.get(f"{name}_units")
+        units = units if isinstance(units, dict) else {}
+        heads = {key: f"{key} [{units[key]}]" if isinstance(units.get(key), str) else key for key in lists}
+        rows = zip(*lists.values(), strict=True)
+        return [{heads[key]: _text(value) for key, value in zip(lists, row, strict=True)} for row in rows]
+    return None
+
+
+def _rows(source: TextFile, whole: Any) -> Iterator[dict[str, str] | None]:
     """Each object's cells by name; `None` for a line that is none."""
-    if "".join(source.head(_LOOKED_AT)).lstrip("\ufeff \t\r\n").startswith("["):
-        text = "\n".join(line for _, lines in source.blocks() for line in lines).lstrip("\ufeff")
-        whole = _parsed(text)
-        for item in whole if isinstance(whole, list) else ():
+    if whole is not None:
+        for item in whole if isinstance(whole, list) else [whole]:
             yield _flat(item) if isinstance(item, dict) else None
         return
     for _, lines in source.blocks():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.errors import InputError, LimitError
+from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.ingest.anemometer import WindOptions, read_log, sniff
 from flagdata.signals import WindLog
 
@@ -78,3 +78,21 @@ def test_an_object_of_any_number_of_members_is_refused_by_a_limit(log_file: Call
     path = log_file(lines([{f"k{index}": 1 for index in range(3000)}] * 2))
     with pytest.raises(LimitError, match="more than 2000 kinds of members"):
         read_log(path, WindOptions())
+
+
+@pytest.mark.parametrize("indent", [None, 2])
+def test_lists_of_one_length_are_columns_with_their_units_and_zone_told(
+    log_file: Callable[[str], Path], indent: int | None
+) -> None:
+    """As the forecast services of Open-Meteo's interface answer."""
+    times = [f"2026-05-01T{hour:02d}:00" for hour in range(14, 17)]
+    answer = {
+        "utc_offset_seconds": 7200, "hourly_units": {"time": "iso8601", "wind_speed_10m": "km/h"},
+        "hourly": {"time": times, "wind_speed_10m": [3.6 * speed for speed in SPEEDS]},
+    }  # fmt: skip
+    path = log_file(json.dumps(answer, indent=indent))
+    with pytest.raises(FlagdataError, match="utc_offset_seconds,7200.*--zone \\+02:00"):
+        read_log(path, WindOptions())
+    series = read_log(path, WindOptions(zone="+02:00")).series
+    assert series.channels["wind_speed"].tolist() == pytest.approx(SPEEDS)
+    assert series.time[0] == START * 10**9
