@@ -91,7 +91,7 @@ def test_lists_of_one_length_are_columns_with_their_units_and_zone_told(
         "hourly": {"time": times, "wind_speed_10m": [3.6 * speed for speed in SPEEDS]},
     }  # fmt: skip
     path = log_file(json.dumps(answer, indent=indent))
-    with pytest.raises(FlagdataError, match="utc_offset_seconds,7200.*--zone \\+02:00"):
+    with pytest.raises(FlagdataError, match=r"utc_offset_seconds,7200.*--zone \+02:00"):
         read_log(path, WindOptions())
     series = read_log(path, WindOptions(zone="+02:00")).series
     assert series.channels["wind_speed"].tolist() == pytest.approx(SPEEDS)
