@@ -57,7 +57,7 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
     year_first = [text.strip() for text in dated if _ISO.match(text)]
     if len(year_first) * 2 > len(dated):
         first = year_first[0]
-        if told is not None:
+        if told not in (None, "ymd"):
             raise TimeError(f"dates are not {told}, but {first[:10]}", where=where, fix="leave out --date-order")
         return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
     parts = [match for text in dated if (match := _PARTS.match(text))]
