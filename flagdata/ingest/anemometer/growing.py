@@ -33,9 +33,6 @@ class Growing(Generic[T]):
         self._room[self._count : end] = block
         self._count = end
 
-    def __len__(self) -> int:
-        return self._count
-
     def view(self) -> NDArray[T]:
         """(n,) all values so far, without a copy."""
         return self._room[: self._count]

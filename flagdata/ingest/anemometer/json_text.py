@@ -22,7 +22,6 @@ from typing import Any
 from flagdata.errors import LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.layout import cell_kind
-from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 WIDEST = 2000
@@ -58,7 +57,7 @@ def is_json(lines: Sequence[str]) -> bool:
     return len(objects) > len(filled) / 2 > messages
 
 
-def as_table(source: TextFile, *, limits: Limits) -> TableText | None:
+def as_table(source: TextFile) -> TableText | None:
     """The objects of a file as a table whose first line names the columns; `None` where a list is no list of objects.
 
     Raises:

@@ -217,7 +217,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
     text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
-    table = json_text.as_table(text, limits=limits) if json_text.is_json(text.head()) else None
+    table = json_text.as_table(text) if json_text.is_json(text.head()) else None
     return table or text
 
 
