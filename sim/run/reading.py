@@ -205,6 +205,7 @@ def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
     spec = MaterialSpec(
         bases=bases,
         density=table.quantity("density", bases[0].density, above=0.0) if "density" in table else None,
+        density_factor=table.quantity("density-factor", 1.0, above=0.0),
         stretching=table.quantity("stretching-factor", 1.0, above=0.0),
         bending=table.quantity("bending-factor", 1.0, least=0.0),
         bending_each=table.quantity("bending-factors", 1.0, least=0.0),
