@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
@@ -119,11 +119,11 @@ class SizePrior:
 
     def share_above(self, length: float) -> float:
         """Share of the flags that are longer than `length` [m]."""
-        return float(norm.sf(math.log(length / self.median) / math.log(self.factor)))
+        return float(ndtr(-math.log(length / self.median) / math.log(self.factor)))
 
     def quantile(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Lengths that these shares of the flags stay below [m]."""
-        return self.median * np.exp(math.log(self.factor) * norm.ppf(share))
+        return self.median * np.exp(math.log(self.factor) * ndtri(share))
 
 
 STRATA = 3
