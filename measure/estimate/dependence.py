@@ -15,24 +15,28 @@ frames; what is found is then an upper bound for windows that follow each other,
 intervals.
 
 The result belongs to a model. It stands in the model's card under "window_correlation", where `of_model` finds it;
-`python -m tests.validation window-correlation` measures it anew.
+`python -m measure.estimate.dependence` measures it anew and writes it there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.console import progress, say
 from flagdata.dataset import Pairs
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, UNKNOWN, Dependence
-from models.estimator import Estimator
+from models.estimator import SHIPPED, Estimator
+from models.storage import read_card, write_card
 from models.targets import truth
 
 CARD_KEY = "window_correlation"
@@ -158,6 +162,35 @@ def of_model(model: Estimator) -> Dependence:
     except (KeyError, TypeError, ValueError, InputError) as error:
         raise CorruptError(
             f"the card's {CARD_KEY} cannot be used: {error}", where=f"model {model.name!r}",
-            fix="measure it anew by python -m tests.validation window-correlation",
+            fix="measure it anew by python -m measure.estimate.dependence",
         ) from None
 
+
+@click.command()
+@click.argument("name")
+@click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
+              help="Where the films are.")  # fmt: skip
+@click.option("--at", help="Version of the lake.")
+@click.option("--side", default="validation", show_default=True, help="Of the data set; it must not be trained on.")
+@click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
+def main(name: str, lake_path: Path, at: str | None, side: str, out: Path) -> None:
+    """Measure how alike two windows of one film are to the shipped model NAME, and write it into its card."""
+    import flagdata
+    from flagdata.dataset import ExplicitSplit
+    from models.estimator import load
+    from models.training.recipe import DataSpec
+
+    model = load(out / name)
+    recipe: Any = model.card["recipe"]
+    spec = DataSpec(dataset=recipe["data"]["dataset"])
+    split = ExplicitSplit(where={part: spec.where(part) for part in {"train", side}})
+    pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=split)
+    with progress(len(set(pairs.table.seed.tolist())), label="windows", unit="film") as advance:
+        entry = card_entry(errors(model, pairs, advance=advance))
+    card = {key: value for key, value in read_card(out / name).items() if key != "format"}
+    write_card(out / name, {**card, CARD_KEY: entry})
+    say(f"errors of two windows correlate by {entry['wind']:.2f} in wind and {entry['cloth']:.2f} in cloth")
+
+
+if __name__ == "__main__":
+    main()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from measure.estimate.answer import Quantity, quantities, sentence
 from measure.estimate.combine import OWN, Dependence, combined
 from measure.estimate.film import Film
 from measure.estimate.gate import Gate, Reason, Verdict, verdict
-from measure.estimate.similarity import FlagSize, Sizes, scaled_back, sizes, spacing
+from measure.estimate.similarity import POWERS, FlagSize, Sizes, scaled_back, sizes, spacing
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
 from models.estimator import Estimator
 from models.learner import Loss
@@ -302,8 +303,9 @@ class _Answer:
         )
 
     def quantities(self, draws: NDArray[np.float64]) -> tuple[Quantity, ...]:
-        return quantities(draws, self.prior(), self.names, level=self.options.level, assumed=self.assumed())
+        return quantities(draws, self.prior, self.names, level=self.options.level, assumed=self.assumed)
 
+    @cached_property
     def prior(self) -> NDArray[np.float64]:
         """(n, target) draws of what the model assumes of a flag of these sizes."""
         learner = self.model.learners[0]
@@ -313,12 +315,14 @@ class _Answer:
         logits = learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
         return scaled_back(self._values(logits), self.names, s)
 
+    @cached_property
     def assumed(self) -> NDArray[np.float64]:
-        """(target, 2) range that was simulated, at these sizes."""
+        """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
         ends = np.array([[TARGETS[name].low for name in self.names], [TARGETS[name].high for name in self.names]])
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
         low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
-        return np.stack([low, high], axis=1)
+        even = np.array([name in POWERS for name in self.names])[:, None]
+        return np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
 
     def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()
