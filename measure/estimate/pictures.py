@@ -40,21 +40,22 @@ def corner(measured: Measurement) -> str:
 
     names, draws = measured.names, measured.draws
     count = len(names)
-    figure = Figure(figsize=(2.1 * count + 0.6, 2.0 * count + 0.4), layout="constrained")
-    grid = figure.subplots(count, count, squeeze=False)
+    side = 2.1 * count + 0.6
+    figure = Figure(figsize=(side, side))
+    grid = figure.add_gridspec(
+        count, count, left=0.7 / side, right=1 - 0.1 / side, bottom=0.5 / side, top=1 - 0.1 / side, hspace=0.22,
+        wspace=0.22,
+    )  # fmt: skip
     for row in range(count):
-        for column in range(count):
-            axes = grid[row, column]
-            if column > row:
-                axes.set_axis_off()
-                continue
+        for column in range(row + 1):
+            axes = figure.add_subplot(grid[row, column])
             if row == column:
                 quantity = measured.quantities[row]
                 axes.hist(draws[:, row], bins=40, color=_BLUE if quantity.told else _GRAY, histtype="stepfilled")
                 axes.axvspan(quantity.low, quantity.high, color=_RUST, alpha=0.15, linewidth=0)
                 axes.set_yticks([])
             else:
-                axes.hist2d(draws[:, column], draws[:, row], bins=30, cmap="Blues", rasterized=True)
+                axes.hist2d(draws[:, column], draws[:, row], bins=30, cmap="Blues")
             if row == count - 1:
                 axes.set_xlabel(_label(measured, column), fontsize=8)
             if column == 0 and row:
