@@ -10,9 +10,11 @@ of the errors of two windows, the mean of K estimates has the variance σ² (1 +
     K_eff = K / (1 + (K − 1) ρ)
 
 independent ones, which is never more than 1/ρ (Kish, Survey Sampling, 1965, section 5.4). The likelihood is therefore
-tempered by K_eff/K. All is done with Gaussians of the targets' logits, on which models are trained. In coordinates in
-which the prior is a standard normal distribution, window k contributes the precision Λ_k = S_k⁻¹ − 1, from which
-directions that are less precise than the prior are left out, and the information S_k⁻¹ m_k along the others.
+tempered by K_eff/K. Means and covariances are those of Gaussians on the targets' logits, on which models are trained. In
+coordinates in which the prior is a standard normal distribution, window k contributes the precision Λ_k = S_k⁻¹ − 1,
+from which directions that are less precise than the prior are left out, and the information S_k⁻¹ m_k along the others.
+The shape is not made Gaussian: the draws are the windows' own, each less its window's mean and over the square root of
+its covariance, at the mean and with the covariance of the product.
 
 *Wind.* The wind of window k given the cloth is its residual r_k about the regression on cloth, w_k = r_k + B_k θ, at
 the cloth that all windows agree on (Matheron's rule). The residuals keep each window's own distribution; among windows
@@ -95,30 +97,32 @@ def combined(
     cloth = [place for place, name in enumerate(names) if name not in OWN]
     if len(draws) == 1:
         return draws[:, :, own], draws[0][:, cloth]
-    shared = _cloth(draws[:, :, cloth], centre[cloth], spread[cloth], dependence.cloth, generator)
+    shared = centre[cloth] + spread[cloth] * _cloth(
+        (draws[:, :, cloth] - centre[cloth]) / spread[cloth], dependence.cloth
+    )
     winds = _winds(draws[:, :, own], draws[:, :, cloth], shared, dependence.wind, generator)
     return winds, shared
 
 
-def _cloth(
-    draws: NDArray[np.float64], centre: NDArray[np.float64], spread: NDArray[np.float64], correlation: float,
-    generator: np.random.Generator,
-) -> NDArray[np.float64]:  # fmt: skip
-    """(n, cloth) draws of the product of Gaussians, tempered."""
-    count, n, size = draws.shape
+def _cloth(white: NDArray[np.float64], correlation: float) -> NDArray[np.float64]:
+    """(n, cloth) draws of the tempered product of posteriors (k, n, cloth), in units of the prior."""
+    count, n, size = white.shape
     if not size:
         return np.zeros((n, 0))
-    white = (draws - centre) / spread
+    tempered = effective(count, correlation) / count
     precision, information = np.eye(size), np.zeros(size)
-    for window in white:
-        inverse = np.linalg.inv(np.atleast_2d(np.cov(window.T)))
-        values, vectors = np.linalg.eigh(inverse - np.eye(size))
-        told = vectors[:, values > 0]
-        precision += effective(count, correlation) / count * (told * values[values > 0]) @ told.T
-        information += effective(count, correlation) / count * told @ (told.T @ (inverse @ window.mean(axis=0)))
-    covariance = np.linalg.inv(precision)
-    factor = np.linalg.cholesky((covariance + covariance.T) / 2)
-    return centre + spread * (covariance @ information + generator.standard_normal((n, size)) @ factor.T)
+    shapes = np.empty_like(white)
+    for k, window in enumerate(white):
+        mean, covariance = window.mean(axis=0), np.atleast_2d(np.cov(window.T))
+        values, vectors = np.linalg.eigh(covariance)
+        told = values < 1
+        gain = vectors[:, told] * (1 / values[told] - 1)
+        precision += tempered * gain @ vectors[:, told].T
+        information += tempered * (vectors[:, told] / values[told]) @ (vectors[:, told].T @ mean)
+        shapes[k] = (window - mean) @ (vectors / np.sqrt(values)) @ vectors.T
+    values, vectors = np.linalg.eigh(precision)
+    shape = shapes[np.arange(n) % count, np.arange(n)]
+    return np.linalg.solve(precision, information) + shape @ (vectors / np.sqrt(values)) @ vectors.T
 
 
 def _winds(

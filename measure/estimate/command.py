@@ -41,13 +41,17 @@ if TYPE_CHECKING:
 @click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
               show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
 @click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses.")
-@click.option("--report", type=click.Path(path_type=Path), metavar="FILE.html", help="Write a page that needs no other.")
+@click.option(
+    "--report", type=click.Path(path_type=Path), metavar="FILE.html", help="Write a page that needs no other."
+)
 @click.option("--zarr", "zarr_path", type=click.Path(path_type=Path), metavar="FOLDER",
               help="Write draws and series as a Zarr data set.")  # fmt: skip
 @click.option("--csv", "as_csv", is_flag=True, help="The windows as comma-separated values on stdout.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
               help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.")  # fmt: skip
-@click.option("--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head.")
+@click.option(
+    "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
+)
 @click.option("--branch", default="main", show_default=True, help="Of the lake, to commit on.")
 @click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
 @json_option

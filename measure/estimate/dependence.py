@@ -77,9 +77,7 @@ class Errors:
         )
 
 
-def errors(
-    model: Estimator, pairs: Pairs, *, seed: int = 0, advance: Callable[[int], None] | None = None
-) -> Errors:
+def errors(model: Estimator, pairs: Pairs, *, seed: int = 0, advance: Callable[[int], None] | None = None) -> Errors:
     """Errors of the first and the last window of films whose truth is known, one film a simulation.
 
     Args:
@@ -161,7 +159,8 @@ def of_model(model: Estimator) -> Dependence:
         return Dependence(wind=float(entry["wind"]), cloth=float(entry["cloth"]), source=str(entry["source"]))
     except (KeyError, TypeError, ValueError, InputError) as error:
         raise CorruptError(
-            f"the card's {CARD_KEY} cannot be used: {error}", where=f"model {model.name!r}",
+            f"the card's {CARD_KEY} cannot be used: {error}",
+            where=f"model {model.name!r}",
             fix="measure it anew by python -m measure.estimate.dependence",
         ) from None
 

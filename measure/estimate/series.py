@@ -212,9 +212,7 @@ def _rmse_interval(off: NDArray[np.float64], seed: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def spectrum(
-    time: NDArray[np.float64], estimated: NDArray[np.float64], logged: NDArray[np.float64]
-) -> Spectrum | None:
+def spectrum(time: NDArray[np.float64], estimated: NDArray[np.float64], logged: NDArray[np.float64]) -> Spectrum | None:
     """Over the longest run of windows one step apart, all of them logged; None where that is shorter than
     `LEAST_SPECTRUM`, or where one of the series does not vary."""
     if len(time) < LEAST_SPECTRUM:

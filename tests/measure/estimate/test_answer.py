@@ -21,9 +21,7 @@ UNTOLD = Quantity(
 
 
 def test_the_answer_is_one_line() -> None:
-    assert (
-        sentence([WIND, WEIGHT], level=0.9) == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
-    )
+    assert sentence([WIND, WEIGHT], level=0.9) == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
 
 
 def test_what_the_film_did_not_tell_is_said_so() -> None:

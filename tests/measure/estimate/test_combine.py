@@ -68,6 +68,13 @@ def test_a_window_that_tells_nothing_changes_nothing() -> None:
     assert both.var() == pytest.approx(alone.var(), rel=0.05)
 
 
+def test_windows_of_the_priors_width_keep_their_shape() -> None:
+    # Half of the mass at either end, as the logits of a quantity whose range is too narrow have it.
+    draws = np.where(stream(8, "shape").uniform(size=(4, 5000, 1)) < 0.5, -1.0, 1.0)
+    found = cloth_of(draws, 0.5)
+    assert np.abs(np.abs(found) - 1).max() < 0.1
+
+
 @pytest.mark.parametrize("correlation", [0.0, 0.5])
 def test_intervals_cover_what_they_say_when_errors_correlate_as_told(correlation: float) -> None:
     # 800 flags, five windows each, observed with noise of variance 1 that correlates between windows.

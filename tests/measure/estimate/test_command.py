@@ -108,9 +108,7 @@ def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
 
 
-def test_a_folder_of_images_and_the_video_of_them_say_the_same(
-    film: Path, model_folder: Path, tmp_path: Path
-) -> None:
+def test_a_folder_of_images_and_the_video_of_them_say_the_same(film: Path, model_folder: Path, tmp_path: Path) -> None:
     folder = tmp_path / "images"
     folder.mkdir()
     for k, image in enumerate(pictures(4 * FRAMES, height=40, width=56)):
@@ -140,9 +138,7 @@ def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder
     assert text.count("data:image/png") == 2
 
 
-def test_a_crop_beyond_the_picture_is_refused_and_one_inside_changes_the_answer(
-    film: Path, model_folder: Path
-) -> None:
+def test_a_crop_beyond_the_picture_is_refused_and_one_inside_changes_the_answer(film: Path, model_folder: Path) -> None:
     options = (*SIZED, "--model", model_folder, "--anyway")
     assert "reaches beyond" in run(film, *options, "--crop", "30,0,30,30", code=2).stderr
     whole, part = answer(film, *options), answer(film, *options, "--crop", "0,0,30,30")

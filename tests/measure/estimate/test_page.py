@@ -25,7 +25,9 @@ def found(model: Estimator) -> Measurement:
     return replace(done, verdict=replace(done.verdict, p=0.5, window_p=(0.5, 0.5, 0.5)))
 
 
-def drawn(found: Measurement, context: Context = PLAIN, *, anyway: bool = False, sections: tuple[Section, ...] = ()) -> str:
+def drawn(
+    found: Measurement, context: Context = PLAIN, *, anyway: bool = False, sections: tuple[Section, ...] = ()
+) -> str:
     return page(found, beside(found, start=None, wind=None), context, anyway=anyway, sections=sections)
 
 
