@@ -10,8 +10,8 @@ of the errors of two windows, the mean of K estimates has the variance σ² (1 +
     K_eff = K / (1 + (K − 1) ρ)
 
 independent ones, which is never more than 1/ρ (Kish, Survey Sampling, 1965, section 5.4). The likelihood is therefore
-tempered by K_eff/K. Means and covariances are those of Gaussians on the targets' logits, on which models are trained. In
-coordinates in which the prior is a standard normal distribution, window k contributes the precision Λ_k = S_k⁻¹ − 1,
+tempered by K_eff/K. Means and covariances are those of Gaussians on the targets' logits, on which models are trained.
+In coordinates in which the prior is a standard normal distribution, window k contributes the precision Λ_k = S_k⁻¹ − 1,
 from which directions that are less precise than the prior are left out, and the information S_k⁻¹ m_k along the others.
 The shape is not made Gaussian: the draws are the windows' own, each less its window's mean and over the square root of
 its covariance, at the mean and with the covariance of the product.

@@ -4,11 +4,10 @@ All is on the targets' logits z, less the prior's mean and over its standard dev
 mean m and variance v. Correlations are those over films, one film a simulation.
 
 - Of the wind, of which each window has its own posterior: of the errors (m − z)/√v.
-- Of the cloth, of which likelihoods are multiplied: of the scores s = m/v − (1/v − 1) z, the derivatives at the truth of
-  the logarithms of the Gaussian likelihoods that the posteriors stand for. A window that tells nothing has a score of
-  0, whereas its error is that of the prior, the same in both. Correlated scores by the same factor as in
-  `measure.estimate.combine` is what adjusts the magnitude of a composite likelihood (Ribatet, Cooley and Davison,
-  Statistica Sinica 22, 2012).
+- Of the cloth, of which likelihoods are multiplied: of the scores s = m/v − (1/v − 1) z, the derivatives at the truth
+  of the logarithms of the Gaussian likelihoods that the posteriors stand for. A window that tells nothing has a score
+  of 0, whereas its error is that of the prior, the same in both. Tempering by the correlation of scores adjusts the
+  magnitude of a composite likelihood (Ribatet, Cooley and Davison, Statistica Sinica 22, 2012).
 
 Films of a data set are two seconds long, so that their first and last windows of 1.2 s share up to a third of their
 frames; what is found is then an upper bound for windows that follow each other, and errs on the side of wider

@@ -255,8 +255,8 @@ def _about_windows(
         found.append(
             Finding(
                 kind="windows-combined", severity=Severity.NOTE, count=len(used),
-                what=f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors count "
-                f"as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} in cloth "
+                what=f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
+                f"count as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} in cloth "
                 f"({dependence.source})",
             )
         )  # fmt: skip

@@ -6,8 +6,8 @@ window is a sample; gusts within the minute count as errors against it.
 
 Spectra are Welch's and the coherence is the magnitude-squared one (`scipy.signal`), with Hann segments of a quarter of
 the longest run of windows without gaps, that overlap by a half. With k such segments independent series exceed the
-coherence 1 − 0.05^(1/(k − 1)) at one frequency in twenty (Carter, Knapp and Nuttall, IEEE Trans. AU 21, 1973), where the
-overlap is not counted. The delay is found as `flagdata.align` finds a clock's offset, with the wind off the film in
+coherence 1 − 0.05^(1/(k − 1)) at one frequency in twenty (Carter, Knapp and Nuttall, IEEE Trans. AU 21, 1973), where
+the overlap is not counted. The delay is found as `flagdata.align` finds a clock's offset, with the wind off the film in
 place of the motion.
 """
 

@@ -172,8 +172,8 @@ def findings_of(layout: Layout, *, found: int, worst: float, repeats: int, rate:
             kind="resampled", severity=Severity.NOTE, value=worst,
             what=f"windows of {layout.frames} frames, "
             + " or ".join(f"{spacing * 1e3:.1f}" for spacing in layout.spacings)
-            + f" ms apart, out of a film of {rate:.4g} frames a second; a frame is at most {worst * 1e3:.1f} ms from its "
-            "instant",
+            + f" ms apart, out of a film of {rate:.4g} frames a second; a frame is at most {worst * 1e3:.1f} ms from "
+            "its instant",
         )
     ]  # fmt: skip
     if found < layout.count:

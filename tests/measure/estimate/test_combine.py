@@ -80,6 +80,7 @@ def test_intervals_cover_what_they_say_when_errors_correlate_as_told(correlation
     # 800 flags, five windows each, observed with noise of variance 1 that correlates between windows.
     rng = stream(5, "coverage")
     problems, covered = 800, 0
+    draws = np.empty((5, 300, 1))
     for number in range(problems):
         truth = rng.normal()
         noise = np.sqrt(correlation) * rng.normal() + np.sqrt(1 - correlation) * rng.normal(size=5)

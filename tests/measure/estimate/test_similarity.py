@@ -56,7 +56,7 @@ def test_what_the_model_is_told_back_makes_half_a_flag_move_like_the_whole() -> 
     half = flight(0.5, wind=wind, material=cloth(density=density, bending=10**bending, scale=0.5))
     moved = np.abs(whole - whole[0]).max()
     assert moved > 0.1  # of a length; it is not a flag at rest that is compared
-    # The step follows from the mesh, so it scales by √s too: equal to rounding, which the motion amplifies (10⁻¹⁵ seen).
+    # The step follows from the mesh, so it scales by √s too: equal to rounding, which motion amplifies (10⁻¹⁵ seen).
     np.testing.assert_allclose(half, whole, atol=1e-9)
     unscaled = flight(0.5, wind=4.0, material=cloth(density=density, bending=10**bending, scale=0.5))
     assert np.abs(unscaled - whole).max() > 0.01
