@@ -206,7 +206,7 @@ class _Job:
             where = done.measured.film + (f", see {self.report}" if self.report is not None else "")
             raise RefusedError(
                 verdict.sentence, where=where,
-                fix="crop to the flag by --crop, give another film, or look at it with --anyway",
+                fix=verdict.reasons[0].fix,
             )  # fmt: skip
 
     def _write_page(

@@ -29,15 +29,17 @@ class Reason:
         kind: stable name in kebab-case.
         what: a sentence for people, with the figure in it.
         p: probability that a familiar clip is at least as strange.
+        fix: what the user can do about it.
     """
 
     kind: str
     what: str
     p: float
+    fix: str = "crop to the flag by --crop, give another film, or look at it with --anyway"
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
-        return {"kind": self.kind, "what": self.what, "p": self.p}
+        return {"kind": self.kind, "what": self.what, "p": self.p, "fix": self.fix}
 
 
 class Gate(Protocol):
@@ -51,6 +53,14 @@ class Gate(Protocol):
         Args:
             frames: (n, height, width) gray, at the model's rate.
             summary: (dimension,) what the model's first network made of them.
+        """
+        ...
+
+    def level(self, false_alarm: float) -> float:
+        """p at or below which a recording is refused, so that this happens to familiar ones at most so often.
+
+        The rate itself where p-values are exact; less where the clips that they were calibrated by are few and the rate
+        is to hold for most draws of these.
         """
         ...
 
@@ -70,6 +80,9 @@ class FamiliarityGate:
             f"p = {p:.3f} among {len(self.cloud.reference)} validation clips"
         )
         return [Reason(kind="unlike-training", what=what, p=p)]
+
+    def level(self, false_alarm: float) -> float:
+        return false_alarm
 
 
 def gate_of(model: Estimator) -> Gate:
@@ -92,24 +105,26 @@ class Verdict:
 
     Attributes:
         false_alarm: share of familiar recordings that are refused, at most.
+        level: p at or below which that is.
         p: of the recording.
         window_p: (k,) of each window, whatever the flag's size.
         reasons: of the window of median p, the strongest first.
     """
 
     false_alarm: float
+    level: float
     p: float
     window_p: tuple[float, ...]
     reasons: tuple[Reason, ...]
 
     @property
     def refused(self) -> bool:
-        return self.p <= self.false_alarm
+        return self.p <= self.level
 
     @property
     def strange(self) -> NDArray[np.bool_]:
         """(k,) whether a window by itself would be refused."""
-        return np.array(self.window_p) <= self.false_alarm
+        return np.array(self.window_p) <= self.level
 
     @property
     def sentence(self) -> str:
@@ -122,17 +137,20 @@ class Verdict:
     def as_dict(self) -> Mapping[str, Any]:
         """JSON values."""
         return {
-            "refused": self.refused, "p": self.p, "false_alarm": self.false_alarm,
+            "refused": self.refused, "p": self.p, "level": self.level, "false_alarm": self.false_alarm,
             "windows": list(self.window_p), "reasons": [reason.as_dict() for reason in self.reasons],
         }  # fmt: skip
 
 
-def verdict(windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float) -> Verdict:
+def verdict(
+    windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float, level: float | None = None
+) -> Verdict:
     """The verdict on a recording.
 
     Args:
         windows: the reasons of each window, for each size of flag considered.
         false_alarm: between 0 and 1.
+        level: p at or below which a recording is refused; the rate itself by default.
 
     Raises:
         InputError: no window, a rate out of range, or a window about which the gate said nothing.
@@ -146,5 +164,6 @@ def verdict(windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float
     joint = float(p[0]) if len(p) == 1 else min(1.0, 2 * float(np.median(p)))
     middle = told[int(np.argsort(p, kind="stable")[len(p) // 2])]
     return Verdict(
-        false_alarm=false_alarm, p=joint, window_p=tuple(p.tolist()), reasons=tuple(middle),
+        false_alarm=false_alarm, level=false_alarm if level is None else level, p=joint,
+        window_p=tuple(p.tolist()), reasons=tuple(middle),
     )  # fmt: skip

@@ -199,7 +199,9 @@ def measure(
             f"none of {layout.count} windows has all its frames", where=film.name,
             fix="the film's stamps have gaps: choose another part by --start and --end",
         )  # fmt: skip
-    judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm)
+    judged = verdict(
+        [one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level(options.false_alarm)
+    )
     answer = _Answer(model=model, sizes=considered, options=options)
     used = _used(seen, judged, layout)
     draws = answer.joint([seen[k] for k in used], dependence)

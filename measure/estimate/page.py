@@ -69,7 +69,7 @@ def page(
         "clip": pictures.animation(measured.clip, rate=clip_rate),
         "neighbours": [_neighbour(one, context.rate) for one in context.neighbours], "compared": context.compared,
         "corner": pictures.corner(measured) if shown else None,
-        "series": pictures.series(series, false_alarm=measured.options.false_alarm)
+        "series": pictures.series(series, level=measured.verdict.level)
         if shown and len(series.time) > 1 else None,
         "spectra": None if series.spectrum is None or not shown else pictures.spectra(series.spectrum),
         "agreement": [_agreement("over the window", series.window), _agreement("minute mean", series.of_minute)]

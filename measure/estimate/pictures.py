@@ -69,8 +69,8 @@ def _label(measured: Measurement, place: int) -> str:
     return SHORT[quantity.name] + ("" if quantity.unit == "1" else f" [{quantity.unit}]")
 
 
-def series(found: Beside, *, false_alarm: float) -> str:
-    """Wind by window with its intervals, beside the anemometer where there is one."""
+def series(found: Beside, *, level: float) -> str:
+    """Wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.5, 3.0), layout="constrained")
@@ -80,7 +80,7 @@ def series(found: Beside, *, false_alarm: float) -> str:
         axes.plot(found.time, found.minute, color=_BLUE, linewidth=1.6, linestyle=":", label="anemometer, minute mean")
     axes.vlines(found.time, found.low, found.high, color=_RUST, alpha=0.35, linewidth=1.4)
     for strange, label in ((False, "film, with its interval"), (True, "film, window unlike the training data")):
-        own = (found.p <= false_alarm) == strange
+        own = (found.p <= level) == strange
         if own.any():
             face = "none" if strange else _RUST
             axes.plot(found.time[own], found.wind[own], "o", markersize=4, color=_RUST, mfc=face, label=label)

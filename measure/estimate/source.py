@@ -148,11 +148,13 @@ class Network:
         estimator: at work.
         identity: SHA-256 of its card and weights.
         artifact: of the lake; None of a folder or of a model that comes with the package.
+        folder: of its files, where what belongs to it may lie beside them.
     """
 
     estimator: Estimator
     identity: str
     artifact: Artifact | None
+    folder: Path
 
 
 def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
@@ -190,5 +192,5 @@ def _loaded(folder: Path, artifact: Artifact | None) -> Network:
     loaded = estimator.load(folder)
     return Network(
         estimator=loaded, identity=digest(f"{file_hash(folder / CARD)} {file_hash(folder / WEIGHTS)}"),
-        artifact=artifact,
+        artifact=artifact, folder=folder,
     )  # fmt: skip

@@ -12,6 +12,7 @@ VALIDATIONS = {
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
+    "measure-windows": "tests.validation.measure_windows",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",

@@ -32,6 +32,11 @@ def test_one_window_keeps_its_p_value() -> None:
     assert not verdict([[reason(0.06)]], false_alarm=0.05).refused
 
 
+def test_a_gate_of_few_clips_may_ask_for_a_smaller_p() -> None:
+    assert not verdict([[reason(0.04)]], false_alarm=0.05, level=0.03).refused
+    assert verdict([[reason(0.02)]], false_alarm=0.05, level=0.03).refused
+
+
 def test_a_film_that_is_familiar_as_that_of_one_size_is_not_refused() -> None:
     found = verdict([[reason(0.001), reason(0.4)]], false_alarm=0.05)
     assert found.p == 0.4

@@ -32,6 +32,9 @@ class Listed:
         p = next(self._values)
         return [Reason(kind="listed", what=f"p = {p}", p=p)]
 
+    def level(self, false_alarm: float) -> float:
+        return false_alarm
+
 
 def measured(film: Pictures, model: Estimator, **changes: object) -> Measurement:
     options = replace(Options(size=WHOLE), **changes)  # type: ignore[arg-type]
