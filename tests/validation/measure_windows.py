@@ -1,8 +1,8 @@
 """Whether intervals of several windows together hold what they say: on the test side's films, whose truth is known.
 
 The lake is that of FLAGDATA_LAKE, with the data set that the shipped model was trained on. A film of it is two seconds
-long: its first and last 1.2 s are two windows that share up to a third of their frames, as they did when the correlation
-of their errors was measured, on the validation side.
+long: its first and last 1.2 s are two windows that share up to a third of their frames, as they did when the
+correlation of their errors was measured, on the validation side.
 """
 
 from __future__ import annotations
