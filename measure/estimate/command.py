@@ -221,7 +221,13 @@ class _Job:
         if self.lake is not None:
             with _advancing("simulated clips", "clip") as advance:
                 neighbours, compared = nearest(
-                    self.lake, model, measured.summary, at=self.at, seed=self.options.seed, advance=advance
+                    self.lake,
+                    model,
+                    measured.summary,
+                    without=subject.recording,
+                    at=self.at,
+                    seed=self.options.seed,
+                    advance=advance,
                 )
         context = Context(
             provenance=self._provenance(subject, artifact), known=subject.known or {}, neighbours=neighbours,

@@ -1,9 +1,11 @@
 """Whether a recording is one that the model can judge, before any interval is shown.
 
 A gate looks at one window and gives reasons, each with the p-value of a familiar clip being as strange. A recording has
-several windows whose p-values depend on each other, so they are combined in a way that holds whatever the dependence:
-twice the median of valid p-values is a valid p-value (Rüger, Metrika 25, 1978). Where the flag's size is unknown, the
-film is refused only if it is strange as that of a flag of every size considered, which is the p-value of the composite
+several windows whose p-values depend on each other; its own is their median. With normal scores Φ⁻¹(p) that are
+exchangeable and jointly Gaussian, of any correlation from 0 to 1, the median score has at most the variance of one of
+them, so that the median p is below α < ½ at most as often as one p is: as often for windows that are alike, less often
+the less they are. (Whatever the dependence, twice the median would do: Rüger, Metrika 25, 1978.) Where the flag's size
+is unknown, a window counts as that of the size at which it is least strange, which is the p-value of the composite
 hypothesis "of some size".
 """
 
@@ -161,9 +163,8 @@ def verdict(
         raise InputError(f"false-alarm rate {false_alarm:g}", where="--false-alarm", fix="give a share, as in 0.05")
     told = [max(sizes, key=lambda reasons: reasons[0].p) for sizes in windows]
     p = np.array([reasons[0].p for reasons in told])
-    joint = float(p[0]) if len(p) == 1 else min(1.0, 2 * float(np.median(p)))
     middle = told[int(np.argsort(p, kind="stable")[len(p) // 2])]
     return Verdict(
-        false_alarm=false_alarm, level=false_alarm if level is None else level, p=joint,
+        false_alarm=false_alarm, level=false_alarm if level is None else level, p=float(np.median(p)),
         window_p=tuple(p.tolist()), reasons=tuple(middle),
     )  # fmt: skip

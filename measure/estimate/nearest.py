@@ -40,18 +40,20 @@ class Neighbour:
 
 @torch.no_grad()
 def nearest(
-    lake: Lake, model: Estimator, summary: NDArray[np.float32], *, at: str | None, seed: int,
+    lake: Lake, model: Estimator, summary: NDArray[np.float32], *, without: str | None, at: str | None, seed: int,
     advance: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[Neighbour, ...], int]:  # fmt: skip
     """The `SHOWN` nearest of `COMPARED` simulated clips, and how many were compared; none where the lake has none.
 
     Args:
         summary: (dimension,) of the film.
+        without: the recording whose clips are left out, that of the film itself; None for none.
         advance: called after each clip with how many there are and 1.
     """
     count = model.front_end.frames
     where = f"kind = '{Kind.CLIP}' and seed is not null and frame_count >= {count}"
-    rows = lake.rows(where, at=at, columns=["artifact", "name", "object", "frame_first"]).to_pylist()
+    columns = ["artifact", "name", "object", "frame_first", "recording"]
+    rows = [row for row in lake.rows(where, at=at, columns=columns).to_pylist() if row["recording"] != without]
     chosen = stream(seed, "nearest").permutation(len(rows))[:COMPARED].tolist()
     whitening = np.eye(len(summary)) if model.cloud is None else model.cloud.whitening
     found: list[Neighbour] = []

@@ -61,6 +61,11 @@ class Subject:
     record: Record | None = None
 
     @property
+    def recording(self) -> str | None:
+        """Id of the recording that the film is, or is a part of; None of a plain file."""
+        return None if self.artifact is None else self.artifact.recording or self.artifact.id
+
+    @property
     def known(self) -> Mapping[str, float] | None:
         """What a simulated record states of itself."""
         return None if self.record is None else self.record.truth

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from flagdata.cli import main
@@ -23,6 +24,8 @@ from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.estimate.artifact import read
+from measure.estimate.nearest import nearest
+from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
 
 START = 1_700_000_000 * NANOSECONDS
@@ -175,6 +178,22 @@ def _as_model(folder: Path, lake: Path) -> Path:
     for entry in folder.iterdir():
         (target / entry.name).write_bytes(entry.read_bytes())
     return target
+
+
+def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, model: Estimator) -> None:
+    opened = Lake.open(lake)
+    first, other = opened.rows("kind = 'recording'").to_pylist()
+    record_ = Record.open(opened.object_path(first["object"]))
+    with torch.no_grad():
+        summary = model.embeddings(model.inputs(record_.frames(0, FRAMES)[None]))[0][0].numpy()
+    found, compared = nearest(opened, model, summary, without=None, at=None, seed=0)
+    assert found[0].distance == pytest.approx(0, abs=1e-4)
+    assert found[0].distance <= found[1].distance <= found[2].distance
+    rest, fewer = nearest(opened, model, summary, without=first["artifact"], at=None, seed=0)
+    assert (compared, fewer) == (6, 3)
+    clips = opened.rows(f"kind = 'clip' and recording = '{other['artifact']}'")["artifact"].to_pylist()
+    assert {one.artifact for one in rest} == set(clips)
+    assert rest[0].known["density"] == 0.12
 
 
 def test_reading_only_adds_nothing_to_the_lake(lake: Path, model_folder: Path) -> None:

@@ -16,12 +16,13 @@ def reason(p: float) -> list[Reason]:
     return [Reason(kind="unlike-training", what=f"p = {p:.3f}", p=p)]
 
 
+@pytest.mark.parametrize("windows", [2, 7])
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 1.0])
-def test_familiar_recordings_are_refused_at_most_at_the_stated_rate(correlation: float) -> None:
+def test_familiar_recordings_are_refused_at_most_at_the_stated_rate(correlation: float, windows: int) -> None:
     rng = stream(1, "gate")
     refused = 0
     for _ in range(2000):
-        score = np.sqrt(correlation) * rng.normal() + np.sqrt(1 - correlation) * rng.normal(size=7)
+        score = np.sqrt(correlation) * rng.normal() + np.sqrt(1 - correlation) * rng.normal(size=windows)
         refused += verdict([[reason(float(p))] for p in ndtr(score)], false_alarm=0.1).refused
     assert refused / 2000 <= 0.1 + 0.015  # two binomial standard errors
 
