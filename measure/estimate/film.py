@@ -101,13 +101,15 @@ class CameraFilm:
 
     def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
         with open_camera(self.path, self._options) as stream:
-            for frame in stream:
-                time = frame.time / NANOSECONDS
-                if time > last:
-                    break
-                if time >= first:
-                    yield time, frame.image
-            self._findings = stream.findings
+            try:
+                for frame in stream:
+                    time = frame.time / NANOSECONDS
+                    if time > last:
+                        break
+                    if time >= first:
+                        yield time, frame.image
+            finally:
+                self._findings = stream.findings
 
     def findings(self) -> tuple[Finding, ...]:
         return self._findings
@@ -157,8 +159,8 @@ class RecordFilm:
         return int(self.times[0])
 
     def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
-        low, high = np.searchsorted(self._seconds, [first, last], side="left").tolist()
-        high = min(high + 1, len(self._seconds)) if high < len(self._seconds) and self._seconds[high] <= last else high
+        low = int(np.searchsorted(self._seconds, first, side="left"))
+        high = int(np.searchsorted(self._seconds, last, side="right"))
         for begin in range(low, high, _AT_ONCE):
             some = min(_AT_ONCE, high - begin)
             pictures = self.record.frames(self._first + begin, some)
