@@ -58,7 +58,8 @@ class Quantity:
             level: of the interval.
             first: whether the level is stated.
         """
-        digits = _DIGITS[self.name]
+        light = self.name == "density" and self.assumed[1] < 0.1  # of a small flag
+        digits = _DIGITS[self.name] + light
         short = SHORT[self.name]
         unit = "" if self.unit == "1" else f" {self.unit}"
         if not self.told:

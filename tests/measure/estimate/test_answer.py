@@ -31,6 +31,14 @@ def test_what_the_film_did_not_tell_is_said_so() -> None:
     assert sentence([UNTOLD], level=0.9).startswith("area weight: not told")
 
 
+def test_the_weight_of_a_small_flag_is_told_to_a_gram() -> None:
+    small = Quantity(
+        name="density", unit="kg/m²", value=0.0325, sigma=0.003, low=0.028, high=0.038, assumed=(0.025, 0.0425),
+        information=0.4,
+    )  # fmt: skip
+    assert small.phrase(level=0.9, first=False) == "area weight 0.033 kg/m² [0.028, 0.038]"
+
+
 def test_information_is_the_divergence_of_gaussians() -> None:
     rng = stream(1, "information")
     prior = rng.normal(0, 2, 200_000)
