@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from measure.estimate.series import beside
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even, pictures
 from tests.measure.estimate.test_measuring import measured
+from tests.measure.estimate.test_series import START, gusts, log, saying
 
 PLAIN = Context(provenance={"film": "<flag>.mkv"}, known={}, neighbours=(), compared=0, rate=25.0)
 
@@ -73,3 +75,16 @@ def test_simulated_neighbours_are_shown_in_motion_with_what_they_were_made_with(
     assert "nearest of 7 simulated clips" in " ".join(text.split())
     assert "<td>6.00</td>" in text
     assert np.all(neighbour.frames == pictures(FRAMES, seed=9))
+
+
+def test_a_long_film_beside_an_anemometer_shows_errors_spectra_and_delay(model: Estimator) -> None:
+    times = np.arange(-70, 160, 0.5)
+    wind = gusts(len(times))
+    seen = np.interp(np.arange(140) + 0.22, times, wind)
+    found = saying(model, np.maximum(seen + 0.5, 0), step=1.0)
+    found = replace(found, verdict=replace(found.verdict, p=0.5))
+    text = page(found, beside(found, start=START, wind=log(times, wind)), PLAIN, anyway=False)
+    assert "bias +0.5" in text
+    assert "n = 140 windows" in text
+    assert "Spectra and coherence" in text
+    assert re.search(r"Clocks: (no delay|[+-]\d)", text)
