@@ -169,14 +169,15 @@ class _Job:
         """Measure one film; commit and write what is to be shown."""
         from measure.estimate.artifact import keep, write
         from measure.estimate.dependence import of_model
-        from measure.estimate.gate import gate_of
         from measure.estimate.measuring import measure as measured_of
         from measure.estimate.series import beside
+        from measure.estimate.source import gate_beside
 
         estimator = self.network.estimator
+        gate = gate_beside(self.network, false_alarm=self.options.false_alarm)
         with _advancing("measure", "window") as advance:
             measured = measured_of(
-                subject.film, estimator, gate=gate_of(estimator), dependence=of_model(estimator), options=self.options,
+                subject.film, estimator, gate=gate, dependence=of_model(estimator), options=self.options,
                 advance=advance,
             )  # fmt: skip
         wind = None if subject.record is None else subject.record.wind()

@@ -14,7 +14,10 @@ from flagdata.lake import Artifact, Lake
 from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
+from measure.estimate.checked import CheckedGate
 from measure.estimate.film import CameraFilm, Film, RecordFilm
+from measure.estimate.gate import Gate, gate_of
+from measure.gate import storage
 from models import estimator
 from models.estimator import Estimator
 from models.storage import CARD, WEIGHTS
@@ -143,6 +146,19 @@ def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
         first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
     )  # fmt: skip
     return Subject(film=film, artifact=artifact, record=film.record)
+
+
+def gate_beside(found: Network, *, false_alarm: float) -> Gate:
+    """The gate of a network: the calibrated one where it lies in the model's folder, else the distance of summaries.
+
+    Raises:
+        CorruptError: the calibrated one is damaged, or another network's.
+        InputError: the model has neither.
+    """
+    if not (found.folder / storage.GATE).is_file():
+        return gate_of(found.estimator)
+    calibrated = storage.read(found.folder, found.estimator)
+    return CheckedGate(model=found.estimator, calibrated=calibrated, false_alarm=false_alarm)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
