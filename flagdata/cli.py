@@ -22,6 +22,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "build": ("sim.datasets.command:build", "Build a data set: sequences, their films, ground truth and a card."),
     "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
     "evaluate": ("models.evaluation.command:evaluate", "Judge trained networks on clips they never saw, in one table."),
+    "measure": ("measure.estimate.command:measure", "Measure wind and cloth from a film, with intervals, or refuse."),
     "close-loop": ("measure.loop.command:close_loop", "Find what the model of a cloth lacks, and add it."),
     "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
     "ls": ("flagdata.commands.lake:ls", "List artifacts."),

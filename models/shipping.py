@@ -7,6 +7,7 @@ are stored as float16, which moves an estimate by a hundredth of its standard de
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -80,8 +81,7 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     loaded = [load(member) for member in members]
     first = loaded[0]
     for other in loaded[1:]:
-        same = {**_recipe(first), "seed": None} == {**_recipe(other), "seed": None}
-        if not same or first.card["data"] != other.card["data"]:
+        if _seedless(_recipe(first)) != _seedless(_recipe(other)) or first.card["data"] != other.card["data"]:
             raise UsageError(
                 f"{other.card['name']} was trained otherwise than {first.card['name']}", where=str(members),
                 fix="ship seeds of one recipe, trained on the same data",
@@ -113,6 +113,11 @@ def _recipe(estimator: Estimator) -> dict[str, Any]:
     return dict(recipe) if isinstance(recipe, dict) else {}
 
 
+def _seedless(recipe: dict[str, Any]) -> dict[str, Any]:
+    """A recipe as JSON, without its seed."""
+    return {**json.loads(json.dumps(recipe)), "seed": None}
+
+
 @click.command()
 @click.argument("name")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
@@ -121,7 +126,7 @@ def _recipe(estimator: Estimator) -> dict[str, Any]:
 @click.option("--cache", type=click.Path(path_type=Path), help="Of prepared inputs; by default LAKE.inputs.")
 @click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Path) -> None:
-    """Make the model NAME, which comes with the package, of all seeds of the network NAME in a lake."""
+    """Make the model NAME, which comes with the package, of all seeds that its recipe was trained with in a lake."""
     import flagdata
     from models.training.command import sides_of
     from models.training.inputs import prepare_clips, prepare_films
@@ -130,9 +135,14 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
     recipe = recipe_of(name)
     source = flagdata.open(lake_path)
     rows = source.lake.rows(f"kind = 'network' and name = '{name}'", columns=["object", "recipe"]).to_pylist()
-    members = [source.lake.object_path(row["object"]) for row in rows if '"sequences":null' in row["recipe"]]
+    wanted = _seedless(recipe.identity())
+    members = [
+        source.lake.object_path(row["object"])
+        for row in rows
+        if _seedless(json.loads(row["recipe"])["recipe"]) == wanted
+    ]
     if not members:
-        raise UsageError(f"no network {name!r} was trained on all sequences", where=str(lake_path), fix="train it")
+        raise UsageError(f"no network {name!r} was trained by its recipe", where=str(lake_path), fix="train it")
     folder = cache if cache is not None else Path(f"{str(lake_path).rstrip('/')}.inputs")
     workers = os.cpu_count() or 1
     train, validation = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))

@@ -6,97 +6,73 @@ estimate looks like, with its interval and its doubt, not how good it is.
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
+from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from flagdata.dataset.pairs import Pairs
-from flagdata.timebase import NANOSECONDS
-from measure.pages.render import data_url
+from flagdata.lake import Artifact
+from measure.estimate import pictures
+from measure.estimate.dependence import of_model
+from measure.estimate.film import RecordFilm
+from measure.estimate.gate import gate_of
+from measure.estimate.measuring import Measurement, Options, measure
+from measure.estimate.series import Beside, beside
+from measure.estimate.similarity import FlagSize
 from models import estimator
 
-EVERY = 5
-"""One clip in so many is estimated: one in six seconds."""
-FALSE_ALARM = 0.05
-LEVEL = 0.9
+STEP = 6.0
+"""From one window to the next [s]."""
+SIZE = FlagSize(length=1.5, height=1.0)
+"""Of the flag that was drawn, as if it were one that the model knows."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Series:
-    """Estimates of some clips of a recording.
+    """Some windows of a recording, measured.
 
     Attributes:
-        time: (n,) of the clips' ends, from the first clip's start [s].
-        wind, low, high: (n,) mean and interval of `LEVEL` [m/s].
-        logged: (n,) the clips' ground truth, the anemometer's mean over a minute [m/s].
-        unlike: (n,) whether the clip is unlike all that the model was trained on, at `FALSE_ALARM`.
-        model: its name.
+        measured: by the shipped model.
+        beside: the anemometer's wind.
     """
 
-    time: NDArray[np.float64]
-    wind: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    logged: NDArray[np.float64]
-    unlike: NDArray[np.bool_]
-    model: str
+    measured: Measurement
+    beside: Beside
 
     @property
     def sentence(self) -> str:
         """What is to be thought of it, in words."""
-        share, count = float(self.unlike.mean()), len(self.unlike)
-        rmse = float(np.sqrt(np.mean((self.wind - self.logged) ** 2)))
-        unlike = f"{share:.0%} of the {count} clips are unlike what the model was trained on"
-        if share > 2 * FALSE_ALARM:
-            doubt = f"{unlike}, as a drawn flag should be; their estimates, shown hollow, are not to be relied on."
-        else:
-            doubt = f"{unlike} (expected of clips like those: {FALSE_ALARM:.0%})."
-        return (
-            f"The model {self.model!r}, trained on simulated flags, differs from the anemometer's minute means by "
-            f"{rmse:.1f} m/s (root mean square). {doubt}"
-        )
+        verdict = self.measured.verdict
+        strange, count = int(verdict.strange.sum()), len(self.measured.windows)
+        compared = self.beside.of_minute
+        known = f"The model {self.measured.model!r} was trained on simulated flags."
+        if compared is not None:
+            known += f" It differs from the anemometer's minute means by {compared.rmse:.1f} m/s (root mean square)."
+        unlike = f"{strange} of {count} windows are unlike what the model was trained on"
+        if verdict.refused:
+            return (
+                f"{known} {unlike}, as a drawn flag should be: `flagdata measure` refuses the film, and what is shown "
+                "hollow is not to be relied on."
+            )
+        return f"{known} {unlike} (expected of familiar films: {verdict.false_alarm:.0%})."
 
 
-def read(pairs: Pairs) -> Series:
-    """Estimates of one clip in `EVERY` by the shipped model.
+def read(path: Path, recording: Artifact) -> Series:
+    """Windows of a recording by the shipped model.
+
+    Args:
+        path: of the recording's object.
 
     Raises:
         NotFoundError: no model came with the package.
-        InputError: clips of another length than the model takes.
+        InputError: a film that is too short or too slow.
     """
     model = estimator.shipped()
-    chosen = range(0, len(pairs), EVERY)
-    order = sorted(chosen, key=lambda index: int(pairs.table.end[index]))
-    clips = np.stack([pairs[index].clip[0].numpy() for index in order])
-    found = model.estimate(model.inputs(clips))
-    low, high = found.interval(LEVEL)
-    wind = [target.name for target in found.targets].index("wind_speed")
-    end = pairs.table.end[order]
-    unlike = found.unlike
-    return Series(
-        time=(end - pairs.table.start[order].min()) / NANOSECONDS, wind=found.mean[:, wind], low=low[:, wind],
-        high=high[:, wind], logged=pairs.table.wind[order],
-        unlike=np.zeros(len(order), dtype=np.bool_) if unlike is None else unlike <= FALSE_ALARM, model=model.name,
-    )  # fmt: skip
+    film = RecordFilm(path, name=recording.name)
+    measured = measure(
+        film, model, gate=gate_of(model), dependence=of_model(model), options=Options(size=SIZE, step=STEP)
+    )
+    return Series(measured=measured, beside=beside(measured, start=film.start, wind=film.record.wind()))
 
 
 def picture(series: Series) -> str:
     """The series as a PNG in a data URL."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.5, 3.0), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(series.time, series.logged, color="#2b6f8f", linewidth=1.4, label="anemometer, minute mean")
-    axes.vlines(series.time, series.low, series.high, color="#c4622d", alpha=0.35, linewidth=1.2)
-    for hollow, label in ((False, "model, 90 % interval"), (True, "model, clip unlike its training data")):
-        own = series.unlike == hollow
-        if own.any():
-            face = "none" if hollow else "#c4622d"
-            axes.plot(series.time[own], series.wind[own], "o", markersize=4, color="#c4622d", mfc=face, label=label)
-    axes.set(xlabel="time since the first clip [s]", ylabel="wind speed [m/s]", ylim=(0, None))
-    axes.legend(loc="lower right", fontsize=8, ncols=3)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=130)
-    return data_url(buffer.getvalue(), "image/png")
+    return pictures.series(series.beside, level=series.measured.verdict.level)

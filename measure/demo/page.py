@@ -58,7 +58,7 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
     shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
     wind_image, caption = _wind_plot(record, lake, at, made)
-    series = estimates.read(pairs)
+    series = estimates.read(record.path, lake.artifact(row["artifact"], at=at))
     target = folder / "index.html"
     values = {
         "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",

@@ -18,7 +18,7 @@ from tests.models.conftest import fill
 
 OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
 """Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the inference."""
-AFTER_START = ("alignment.md", "versions-and-recovery.md", "exports.md")
+AFTER_START = ("alignment.md", "measure.md", "versions-and-recovery.md", "exports.md")
 ALONE = ("sensors.md", "simulator.md", "models.md")
 RECIPE = FieldRecipe(seed=2026, duration=150, frame_rate=25)
 

@@ -14,6 +14,7 @@ VALIDATIONS = {
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
     "gate": "tests.validation.gate",
+    "measure-windows": "tests.validation.measure_windows",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",

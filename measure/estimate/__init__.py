@@ -1,0 +1,1 @@
+"""Wind and cloth of one recording, with intervals, or the reason why not: what `flagdata measure` does."""

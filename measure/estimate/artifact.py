@@ -1,0 +1,126 @@
+"""A measurement in the lake: what was said, of which film, by which network.
+
+Its identity is a hash of what went in: the film's artifact or content, the network, the options and the seed. Its
+object is a Zarr folder with the posterior's draws, the windows' series and the whole answer as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.errors import CorruptError
+from flagdata.findings import quality_flags
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical
+from flagdata.schema import Kind
+from flagdata.timebase import NANOSECONDS
+from measure.estimate.measuring import Measurement
+from measure.estimate.series import WIND, Beside
+from measure.estimate.source import Network, Reading, Subject
+
+_FORMAT = 1
+_HEAD = "flagdata_estimate"
+REFUSED = "refused-by-gate"
+"""Quality flag of what was kept although the gate refused it."""
+
+
+def artifact(
+    measured: Measurement, subject: Subject, network: Network, reading: Reading, *, stored: str | None = None
+) -> Artifact:
+    """The row of a measurement."""
+    parents = [] if subject.artifact is None else [subject.artifact.id]
+    parents += [] if network.artifact is None else [network.artifact.id]
+    start = subject.film.start
+    wind = next((q for q in measured.quantities if q.name == WIND and q.told), None)
+    flags = quality_flags(measured.findings)
+    return Artifact(
+        kind=Kind.MEASUREMENT, name=measured.film, object=stored, parents=parents, seed=measured.options.seed,
+        source_hash=subject.content_hash(), source_name=None if subject.path is None else subject.path.name,
+        recipe={
+            "measure": _FORMAT, "network": network.identity, **measured.options.recipe(), **reading.recipe(),
+        },
+        start=start, end=None if start is None else start + round(measured.duration * NANOSECONDS),
+        wind=None if wind is None else wind.value, wind_sigma=None if wind is None else wind.sigma,
+        parameters=canonical({q.name: q.value for q in measured.quantities if q.told}),
+        quality=sorted({*flags, REFUSED}) if measured.verdict.refused else flags,
+        report=canonical(report(measured)),
+    )  # fmt: skip
+
+
+def report(measured: Measurement) -> Mapping[str, Any]:
+    """What the row says of it: JSON values."""
+    return {
+        "schema": "flagdata.measure-report/1", "sentence": measured.sentence, "model": measured.model,
+        "quantities": {q.name: q.as_dict() for q in measured.quantities}, "gate": measured.verdict.as_dict(),
+        "combined": measured.combined, "findings": [finding.as_dict() for finding in measured.findings],
+    }  # fmt: skip
+
+
+def keep(
+    lake: Lake, measured: Measurement, subject: Subject, network: Network, reading: Reading, series: Beside, *,
+    branch: str,
+) -> tuple[str, bool]:  # fmt: skip
+    """Commit a measurement; the same one again adds nothing. Returns its id and whether it was there already.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    wanted = artifact(measured, subject, network, reading)
+    with lake.transaction(f"measure {measured.film}", branch=branch) as transaction:
+        if transaction.find(wanted.id) is not None:
+            return wanted.id, True
+        staged = transaction.staging(".zarr")
+        write(staged, measured, series)
+        transaction.add(artifact(measured, subject, network, reading, stored=transaction.put(staged)))
+    return wanted.id, False
+
+
+def write(path: Path, measured: Measurement, series: Beside) -> None:
+    """A new Zarr folder: `draws` (draw, target) and the columns of the wind series, each over `time`.
+
+    Dimensions are named, so that xarray opens it as a data set.
+    """
+    import zarr
+    from zarr.codecs import BloscCodec
+
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    group.update_attributes({
+        _HEAD: {"format": _FORMAT}, "targets": list(measured.names), "answer": dict(measured.as_dict(anyway=True)),
+        "series": series.as_dict(),
+    })  # fmt: skip
+    arrays = {"draws": (measured.draws.astype(np.float32), ("draw", "target"))}
+    arrays |= {name: (values.astype(np.float32), ("time",)) for name, values in series.columns().items()}
+    arrays["time"] = (series.time.astype(np.float64), ("time",))  # type: ignore[assignment]
+    for name, (values, dimensions) in arrays.items():
+        array = group.create_array(
+            name, shape=values.shape, dtype=values.dtype, chunks=tuple(max(1, n) for n in values.shape),
+            dimension_names=dimensions,
+            compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
+        )  # fmt: skip
+        array[...] = values
+
+
+def read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """The answer of a measurement's object as JSON values, and its arrays.
+
+    Raises:
+        CorruptError: not such a folder, or damaged.
+    """
+    import zarr
+
+    try:
+        group = zarr.open_group(path, mode="r", zarr_format=3)
+        head: Any = group.attrs.get(_HEAD)
+        if not isinstance(head, Mapping) or head["format"] != _FORMAT:
+            raise CorruptError("not a measurement of this version", where=str(path), fix="open it with zarr")
+        answer: Any = json.loads(json.dumps(group.attrs["answer"]))
+        return answer, {name: np.asarray(array[...]) for name, array in group.arrays()}
+    except (KeyError, ValueError, TypeError, OSError) as error:
+        raise CorruptError(
+            f"the measurement is damaged: {error}", where=str(path), fix="run flagdata verify; measure again"
+        ) from error

@@ -1,0 +1,42 @@
+"""The gate of `measure.gate`, all of its checks together, as the measuring asks it: window by window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.estimate.gate import Reason
+from measure.gate.gate import Gate as Calibrated
+from measure.gate.judgement import CONFIDENCE, judge
+from measure.gate.tails import level
+from models.estimator import Estimator
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckedGate:
+    """A gate that was calibrated for a model.
+
+    Attributes:
+        model: whose training windows are compared with.
+        calibrated: its checks, by clips that the model was not trained on.
+        false_alarm: rate at which reasons are given.
+    """
+
+    model: Estimator
+    calibrated: Calibrated
+    false_alarm: float
+
+    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+        found = judge(frames, self.model, self.calibrated, false_alarm=self.false_alarm)
+        if not found.reasons:
+            return [Reason(kind="familiar", what=f"nothing stands out, p = {found.p:.3f} over all checks", p=found.p)]
+        # The first speaks for all checks together.
+        return [
+            Reason(kind=told.kind, what=told.sentence, p=told.p if place else found.p, fix=told.fix)
+            for place, told in enumerate(found.reasons)
+        ]
+
+    def level(self, false_alarm: float) -> float:
+        return level(len(self.calibrated.calibration), false_alarm, CONFIDENCE)

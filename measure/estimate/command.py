@@ -1,0 +1,303 @@
+"""`flagdata measure`: wind and cloth of a film, with intervals, or the reason why not."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.commands.durations import DURATION
+from flagdata.console import document, json_option, progress, say
+from flagdata.errors import ConflictError, RefusedError, UsageError
+
+if TYPE_CHECKING:
+    from flagdata.lake import Lake
+    from measure.estimate.measuring import Measurement, Options
+    from measure.estimate.series import Beside
+    from measure.estimate.source import Network, Reading, Subject
+
+
+@click.command()
+@click.argument("source", required=False, metavar="[SOURCE]")
+@click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
+@click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0.")
+@click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
+              help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
+@click.option("--crop", metavar="X,Y,W,H", help="Region of the flag [px]; by default the largest centred square.")
+@click.option("--start", "first", type=DURATION, metavar="TIME", help="Where to begin in the film, as in 12s.")
+@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end.")
+@click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran.")
+@click.option("--sequence-fps", type=float, metavar="HZ", help="Rate of a folder of images.")
+@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
+              help="Of the intervals.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of all draws.")
+@click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default the shipped one.")
+@click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
+              show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
+@click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses.")
+@click.option(
+    "--report", type=click.Path(path_type=Path), metavar="FILE.html", help="Write a page that needs no other."
+)
+@click.option("--zarr", "zarr_path", type=click.Path(path_type=Path), metavar="FOLDER",
+              help="Write draws and series as a Zarr data set.")  # fmt: skip
+@click.option("--csv", "as_csv", is_flag=True, help="The windows as comma-separated values on stdout.")
+@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+              help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
+)
+@click.option("--branch", default="main", show_default=True, help="Of the lake, to commit on.")
+@click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
+@json_option
+def measure(
+    source: str | None,
+    query: str | None,
+    flag_size: str | None,
+    step: float | None,
+    crop: str | None,
+    first: float | None,
+    last: float | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
+    level: float,
+    seed: int,
+    model: str | None,
+    false_alarm: float,
+    anyway: bool,
+    report: Path | None,
+    zarr_path: Path | None,
+    as_csv: bool,
+    lake_path: Path | None,
+    at: str | None,
+    branch: str,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Measure wind and area weight from a film of a flag, with intervals.
+
+    SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. A gate looks
+    first: a film unlike those the model was trained on is refused with the reason, exit code 3, and nothing estimated
+    is shown. With --lake the measurement becomes an artifact; the same one again adds nothing.
+
+    \b
+      flagdata measure clip.mp4 --flag-size 1.5x1.0 --report clip.html
+      flagdata measure recording-7 --lake lake --windows 1.2s --csv
+      flagdata measure --lake lake --query "wind between 3 and 6" --json
+    """
+    if as_json and as_csv:
+        raise UsageError("more than one form of output", fix="choose one of --json and --csv")
+    for path in (report, zarr_path):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise UsageError("no such folder", where=str(path.parent), fix="create it first")
+    if zarr_path is not None and zarr_path.exists():
+        raise ConflictError(f"{zarr_path} exists", fix="choose another name or remove it")
+    from flagdata.ingest.camera import CropBox, parse_crop
+    from flagdata.lake import Lake
+    from measure.estimate.measuring import Options
+    from measure.estimate.similarity import parse_size
+    from measure.estimate.source import Reading, network, subjects
+
+    box = None if crop is None else parse_crop(crop)
+    if not (box is None or isinstance(box, CropBox)):
+        raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+    reading = Reading(crop=box, true_fps=true_fps, sequence_fps=sequence_fps)
+    options = Options(
+        size=None if flag_size is None else parse_size(flag_size), step=step, first=first, last=last, level=level,
+        false_alarm=false_alarm, seed=seed,
+    )  # fmt: skip
+    lake = None if lake_path is None else Lake.open(lake_path)
+    seen = at if at is not None else branch
+    found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
+    job = _Job(
+        options=options, reading=reading, network=network(model, lake=lake, at=seen), lake=lake, at=seen, branch=branch,
+        commit=not read_only, anyway=anyway, report=report, zarr=zarr_path,
+    )  # fmt: skip
+    if query is not None:
+        if report is not None or zarr_path is not None or as_csv:
+            raise UsageError("a page, a Zarr or a CSV is of one film", fix="measure one clip by its id, or use --json")
+        _several(job, found, as_json=as_json)
+        return
+    done = job.do(found[0])
+    job.refuse(done)
+    if as_json:
+        document("measure", done.as_dict(anyway=anyway))
+    elif as_csv:
+        csv.writer(sys.stdout, lineterminator="\n").writerows(done.series.rows())
+    else:
+        _tell(done, series=step is not None)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Done:
+    measured: Measurement
+    series: Beside
+    artifact: str | None
+    subject: Subject
+
+    def as_dict(self, *, anyway: bool) -> dict[str, Any]:
+        shown = anyway or not self.measured.verdict.refused
+        known = self.subject.known or {}
+        return {
+            **self.measured.as_dict(anyway=anyway), "series": self.series.as_dict() if shown else None,
+            "source": None if self.subject.artifact is None else self.subject.artifact.id, "artifact": self.artifact,
+            "simulated_with": {name: known[name] for name in self.measured.names if name in known} or None,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Job:
+    """How all films of one command are measured, and where what is found goes."""
+
+    options: Options
+    reading: Reading
+    network: Network
+    lake: Lake | None
+    at: str | None
+    branch: str
+    commit: bool
+    anyway: bool
+    report: Path | None
+    zarr: Path | None
+
+    def do(self, subject: Subject) -> _Done:
+        """Measure one film; commit and write what is to be shown."""
+        from measure.estimate.artifact import keep, write
+        from measure.estimate.dependence import of_model
+        from measure.estimate.measuring import measure as measured_of
+        from measure.estimate.series import beside
+        from measure.estimate.source import gate_beside
+
+        estimator = self.network.estimator
+        gate = gate_beside(self.network, false_alarm=self.options.false_alarm)
+        with _advancing("measure", "window") as advance:
+            measured = measured_of(
+                subject.film, estimator, gate=gate, dependence=of_model(estimator), options=self.options,
+                advance=advance,
+            )  # fmt: skip
+        wind = None if subject.record is None else subject.record.wind()
+        series = beside(measured, start=subject.film.start, wind=wind)
+        for finding in measured.findings:
+            if finding.severity != "note":
+                say(f"{finding.severity.value}: {finding.what}")
+        shown = self.anyway or not measured.verdict.refused
+        artifact = None
+        if self.lake is not None and self.commit and shown:
+            artifact, existing = keep(
+                self.lake, measured, subject, self.network, self.reading, series, branch=self.branch
+            )
+            say(f"{artifact[:12]}  measurement, {'there already' if existing else 'committed'}")
+        if self.zarr is not None and shown:
+            write(self.zarr, measured, series)
+        if self.report is not None:
+            self._write_page(self.report, measured, series, subject, artifact)
+        return _Done(measured=measured, series=series, artifact=artifact, subject=subject)
+
+    def refuse(self, done: _Done) -> None:
+        """Raises:
+        RefusedError: the gate refused the film, and it is not to be shown anyway.
+        """
+        verdict = done.measured.verdict
+        if verdict.refused and not self.anyway:
+            where = done.measured.film + (f", see {self.report}" if self.report is not None else "")
+            raise RefusedError(
+                verdict.sentence, where=where,
+                fix=verdict.reasons[0].fix,
+            )  # fmt: skip
+
+    def _write_page(
+        self, path: Path, measured: Measurement, series: Beside, subject: Subject, artifact: str | None
+    ) -> None:
+        from flagdata.lake.durable import disk_errors
+        from measure.estimate.nearest import nearest
+        from measure.estimate.page import Context, page
+
+        model = self.network.estimator
+        neighbours, compared = (), 0
+        if self.lake is not None:
+            with _advancing("simulated clips", "clip") as advance:
+                neighbours, compared = nearest(
+                    self.lake,
+                    model,
+                    measured.summary,
+                    without=subject.recording,
+                    at=self.at,
+                    seed=self.options.seed,
+                    advance=advance,
+                )
+        context = Context(
+            provenance=self._provenance(subject, artifact), known=subject.known or {}, neighbours=neighbours,
+            compared=compared, rate=model.front_end.rate,
+        )  # fmt: skip
+        text = page(measured, series, context, anyway=self.anyway)
+        with disk_errors("writing the report", path):
+            path.write_text(text, encoding="utf-8")
+        say(f"report: {path}")
+
+    def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:
+        film = subject.film
+        source = subject.content_hash() if subject.artifact is None else subject.artifact.id
+        rows = {
+            "film": f"{film.name}, {film.duration:.2f} s at {film.rate:.4g} frames a second",
+            "source": f"SHA-256 {source}" if subject.artifact is None else f"{subject.artifact.kind} {source}",
+            "network": f"{self.network.estimator.name}, SHA-256 {self.network.identity}",
+            "options": ", ".join(f"{k} {v}" for k, v in _given(self.options, self.reading).items()),
+            "seed": str(self.options.seed),
+        }
+        return rows if artifact is None else {**rows, "artifact": artifact}
+
+
+def _given(options: Options, reading: Reading) -> Mapping[str, Any]:
+    return {k: v for k, v in {**options.recipe(), **reading.recipe()}.items() if v is not None}
+
+
+def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
+    done = [job.do(subject) for subject in found]
+    told = [one for one in done if job.anyway or not one.measured.verdict.refused]
+    if as_json:
+        document("measurements", {"measurements": [one.as_dict(anyway=job.anyway) for one in done]})
+    else:
+        for one in done:
+            source = one.subject.artifact.id[:12] if one.subject.artifact is not None else one.measured.film
+            answer = one.measured.sentence if one in told else f"refused: {one.measured.verdict.sentence}"
+            click.echo(f"{source}  {answer}")
+    if not told:
+        raise RefusedError(
+            f"all {len(done)} clips are unlike what the model was trained on", where="--query",
+            fix="look at one with --report, or at all with --anyway",
+        )  # fmt: skip
+
+
+def _tell(done: _Done, *, series: bool) -> None:
+    measured = done.measured
+    mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
+    click.echo(mark + measured.sentence)
+    say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.windows)} windows")
+    if not series:
+        return
+    wind = [window.quantity("wind_speed") for window in measured.windows]
+    for window, quantity in zip(measured.windows, wind, strict=True):
+        click.echo(f"{window.start:9.2f} s  {quantity.value:6.2f} m/s [{quantity.low:.2f}, {quantity.high:.2f}]")
+    for title, agreement in (("window", done.series.window), ("minute", done.series.of_minute)):
+        if agreement is not None:
+            say(f"  against the anemometer's {title} means: bias {agreement.bias:+.2f} m/s, RMSE {agreement.rmse:.2f} "
+                f"[{agreement.interval[0]:.2f}, {agreement.interval[1]:.2f}] 90 %, n = {agreement.count}")  # fmt: skip
+
+
+@contextmanager
+def _advancing(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar whose length is told with its first step."""
+    with ExitStack() as stack:
+        steps: list[Callable[[int], None]] = []
+
+        def advance(total: int, count: int) -> None:
+            if not steps:
+                steps.append(stack.enter_context(progress(total, label=label, unit=unit)))
+            steps[0](count)
+
+        yield advance

@@ -1,0 +1,190 @@
+"""A film to measure: frames at their instants, from a video file, a folder of images, or a record of a lake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding
+from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, probe
+from flagdata.ingest.camera.options import Crop
+from flagdata.record import Record
+from flagdata.schema import FRAME_SIZE
+from flagdata.timebase import NANOSECONDS
+
+_AT_ONCE = 64  # frames read from a record together
+_NO_START = 0  # a file's own clock begins with its first frame
+
+
+class Film(Protocol):
+    """Frames on one clock, read any number of times."""
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        ...
+
+    @property
+    def rate(self) -> float:
+        """Frames a second: the median, where it varies [Hz]."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """From the first frame to the last [s]."""
+        ...
+
+    @property
+    def start(self) -> int | None:
+        """Instant of the first frame [UTC ns]; None where nobody said."""
+        ...
+
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+        """(time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
+        ...
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What was noticed; complete when its frames were read."""
+        ...
+
+
+class CameraFilm:
+    """A video file or a folder of images.
+
+    Args:
+        path: of it.
+        crop: the region of the flag, a box of the upright picture in pixels; it is widened to a square. None is the
+            largest centred square.
+        true_fps: rate at which a high-speed camera really ran [Hz].
+        sequence_fps: rate of images without stamps [Hz].
+
+    Raises:
+        FlagdataError: see `flagdata.ingest.camera.open_camera`.
+    """
+
+    def __init__(
+        self, path: Path, *, crop: CropBox | None = None, true_fps: float | None = None,
+        sequence_fps: float | None = None,
+    ) -> None:  # fmt: skip
+        self.path = path
+        options = CameraOptions(start=_NO_START, rate="native", true_fps=true_fps, sequence_fps=sequence_fps)
+        facts = probe(path, options)
+        chosen: Crop = "square" if crop is None else squared(crop, width=facts.width, height=facts.height)
+        self._options = CameraOptions(
+            start=_NO_START, rate="native", true_fps=true_fps, sequence_fps=sequence_fps, crop=chosen, size=FRAME_SIZE
+        )
+        slower = 1.0 if true_fps is None else facts.rate / true_fps
+        self._rate = facts.rate / slower
+        self._duration = facts.duration * slower
+        self._findings = facts.findings
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+    @property
+    def rate(self) -> float:
+        return self._rate
+
+    @property
+    def duration(self) -> float:
+        return self._duration
+
+    @property
+    def start(self) -> int | None:
+        return None
+
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+        with open_camera(self.path, self._options) as stream:
+            try:
+                for frame in stream:
+                    time = frame.time / NANOSECONDS
+                    if time > last:
+                        break
+                    if time >= first:
+                        yield time, frame.image
+            finally:
+                self._findings = stream.findings
+
+    def findings(self) -> tuple[Finding, ...]:
+        return self._findings
+
+
+class RecordFilm:
+    """Frames of a record of a lake: a recording, one of its clips, or a camera's.
+
+    Args:
+        path: of the record's object.
+        name: of the artifact.
+        first, count: the frames that belong to it; all by default.
+        crop: the region of the flag in pixels of the stored frames.
+
+    Raises:
+        InputError: fewer than two frames, or a crop beyond the picture.
+        NotFoundError, CorruptError: see `flagdata.record.Record`.
+    """
+
+    def __init__(
+        self, path: Path, *, name: str, first: int = 0, count: int | None = None, crop: CropBox | None = None
+    ) -> None:
+        self.record = Record.open(path)
+        self._name, self._first = name, first
+        times = self.record.frame_times[first : None if count is None else first + count]
+        if len(times) < 2:
+            raise InputError(f"{len(times)} frames", where=name, fix="name a recording or clip with frames")
+        self.times = times
+        self._seconds = (times - times[0]) / NANOSECONDS
+        height, width = self.record.frames(first, 1).shape[1:]
+        self._box = None if crop is None else squared(crop, width=width, height=height)
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def rate(self) -> float:
+        return float(NANOSECONDS / np.median(np.diff(self.times)))
+
+    @property
+    def duration(self) -> float:
+        return float(self._seconds[-1])
+
+    @property
+    def start(self) -> int | None:
+        return int(self.times[0])
+
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+        low = int(np.searchsorted(self._seconds, first, side="left"))
+        high = int(np.searchsorted(self._seconds, last, side="right"))
+        for begin in range(low, high, _AT_ONCE):
+            some = min(_AT_ONCE, high - begin)
+            pictures = self.record.frames(self._first + begin, some)
+            if self._box is not None:
+                x, y, width, height = self._box.as_tuple()
+                pictures = pictures[:, y : y + height, x : x + width]
+            yield from zip(self._seconds[begin : begin + some].tolist(), pictures, strict=True)
+
+    def findings(self) -> tuple[Finding, ...]:
+        return ()
+
+
+def squared(box: CropBox, *, width: int, height: int) -> CropBox:
+    """The square about a box that lies in a picture of width × height: as wide as its longer side, where there is room.
+
+    Raises:
+        UsageError: a box beyond the picture.
+    """
+    if box.x + box.width > width or box.y + box.height > height:
+        raise UsageError(
+            f"the crop {box} reaches beyond the picture of {width} × {height} px", where="--crop",
+            fix="give x,y,width,height of a region inside it",
+        )  # fmt: skip
+    side = min(max(box.width, box.height), width, height)
+    x = min(max(box.x + box.width // 2 - side // 2, 0), width - side)
+    y = min(max(box.y + box.height // 2 - side // 2, 0), height - side)
+    return CropBox(x=x, y=y, width=side, height=side)

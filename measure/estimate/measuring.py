@@ -1,0 +1,330 @@
+"""From a film to a measurement: windows, what the model says of each, the gate, one answer for all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.rng import child_seed, stream
+from measure.estimate.answer import Quantity, quantities, sentence
+from measure.estimate.combine import OWN, Dependence, combined
+from measure.estimate.film import Film
+from measure.estimate.gate import Gate, Reason, Verdict, verdict
+from measure.estimate.similarity import POWERS, FlagSize, Sizes, scaled_back, sizes, spacing
+from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
+from models.estimator import Estimator
+from models.learner import Loss
+from models.targets import TARGETS
+
+DRAWS = 400
+"""Of each window's posterior, for each size of flag."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How a film is measured.
+
+    Attributes:
+        size: of the flag; None if unknown.
+        step: from one window to the next [s]; None for windows that follow each other.
+        first, last: the part of the film [s]; None for its ends.
+        level: of the intervals.
+        false_alarm: rate of the gate.
+        seed: of all draws.
+    """
+
+    size: FlagSize | None = None
+    step: float | None = None
+    first: float | None = None
+    last: float | None = None
+    level: float = 0.9
+    false_alarm: float = 0.05
+    seed: int = 0
+
+    def recipe(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "flag_size": None if self.size is None else [self.size.length, self.size.height], "step": self.step,
+            "first": self.first, "last": self.last, "level": self.level, "false_alarm": self.false_alarm,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WindowAnswer:
+    """What one window said by itself.
+
+    Attributes:
+        start, end: of its frames, at the smallest and largest size considered [s from the film's first frame].
+        quantities: with their intervals.
+        p: that a familiar clip is at least as strange.
+    """
+
+    start: float
+    end: float
+    quantities: tuple[Quantity, ...]
+    p: float
+
+    def quantity(self, name: str) -> Quantity:
+        """The one of that name."""
+        return next(quantity for quantity in self.quantities if quantity.name == name)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "start": self.start, "end": self.end, "p": self.p,
+            "quantities": {quantity.name: quantity.as_dict() for quantity in self.quantities},
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measurement:
+    """A film, measured.
+
+    Attributes:
+        film: its name.
+        rate, duration: of it [Hz, s].
+        model: name of the estimator.
+        options: how it was measured.
+        names: of the targets.
+        draws: (n, target) of the joint posterior.
+        quantities: of these.
+        windows: each by itself, in order.
+        combined: how many of them the answer rests on.
+        dependence: of their errors.
+        verdict: of the gate.
+        sizes: of flags that were considered.
+        summary: (dimension,) of the window of median p.
+        clip: (frames, height, width) of the first window, at the size in the middle.
+        findings: on film, size and windows.
+    """
+
+    film: str
+    rate: float
+    duration: float
+    model: str
+    options: Options
+    names: tuple[str, ...]
+    draws: NDArray[np.float64]
+    quantities: tuple[Quantity, ...]
+    windows: tuple[WindowAnswer, ...]
+    combined: int
+    dependence: Dependence
+    verdict: Verdict
+    sizes: Sizes
+    summary: NDArray[np.float32]
+    clip: NDArray[np.uint8]
+    findings: tuple[Finding, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The answer in one line; whether it may be believed, the verdict says."""
+        return sentence(self.quantities, level=self.options.level)
+
+    def as_dict(self, *, anyway: bool) -> Mapping[str, Any]:
+        """JSON values. What was refused is left out, unless `anyway`."""
+        shown = anyway or not self.verdict.refused
+        return {
+            "film": self.film, "rate": self.rate, "duration": self.duration, "model": self.model,
+            "options": {**self.options.recipe(), "seed": self.options.seed}, "gate": self.verdict.as_dict(),
+            "sentence": self.sentence if shown else None,
+            "quantities": {q.name: q.as_dict() for q in self.quantities} if shown else None,
+            "windows": [window.as_dict() for window in self.windows] if shown else None,
+            "combined": self.combined,
+            "dependence": {
+                "wind": self.dependence.wind, "cloth": self.dependence.cloth, "source": self.dependence.source,
+            },
+            "findings": [finding.as_dict() for finding in self.findings],
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Seen:
+    """A window as the model sees it: logits (i, n, target), its first network's summaries (i, dimension), reasons."""
+
+    start: float
+    logits: NDArray[np.float64]
+    summaries: NDArray[np.float32]
+    reasons: tuple[list[Reason], ...]
+
+
+def measure(
+    film: Film, model: Estimator, *, gate: Gate, dependence: Dependence, options: Options,
+    advance: Callable[[int, int], None] | None = None,
+) -> Measurement:  # fmt: skip
+    """Measure a film.
+
+    Args:
+        gate: what tells whether the model can judge it.
+        dependence: of the errors of the film's windows.
+        advance: called after each window with how many there are and 1.
+
+    Raises:
+        UsageError: a model without distributions, or a part that the film does not have.
+        InputError: a film that is too short or too slow, or of which no window is whole.
+    """
+    if model.learners[0].objective is not Loss.POSTERIOR:
+        raise UsageError(
+            f"the model {model.name!r} gives values without intervals", where="--model",
+            fix="name a model that was trained for a posterior, as the shipped one",
+        )  # fmt: skip
+    considered = sizes(
+        options.size, rate=film.rate, frames_rate=model.front_end.rate, draws=DRAWS,
+        generator=stream(options.seed, "sizes"),
+    )  # fmt: skip
+    layout = lay_out(
+        frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
+        last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
+    )  # fmt: skip
+    seen: list[_Seen] = []
+    clip: NDArray[np.uint8] | None = None
+    worst, repeats = 0.0, 0
+    margin = layout.tolerance
+    for window in cut(film.frames(layout.first - margin, layout.last + margin), layout):
+        if clip is None:
+            clip = window.clips[len(window.clips) // 2]
+        seen.append(_look(window, model, gate, seed=options.seed))
+        worst, repeats = max(worst, window.worst), repeats + window.repeats
+        if advance is not None:
+            advance(layout.count, 1)
+    if clip is None:
+        raise UsageError(
+            f"none of {layout.count} windows has all its frames", where=film.name,
+            fix="the film's stamps have gaps: choose another part by --start and --end",
+        )  # fmt: skip
+    judged = verdict(
+        [one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level(options.false_alarm)
+    )
+    answer = _Answer(model=model, sizes=considered, options=options)
+    used = _used(seen, judged, layout)
+    draws = answer.joint([seen[k] for k in used], dependence)
+    middle = seen[int(np.argsort(judged.window_p, kind="stable")[len(seen) // 2])]
+    found = findings_of(layout, found=len(seen), worst=worst, repeats=repeats, rate=film.rate)
+    return Measurement(
+        film=film.name, rate=film.rate, duration=film.duration, model=model.name, options=options,
+        names=tuple(answer.names), draws=draws, quantities=answer.quantities(draws),
+        windows=tuple(answer.window(one, layout, p) for one, p in zip(seen, judged.window_p, strict=True)),
+        combined=len(used), dependence=dependence, verdict=judged, sizes=considered,
+        summary=middle.summaries[len(middle.summaries) // 2], clip=clip,
+        findings=(*film.findings(), *considered.findings, *found, *_about_windows(seen, judged, used, dependence)),
+    )  # fmt: skip
+
+
+@torch.no_grad()
+def _look(window: Window, model: Estimator, gate: Gate, *, seed: int) -> _Seen:
+    embeddings = model.embeddings(model.inputs(window.clips))
+    logits = model.logits(embeddings, seed=child_seed(seed, "window", window.index), draws=DRAWS)[:, :DRAWS]
+    summaries = embeddings[0].cpu().numpy().astype(np.float32)
+    reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
+    return _Seen(start=window.start, logits=logits.double().cpu().numpy(), summaries=summaries, reasons=reasons)
+
+
+def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
+    """Windows that the answer rests on: none that overlap; of a familiar recording none that are strange."""
+    apart = layout.frames * max(layout.spacings)
+    chosen: list[int] = []
+    strange = judged.strange
+    leave_out = not judged.refused and not strange.all()
+    for k, one in enumerate(seen):
+        if leave_out and strange[k]:
+            continue
+        if not chosen or one.start - seen[chosen[-1]].start >= apart - layout.tolerance:
+            chosen.append(k)
+    return chosen
+
+
+def _about_windows(
+    seen: Sequence[_Seen], judged: Verdict, used: Sequence[int], dependence: Dependence
+) -> list[Finding]:
+    found = []
+    strange = int(judged.strange.sum())
+    if strange and not judged.refused:
+        found.append(
+            Finding(
+                kind="strange-windows", severity=Severity.NOTE, count=strange,
+                what=f"{strange} of {len(seen)} windows are unlike what the model was trained on by themselves "
+                f"(expected of familiar ones: {judged.false_alarm:.0%}) and were left out of the answer",
+            )
+        )  # fmt: skip
+    if len(used) > 1:
+        found.append(
+            Finding(
+                kind="windows-combined", severity=Severity.NOTE, count=len(used),
+                what=f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
+                f"count as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} in cloth "
+                f"({dependence.source})",
+            )
+        )  # fmt: skip
+    return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Answer:
+    """Turns logits at the sizes considered into quantities of the flag itself."""
+
+    model: Estimator
+    sizes: Sizes
+    options: Options
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.model.learners[0].scaling.names)
+
+    def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> NDArray[np.float64]:
+        """(n, target) draws of all windows together."""
+        learner = self.model.learners[0]
+        own = [place for place, name in enumerate(self.names) if name in OWN]
+        cloth = [place for place, name in enumerate(self.names) if name not in OWN]
+        parts = []
+        for stratum in range(len(self.sizes.scale)):
+            winds, shared = combined(
+                np.stack([one.logits[stratum] for one in seen]), names=self.names,
+                centre=learner.centre.double().cpu().numpy(), spread=learner.spread.double().cpu().numpy(),
+                dependence=dependence, generator=stream(self.options.seed, "combine", stratum),
+            )  # fmt: skip
+            logits = np.empty((*winds.shape[:2], len(self.names)))
+            logits[..., own] = winds
+            logits[..., cloth] = shared
+            parts.append(scaled_back(self._values(logits).mean(axis=0), self.names, self.sizes.draws[stratum]))
+        return np.concatenate(parts)
+
+    def window(self, one: _Seen, layout: Layout, p: float) -> WindowAnswer:
+        parts = [
+            scaled_back(self._values(one.logits[stratum]), self.names, self.sizes.draws[stratum])
+            for stratum in range(len(self.sizes.scale))
+        ]
+        return WindowAnswer(
+            start=one.start, end=one.start + layout.length, quantities=self.quantities(np.concatenate(parts)), p=p
+        )
+
+    def quantities(self, draws: NDArray[np.float64]) -> tuple[Quantity, ...]:
+        return quantities(draws, self.prior, self.names, level=self.options.level, assumed=self.assumed)
+
+    @cached_property
+    def prior(self) -> NDArray[np.float64]:
+        """(n, target) draws of what the model assumes of a flag of these sizes."""
+        learner = self.model.learners[0]
+        s = self.sizes.draws.ravel()
+        generator = stream(self.options.seed, "prior")
+        normal = generator.standard_normal((len(s), len(self.names)))
+        logits = learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
+        return scaled_back(self._values(logits), self.names, s)
+
+    @cached_property
+    def assumed(self) -> NDArray[np.float64]:
+        """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
+        ends = np.array([[TARGETS[name].low for name in self.names], [TARGETS[name].high for name in self.names]])
+        smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
+        low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
+        even = np.array([name in POWERS for name in self.names])[:, None]
+        return np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
+
+    def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()

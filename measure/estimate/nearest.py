@@ -1,0 +1,74 @@
+"""The simulated clips of a lake that a model finds most like a film, to look at beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.lake import Lake
+from flagdata.record import Record
+from flagdata.rng import stream
+from flagdata.schema import Kind
+from models.estimator import Estimator
+
+COMPARED = 48
+"""Clips of the lake that are looked at, drawn at random: each costs a tenth of a second."""
+SHOWN = 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Neighbour:
+    """A simulated clip.
+
+    Attributes:
+        artifact, name: of the clip.
+        frames: (frames, height, width) gray.
+        distance: of the summaries, in standard deviations of the training clips.
+        known: what its simulation was made with.
+    """
+
+    artifact: str
+    name: str
+    frames: NDArray[np.uint8]
+    distance: float
+    known: Mapping[str, float]
+
+
+@torch.no_grad()
+def nearest(
+    lake: Lake, model: Estimator, summary: NDArray[np.float32], *, without: str | None, at: str | None, seed: int,
+    advance: Callable[[int, int], None] | None = None,
+) -> tuple[tuple[Neighbour, ...], int]:  # fmt: skip
+    """The `SHOWN` nearest of `COMPARED` simulated clips, and how many were compared; none where the lake has none.
+
+    Args:
+        summary: (dimension,) of the film.
+        without: the recording whose clips are left out, that of the film itself; None for none.
+        advance: called after each clip with how many there are and 1.
+    """
+    count = model.front_end.frames
+    where = f"kind = '{Kind.CLIP}' and seed is not null and frame_count >= {count}"
+    columns = ["artifact", "name", "object", "frame_first", "recording"]
+    rows = [row for row in lake.rows(where, at=at, columns=columns).to_pylist() if row["recording"] != without]
+    chosen = stream(seed, "nearest").permutation(len(rows))[:COMPARED].tolist()
+    whitening = np.eye(len(summary)) if model.cloud is None else model.cloud.whitening
+    found: list[Neighbour] = []
+    for place in chosen:
+        row = rows[place]
+        record = Record.open(lake.object_path(row["object"]))
+        frames = record.frames(row["frame_first"], count)
+        own = model.embeddings(model.inputs(frames[None]))[0][0].cpu().numpy()
+        distance = float(np.linalg.norm(whitening @ (own.astype(np.float64) - summary)))
+        found.append(
+            Neighbour(
+                artifact=row["artifact"], name=row["name"], frames=frames, distance=distance, known=record.truth or {}
+            )
+        )
+        found = sorted(found, key=lambda one: one.distance)[:SHOWN]
+        if advance is not None:
+            advance(len(chosen), 1)
+    return tuple(found), len(chosen)

@@ -1,0 +1,124 @@
+"""A measurement as one HTML file that refers to no other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from flagdata.provenance import code_version
+from measure.estimate import pictures
+from measure.estimate.answer import SHORT, Quantity
+from measure.estimate.measuring import Measurement
+from measure.estimate.nearest import Neighbour
+from measure.estimate.series import Agreement, Beside
+from measure.pages.render import render
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A part of the page that another program made, such as a refinement by simulation.
+
+    Attributes:
+        anchor: its id in the page.
+        title: its heading.
+        body: HTML, escaped by whoever made it.
+    """
+
+    anchor: str
+    title: str
+    body: Markup
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Context:
+    """What the page says of where a measurement is from.
+
+    Attributes:
+        provenance: rows of a table, in order.
+        known: what a simulated film states of itself; empty for a real one.
+        neighbours, compared: the nearest simulated clips, of so many; none where no lake was given.
+        rate: of the model's frames [Hz].
+    """
+
+    provenance: Mapping[str, str]
+    known: Mapping[str, float]
+    neighbours: Sequence[Neighbour]
+    compared: int
+    rate: float
+
+
+def page(
+    measured: Measurement, series: Beside, context: Context, *, anyway: bool, sections: Sequence[Section] = ()
+) -> str:
+    """The page.
+
+    Args:
+        anyway: whether estimates are shown although the gate refused the film; they are marked then.
+        sections: what comes between the answer and its provenance, each under its own heading.
+    """
+    shown = anyway or not measured.verdict.refused
+    spacing = measured.windows[0].end - measured.windows[0].start
+    clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else context.rate
+    values = {
+        "film": measured.film, "shown": shown, "refused": measured.verdict.refused, "gate": measured.verdict.sentence,
+        "reasons": [reason.what for reason in measured.verdict.reasons], "answer": measured.sentence,
+        "rows": [_row(quantity, context.known, measured.options.level) for quantity in measured.quantities],
+        "simulated": bool(context.known), "level": f"{measured.options.level * 100:.3g} %",
+        "clip": pictures.animation(measured.clip, rate=clip_rate),
+        "neighbours": [_neighbour(one, context.rate) for one in context.neighbours], "compared": context.compared,
+        "corner": pictures.corner(measured) if shown else None,
+        "series": pictures.series(series, level=measured.verdict.level)
+        if shown and len(series.time) > 1 else None,
+        "spectra": None if series.spectrum is None or not shown else pictures.spectra(series.spectrum),
+        "agreement": [_agreement("over the window", series.window), _agreement("minute mean", series.of_minute)]
+        if series.logged is not None and shown else [],
+        "delay": _delay(series) if shown else None,
+        "windows": len(measured.windows), "combined": measured.combined, "dependence": measured.dependence,
+        "strange": int(measured.verdict.strange.sum()), "false_alarm": f"{measured.options.false_alarm:.0%}",
+        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in measured.findings],
+        "sections": list(sections), "provenance": {**context.provenance, "code": code_version()},
+    }  # fmt: skip
+    return render("measure.estimate", "page.html.j2", values)
+
+
+def _row(quantity: Quantity, known: Mapping[str, float], level: float) -> dict[str, str | bool]:
+    digits = 3 if quantity.name == "density" else 2
+    truth = known.get(quantity.name)
+    return {
+        "name": SHORT[quantity.name], "unit": "" if quantity.unit == "1" else quantity.unit, "told": quantity.told,
+        "value": f"{quantity.value:.{digits}f}", "interval": f"[{quantity.low:.{digits}f}, {quantity.high:.{digits}f}]",
+        "assumed": f"{quantity.assumed[0]:.{digits}f} to {quantity.assumed[1]:.{digits}f}",
+        "information": f"{quantity.information:.2f}", "known": "" if truth is None else f"{truth:.{digits}f}",
+    }  # fmt: skip
+
+
+def _neighbour(one: Neighbour, rate: float) -> dict[str, str]:
+    known = [
+        f"{SHORT[name]} {one.known[name]:.{digits}f} {unit}"
+        for name, digits, unit in (("wind_speed", 1, "m/s"), ("density", 3, "kg/m²")) if name in one.known
+    ]  # fmt: skip
+    return {
+        "name": one.name, "image": pictures.animation(one.frames, rate=rate), "known": ", ".join(known),
+        "distance": f"{one.distance:.1f}",
+    }  # fmt: skip
+
+
+def _agreement(title: str, found: Agreement | None) -> dict[str, str]:
+    if found is None:
+        return {"title": title, "text": "the anemometer was silent"}
+    return {
+        "title": title,
+        "text": f"bias {found.bias:+.2f} m/s, RMSE {found.rmse:.2f} m/s [{found.interval[0]:.2f}, "
+        f"{found.interval[1]:.2f}] 90 %, the intervals hold {found.covered:.0%} of it, n = {found.count} windows",
+    }  # fmt: skip
+
+
+def _delay(series: Beside) -> str | None:
+    if series.delay is None:
+        return None
+    if series.delay.offset is None or series.delay.reasons:
+        return f"no delay between film and anemometer could be told: {'; '.join(series.delay.reasons)}"
+    sigma = "" if series.delay.sigma is None else f" ± {series.delay.sigma:.2f} s (1 σ)"
+    return f"{series.delay.offset:+.2f} s{sigma} are to be added to the film's clock to reach the anemometer's"

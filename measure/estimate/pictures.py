@@ -1,0 +1,112 @@
+"""Pictures of a measurement as data URLs: clips in motion, the posterior, the wind series with its spectra."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from measure.estimate.answer import SHORT
+from measure.estimate.measuring import Measurement
+from measure.estimate.series import Beside, Spectrum
+from measure.pages.render import data_url
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SIDE = 220  # px of a clip
+_BLUE, _RUST, _GRAY = "#2b6f8f", "#c4622d", "0.6"
+
+
+def animation(frames: NDArray[np.uint8], *, rate: float) -> str:
+    """The largest centred square of a clip (frames, height, width), endless, at its own speed."""
+    side = min(frames.shape[1:])
+    top, left = (frames.shape[1] - side) // 2, (frames.shape[2] - side) // 2
+    cut = frames[:, top : top + side, left : left + side]
+    images = [Image.fromarray(frame).resize((_SIDE, _SIDE)) for frame in cut]
+    buffer = io.BytesIO()
+    images[0].save(
+        buffer, "WEBP", save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0, quality=60
+    )
+    return data_url(buffer.getvalue(), "image/webp")
+
+
+def corner(measured: Measurement) -> str:
+    """The joint posterior: each quantity by itself on the diagonal, in pairs below it."""
+    from matplotlib.figure import Figure
+
+    names, draws = measured.names, measured.draws
+    count = len(names)
+    side = 2.1 * count + 0.6
+    figure = Figure(figsize=(side, side))
+    grid = figure.add_gridspec(
+        count, count, left=0.7 / side, right=1 - 0.1 / side, bottom=0.5 / side, top=1 - 0.1 / side, hspace=0.22,
+        wspace=0.22,
+    )  # fmt: skip
+    for row in range(count):
+        for column in range(row + 1):
+            axes = figure.add_subplot(grid[row, column])
+            if row == column:
+                quantity = measured.quantities[row]
+                axes.hist(draws[:, row], bins=40, color=_BLUE if quantity.told else _GRAY, histtype="stepfilled")
+                axes.axvspan(quantity.low, quantity.high, color=_RUST, alpha=0.15, linewidth=0)
+                axes.set_yticks([])
+            else:
+                axes.hist2d(draws[:, column], draws[:, row], bins=30, cmap="Blues")
+            if row == count - 1:
+                axes.set_xlabel(_label(measured, column), fontsize=8)
+            if column == 0 and row:
+                axes.set_ylabel(_label(measured, row), fontsize=8)
+            axes.tick_params(labelsize=7)
+    return _png(figure)
+
+
+def _label(measured: Measurement, place: int) -> str:
+    quantity = measured.quantities[place]
+    return SHORT[quantity.name] + ("" if quantity.unit == "1" else f" [{quantity.unit}]")
+
+
+def series(found: Beside, *, level: float) -> str:
+    """Wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.5, 3.0), layout="constrained")
+    axes = figure.subplots()
+    if found.logged is not None and found.minute is not None:
+        axes.plot(found.time, found.logged, color=_BLUE, linewidth=1.0, label="anemometer, over the window")
+        axes.plot(found.time, found.minute, color=_BLUE, linewidth=1.6, linestyle=":", label="anemometer, minute mean")
+    axes.vlines(found.time, found.low, found.high, color=_RUST, alpha=0.35, linewidth=1.4)
+    for strange, label in ((False, "film, with its interval"), (True, "film, window unlike the training data")):
+        own = (found.p <= level) == strange
+        if own.any():
+            face = "none" if strange else _RUST
+            axes.plot(found.time[own], found.wind[own], "o", markersize=4, color=_RUST, mfc=face, label=label)
+    axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
+    axes.legend(loc="best", fontsize=8, ncols=2)
+    return _png(figure)
+
+
+def spectra(found: Spectrum) -> str:
+    """Power densities of both series, and their coherence with what chance reaches."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.5, 3.0), layout="constrained")
+    power, coherent = figure.subplots(1, 2)
+    power.loglog(found.frequency, found.logged, color=_BLUE, label="anemometer")
+    power.loglog(found.frequency, found.estimated, color=_RUST, label="film")
+    power.set(xlabel="frequency [Hz]", ylabel="power density [(m/s)²/Hz]")
+    power.legend(fontsize=8)
+    coherent.semilogx(found.frequency, found.coherence, color=_RUST)
+    coherent.axhline(found.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20")
+    coherent.set(xlabel="frequency [Hz]", ylabel="coherence", ylim=(0, 1))
+    coherent.legend(fontsize=8)
+    return _png(figure)
+
+
+def _png(figure: Figure) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    return data_url(buffer.getvalue(), "image/png")

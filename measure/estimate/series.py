@@ -1,0 +1,261 @@
+"""Wind by window, beside an anemometer's: how far off, at which frequencies they agree, and how much later one is.
+
+Two references are taken from the anemometer. *Window*: its mean over the window's own time, what the film should show.
+*Minute*: its mean over the minute before the window's end, the ground truth of Runia et al. 2020, section 5, of which a
+window is a sample; gusts within the minute count as errors against it.
+
+Spectra are Welch's and the coherence is the magnitude-squared one (`scipy.signal`), with Hann segments of a quarter of
+the longest run of windows without gaps, that overlap by a half. With k such segments independent series exceed the
+coherence 1 − 0.05^(1/(k − 1)) at one frequency in twenty (Carter, Knapp and Nuttall, IEEE Trans. AU 21, 1973), where
+the overlap is not counted. The delay is found as `flagdata.align` finds a clock's offset, with the wind off the film in
+place of the motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.align.lag import LagSearch, estimate_offset
+from flagdata.align.motion import MotionSeries
+from flagdata.align.windbins import wind_bins
+from flagdata.dataset.truth import TruthSeries, over_ground
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from flagdata.schema import TRUTH_WINDOW
+from flagdata.signals import WindSeries
+from flagdata.timebase import NANOSECONDS
+from measure.estimate.measuring import Measurement
+
+WIND = "wind_speed"
+LEAST_SPECTRUM = 32
+"""Windows in a row below which there is no spectrum."""
+_SEGMENTS = 4
+_SEARCHED = 30.0  # s either way
+_SHORTEST_DELAY = 120.0  # s that film and anemometer must share
+_RESPONSE = (0.0, 0.3)  # s: the network's windows are centred; the flag follows the wind by about L/U, of either sign
+_RESAMPLES = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """Estimated less logged wind.
+
+    Attributes:
+        count: windows compared.
+        bias: mean difference [m/s].
+        rmse: root mean square [m/s].
+        interval: 90 % of the RMSE, by resampling blocks of ten windows [m/s].
+        covered: share of the windows whose interval holds the reference.
+    """
+
+    count: int
+    bias: float
+    rmse: float
+    interval: tuple[float, float]
+    covered: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "count": self.count, "bias": self.bias, "rmse": self.rmse, "interval": list(self.interval),
+            "covered": self.covered,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Spectrum:
+    """Of both series, over the longest run without gaps.
+
+    Attributes:
+        frequency: (f,) [Hz].
+        estimated, logged: (f,) power densities [(m/s)²/Hz].
+        coherence: (f,) from 0 to 1.
+        chance: coherence that independent series exceed at one frequency in twenty.
+        windows: length of the run.
+    """
+
+    frequency: NDArray[np.float64]
+    estimated: NDArray[np.float64]
+    logged: NDArray[np.float64]
+    coherence: NDArray[np.float64]
+    chance: float
+    windows: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "frequency": self.frequency.tolist(), "estimated": self.estimated.tolist(), "logged": self.logged.tolist(),
+            "coherence": self.coherence.tolist(), "chance": self.chance, "windows": self.windows,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delay:
+    """What is to be added to the film's clock to reach the anemometer's.
+
+    Attributes:
+        offset, sigma: [s]; None where nothing was found.
+        reasons: why it may not be relied on; empty where it may.
+    """
+
+    offset: float | None
+    sigma: float | None
+    reasons: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {"offset": self.offset, "sigma": self.sigma, "reasons": list(self.reasons)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Beside:
+    """A wind series and its anemometer.
+
+    Attributes:
+        time: (n,) middles of the windows [s from the film's first frame].
+        wind, low, high: (n,) estimated [m/s].
+        p: (n,) of the gate.
+        logged, minute: (n,) references [m/s]; NaN where the anemometer was silent. None without an anemometer.
+        window, of_minute: agreement with them.
+        spectrum: None where the series is too short.
+        delay: None without an anemometer.
+    """
+
+    time: NDArray[np.float64]
+    wind: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    p: NDArray[np.float64]
+    logged: NDArray[np.float64] | None = None
+    minute: NDArray[np.float64] | None = None
+    window: Agreement | None = None
+    of_minute: Agreement | None = None
+    spectrum: Spectrum | None = None
+    delay: Delay | None = None
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Name → (n,), as they are written to tables."""
+        out = {"time": self.time, "wind": self.wind, "low": self.low, "high": self.high, "p": self.p}
+        if self.logged is not None and self.minute is not None:
+            out |= {"anemometer": self.logged, "anemometer_minute": self.minute}
+        return out
+
+    def rows(self) -> Iterator[Sequence[str]]:
+        """Lines of a table, its header first; unknown values are empty."""
+        columns = self.columns()
+        yield list(columns)
+        for values in zip(*columns.values(), strict=True):
+            yield ["" if math.isnan(value) else f"{value:.6g}" for value in values]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values of what is concluded; the columns are elsewhere."""
+        parts = {"window": self.window, "minute": self.of_minute, "spectrum": self.spectrum, "delay": self.delay}
+        return {name: None if part is None else part.as_dict() for name, part in parts.items()}
+
+
+def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None) -> Beside:
+    """The windows of a measurement as a series, beside an anemometer on the film's clock.
+
+    Args:
+        start: instant of the film's first frame [UTC ns]; None where nobody said, and nothing is compared.
+        wind: of the anemometer; None if there is none.
+    """
+    found = [window.quantity(WIND) for window in measured.windows]
+    series = Beside(
+        time=np.array([(window.start + window.end) / 2 for window in measured.windows]),
+        wind=np.array([one.value for one in found]), low=np.array([one.low for one in found]),
+        high=np.array([one.high for one in found]), p=np.array(measured.verdict.window_p),
+    )  # fmt: skip
+    if start is None or wind is None or over_ground(wind) is None:
+        return series
+    truth = TruthSeries.of(wind)
+    ends = [start + round(window.end * NANOSECONDS) for window in measured.windows]
+    length = measured.windows[0].end - measured.windows[0].start
+    # A slow logger's window holds no sample of its own, so it is as long as its sampling period at least.
+    logged = np.array([truth.before(end, window=max(length, truth.period)).wind for end in ends])
+    minute = np.array([truth.before(end, window=TRUTH_WINDOW).wind for end in ends])
+    return Beside(
+        time=series.time, wind=series.wind, low=series.low, high=series.high, p=series.p, logged=logged, minute=minute,
+        window=agreement(series, logged, seed=measured.options.seed),
+        of_minute=agreement(series, minute, seed=measured.options.seed),
+        spectrum=spectrum(series.time, series.wind, logged), delay=_delay(series, start, wind, measured.options.seed),
+    )  # fmt: skip
+
+
+def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> Agreement | None:
+    """Of the windows that the reference covers; None where there is none."""
+    known = np.isfinite(reference)
+    count = int(known.sum())
+    if not count:
+        return None
+    off = series.wind[known] - reference[known]
+    inside = (series.low[known] <= reference[known]) & (reference[known] <= series.high[known])
+    return Agreement(
+        count=count, bias=float(off.mean()), rmse=float(np.sqrt(np.mean(off**2))), interval=_rmse_interval(off, seed),
+        covered=float(inside.mean()),
+    )  # fmt: skip
+
+
+def _rmse_interval(off: NDArray[np.float64], seed: int) -> tuple[float, float]:
+    """90 % of the RMSE, by resampling blocks of ten windows: neighbours err alike."""
+    blocks = np.array_split(np.square(off), max(1, len(off) // 10))
+    sums, sizes = np.array([block.sum() for block in blocks]), np.array([len(block) for block in blocks])
+    drawn = stream(seed, "agreement").integers(len(blocks), size=(_RESAMPLES, len(blocks)))
+    values = np.sqrt(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
+    low, high = np.quantile(values, [0.05, 0.95])
+    return float(low), float(high)
+
+
+def spectrum(time: NDArray[np.float64], estimated: NDArray[np.float64], logged: NDArray[np.float64]) -> Spectrum | None:
+    """Over the longest run of windows one step apart, all of them logged; None where that is shorter than
+    `LEAST_SPECTRUM`, or where one of the series does not vary."""
+    if len(time) < LEAST_SPECTRUM:
+        return None
+    from scipy import signal
+
+    step = float(np.median(np.diff(time)))
+    broken = np.flatnonzero((np.abs(np.diff(time) - step) > 0.01 * step) | ~np.isfinite(logged[1:] + logged[:-1])) + 1
+    runs = np.split(np.arange(len(time)), broken)
+    run = max(runs, key=len)
+    if len(run) < LEAST_SPECTRUM:
+        return None
+    segment = len(run) // _SEGMENTS
+    pair = estimated[run] - estimated[run].mean(), logged[run] - logged[run].mean()
+    if min(float(np.ptp(values)) for values in pair) == 0:
+        return None
+    frequency, own = signal.welch(pair[0], fs=1 / step, nperseg=segment)
+    _, other = signal.welch(pair[1], fs=1 / step, nperseg=segment)
+    _, coherent = signal.coherence(*pair, fs=1 / step, nperseg=segment)
+    return Spectrum(
+        frequency=frequency[1:], estimated=own[1:], logged=other[1:], coherence=coherent[1:],
+        chance=1 - 0.05 ** (1 / (_SEGMENTS - 1)), windows=len(run),
+    )  # fmt: skip
+
+
+def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
+    if series.time[-1] - series.time[0] < _SHORTEST_DELAY:
+        return Delay(offset=None, sigma=None, reasons=(f"the film is shorter than {_SHORTEST_DELAY:.0f} s",))
+    step = float(np.median(np.diff(series.time)))
+    instants = start + np.round(series.time * NANOSECONDS).astype(np.int64)
+    try:
+        bins = wind_bins(wind, shortest=max(1.0, 2 * step))
+        found = estimate_offset(
+            MotionSeries(time=instants, energy=np.maximum(series.wind, 0.0)), bins.average,
+            search=LagSearch(
+                window=_SEARCHED, response=_RESPONSE[0], response_sigma=_RESPONSE[1], stamp_sigma=bins.sigma
+            ),
+            generator=stream(seed, "delay"),
+        )  # fmt: skip
+    except InputError as error:
+        return Delay(offset=None, sigma=None, reasons=(error.what,))
+    known = math.isfinite(found.offset)
+    return Delay(
+        offset=found.offset if known else None, sigma=found.sigma if known and math.isfinite(found.sigma) else None,
+        reasons=found.reasons,
+    )  # fmt: skip

@@ -1,0 +1,250 @@
+"""Flags of another size, by dynamic similarity: what a model of a 1.5 m flag says of a flag of any length.
+
+The equation of motion of a cloth with area weight ρ_s and bending stiffness B in air of density ρ_a at speed U is, in
+terms of the orders of its parts,
+
+    ρ_s ẍ  =  ρ_a U² f(shape, ẋ/U)  +  B ∂⁴x  +  E ∂²x (stretching)  +  ρ_s g.
+
+Lengths are measured in L, times in √(L/g), speeds in √(gL), and everything is divided by ρ_s g. What is left are the
+numbers
+
+    U²/(gL)  (Froude),   ρ_s/(ρ_a L)  (mass ratio),   B/(ρ_s g L³),   E/(ρ_s g L).
+
+Two flags that agree in these, in the shape and in the way they are held move alike: x(t)/L is the same function of
+t√(g/L). Gravity and air are the same for both. So a flag that is s times as long as another moves like it if
+
+    U ∝ √s,   t ∝ √s,   ρ_s ∝ s,   B ∝ ρ_s L³ ∝ s⁴,   E ∝ ρ_s L ∝ s²,   internal damping time ∝ √s.
+
+A flag of length s · 1.5 m is therefore shown to the model in frames √s/25 s apart, and wind, area weight and bending
+stiffness are scaled back by √s, s and s⁴; ratios of stiffnesses stay. Two things do not follow the rule: a fabric's
+stretching stiffness E does not grow with the flag, which matters little as long as the cloth hardly stretches, and its
+bending table changes at curvatures of 5, 10, 15 and 20 1/m, not at multiples of 1/L. The Reynolds number, on which the
+simulated air's force does not depend, is another.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.findings import Finding, Severity
+
+TRAINED_LENGTH = 1.5
+"""Length of the flags that the models are trained on, along the wind [m]."""
+TRAINED_ASPECT = 1.5
+"""Their length over their height."""
+_SHORTEST, _LONGEST = 0.1, 20.0  # m
+_ASPECT_SLACK = 0.05  # relative; printed sizes are rounded
+_SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:m)?\s*")
+
+POWERS: dict[str, float] = {"wind_speed": 0.5, "density": 1.0}
+"""Powers of s by which quantities grow."""
+LOGARITHMS: dict[str, float] = {"bending_scale": 4.0, "anisotropy": 0.0}
+"""The same of quantities that are known by their logarithm, base 10."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlagSize:
+    """Length along the wind and height along the pole [m].
+
+    Raises:
+        UsageError: a size that no flag has.
+    """
+
+    length: float
+    height: float
+
+    def __post_init__(self) -> None:
+        if not (_SHORTEST <= self.length <= _LONGEST and _SHORTEST <= self.height <= _LONGEST):
+            raise UsageError(
+                f"a flag of {self.length:g} m × {self.height:g} m", where="--flag-size",
+                fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as in 1.5x1.0",
+            )  # fmt: skip
+
+    @property
+    def scale(self) -> float:
+        """s, the length in lengths of the flags that models are trained on."""
+        return self.length / TRAINED_LENGTH
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What is to be said of its shape."""
+        aspect = self.length / self.height
+        if abs(aspect / TRAINED_ASPECT - 1) <= _ASPECT_SLACK:
+            return ()
+        return (
+            Finding(
+                kind="aspect-ratio", severity=Severity.WARNING, value=aspect,
+                what=f"the flag is {aspect:.2f} times as long as it is high, those of the training 1.50 times: "
+                "similarity holds for flags of one shape, so that intervals may be too narrow",
+            ),
+        )  # fmt: skip
+
+
+def parse_size(text: str) -> FlagSize:
+    """The size that "1.5x1.0" names, length by height [m].
+
+    Raises:
+        UsageError: anything else.
+    """
+    match = _SIZE.fullmatch(text)
+    if match is None:
+        raise UsageError(
+            f"{text!r} is not a flag's size", where="--flag-size", fix="give length x height in metres, as in 1.5x1.0"
+        )
+    return FlagSize(length=float(match[1]), height=float(match[2]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SizePrior:
+    """What is assumed of a flag's length where nobody states it: a log-normal distribution.
+
+    The median is the 1.5 m × 1.0 m (5 ft × 3 ft) flag, the most common size on house and club poles; a factor of 1.3
+    for one standard deviation puts 90 % of the flags between 0.97 m and 2.31 m. It is a choice of this project, not a
+    measured distribution.
+
+    Attributes:
+        median: [m].
+        factor: e to the standard deviation of the logarithm.
+    """
+
+    median: float = 1.5
+    factor: float = 1.3
+
+    def share_above(self, length: float) -> float:
+        """Share of the flags that are longer than `length` [m]."""
+        return float(ndtr(-math.log(length / self.median) / math.log(self.factor)))
+
+    def quantile(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Lengths that these shares of the flags stay below [m]."""
+        return self.median * np.exp(math.log(self.factor) * ndtri(share))
+
+
+STRATA = 3
+"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each."""
+LEAST_SHARE = 0.5
+"""Of the prior that the frame rate must admit."""
+RATE_SLACK = 0.95
+"""A film may be this much slower than the model's frames: one frame in twenty is then shown twice. It admits films of
+24 frames a second for a model of 25."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sizes:
+    """What lengths are considered, in lengths of the flags that models are trained on.
+
+    Attributes:
+        given: the size that was stated; None where it was not.
+        scale: (i,) s at which the model looks at the film.
+        draws: (i, n) s of each draw of the posterior at that stratum; all equal where the size is given.
+        findings: on the size.
+    """
+
+    given: FlagSize | None
+    scale: NDArray[np.float64]
+    draws: NDArray[np.float64]
+    findings: tuple[Finding, ...]
+
+
+def sizes(
+    given: FlagSize | None, *, rate: float, frames_rate: float, draws: int, generator: np.random.Generator,
+    prior: SizePrior | None = None,
+) -> Sizes:  # fmt: skip
+    """The lengths to consider for a film.
+
+    Of an unknown size the prior is cut into `STRATA` parts of equal probability. The model looks at the film as that
+    of a flag of each part's median length; what it says in scaled units, which changes slowly with s, is scaled back by
+    lengths drawn within the part.
+
+    Args:
+        given: None if unknown.
+        rate: of the film [Hz].
+        frames_rate: of the model's frames [Hz].
+        draws: for each stratum.
+        generator: for the lengths within the strata.
+        prior: of the length; by default `SizePrior()`.
+
+    Raises:
+        InputError: the film is too slow for the flag's size, or for half of what is likely where that is unknown.
+    """
+    prior = prior if prior is not None else SizePrior()
+    if given is not None:
+        needed = frames_rate / math.sqrt(given.scale)
+        if rate < RATE_SLACK * needed:
+            raise InputError(
+                f"the film has {rate:.4g} frames a second, a flag of {given.length:g} m needs {needed:.4g}",
+                where="frame rate", fix=f"film at {RATE_SLACK * needed:.3g} frames a second or more",
+            )  # fmt: skip
+        scale = np.array([given.scale])
+        return Sizes(given=given, scale=scale, draws=np.full((1, draws), given.scale), findings=given.findings())
+    least = TRAINED_LENGTH * (RATE_SLACK * frames_rate / rate) ** 2
+    admitted = prior.share_above(least)
+    if admitted < LEAST_SHARE:
+        enough = RATE_SLACK * frames_rate * math.sqrt(TRAINED_LENGTH / prior.median)
+        raise InputError(
+            f"the film has {rate:.4g} frames a second, too few for flags shorter than {least:.2f} m, and the flag's "
+            "size was not given",
+            where="frame rate", fix=f"give --flag-size if the flag is larger, or film at {enough:.3g} Hz or more",
+        )  # fmt: skip
+    below = 1 - admitted
+    edges = below + admitted * np.arange(STRATA + 1) / STRATA
+    middles = (edges[:-1] + edges[1:]) / 2
+    within = edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * generator.uniform(size=(STRATA, draws))
+    low, high = prior.quantile(np.array([below + 0.05 * admitted, 1 - 0.05 * admitted]))
+    found = [
+        Finding(
+            kind="size-assumed", severity=Severity.WARNING, value=prior.median,
+            what=f"the flag's size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken as possible "
+            "and widen the intervals",
+            fix="give --flag-size LENGTHxHEIGHT",
+        )
+    ]  # fmt: skip
+    if below > 0.01:
+        found.append(
+            Finding(
+                kind="small-sizes-left-out", severity=Severity.WARNING, value=below,
+                what=f"at {rate:.4g} frames a second flags shorter than {least:.2f} m cannot be judged; {below:.0%} of "
+                "what was assumed of the size was left out",
+                fix="give --flag-size, or film faster",
+            )
+        )  # fmt: skip
+    return Sizes(
+        given=None, scale=prior.quantile(middles) / TRAINED_LENGTH, draws=prior.quantile(within) / TRAINED_LENGTH,
+        findings=tuple(found),
+    )  # fmt: skip
+
+
+def spacing(scale: float, *, rate: float) -> float:
+    """Time between frames at which a flag of scale s looks like the model's at `rate` [s]."""
+    return math.sqrt(scale) / rate
+
+
+def scaled_back(
+    values: NDArray[np.floating], names: Sequence[str], scale: NDArray[np.float64] | float
+) -> NDArray[np.float64]:
+    """What a model said of a flag of scale s, as that flag's own.
+
+    Args:
+        values: (…, target) as the model says them.
+        names: of the targets.
+        scale: s, a number or (…,).
+
+    Raises:
+        UnknownNameError: a target whose scaling is not known.
+    """
+    out = np.array(values, dtype=np.float64)
+    s = np.asarray(scale, dtype=np.float64)
+    for column, name in enumerate(names):
+        if name in POWERS:
+            out[..., column] *= s ** POWERS[name]
+        elif name in LOGARITHMS:
+            out[..., column] += LOGARITHMS[name] * np.log10(s)
+        else:
+            raise UnknownNameError.of("scaled quantity", name, {**POWERS, **LOGARITHMS})
+    return out

@@ -1,0 +1,217 @@
+"""What SOURCE names: a video file or folder of images, an artifact of a lake, or the clips of a query."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.ingest.camera import CropBox
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import digest, file_hash
+from flagdata.record import Record
+from flagdata.schema import Kind
+from measure.estimate.checked import CheckedGate
+from measure.estimate.film import CameraFilm, Film, RecordFilm
+from measure.estimate.gate import Gate, gate_of
+from measure.gate import storage
+from models import estimator
+from models.estimator import Estimator
+from models.storage import CARD, WEIGHTS
+
+FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
+"""Kinds of artifacts that have frames."""
+_LEAST_PREFIX = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a source is read.
+
+    Attributes:
+        crop: region of the flag; None for the largest centred square.
+        true_fps: rate at which a high-speed camera really ran [Hz]; of files only.
+        sequence_fps: rate of images without stamps [Hz]; of files only.
+    """
+
+    crop: CropBox | None = None
+    true_fps: float | None = None
+    sequence_fps: float | None = None
+
+    def recipe(self) -> dict[str, Any]:
+        """JSON values."""
+        crop = None if self.crop is None else str(self.crop)
+        return {"crop": crop, "true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Subject:
+    """A film and where it is from.
+
+    Attributes:
+        film: its frames.
+        artifact: of the lake; None of a plain file.
+        path: of the plain file or folder; None of an artifact.
+        record: the artifact's record, which may hold wind and truth.
+    """
+
+    film: Film
+    artifact: Artifact | None = None
+    path: Path | None = None
+    record: Record | None = None
+
+    @property
+    def recording(self) -> str | None:
+        """Id of the recording that the film is, or is a part of; None of a plain file."""
+        return None if self.artifact is None else self.artifact.recording or self.artifact.id
+
+    @property
+    def known(self) -> Mapping[str, float] | None:
+        """What a simulated record states of itself."""
+        return None if self.record is None else self.record.truth
+
+    def content_hash(self) -> str | None:
+        """SHA-256 of a plain file, or of the names and hashes of a folder's files; None of an artifact."""
+        if self.path is None:
+            return None
+        if self.path.is_file():
+            return file_hash(self.path)
+        total = hashlib.sha256()
+        for entry in sorted(entry for entry in self.path.iterdir() if entry.is_file()):
+            total.update(f"{entry.name} {file_hash(entry)}\n".encode(errors="surrogateescape"))
+        return total.hexdigest()
+
+
+def subjects(
+    source: str | None, *, query: str | None, lake: Lake | None, at: str | None, reading: Reading
+) -> list[Subject]:
+    """The films that a source or a query names.
+
+    Args:
+        source: a path, or the name, id or beginning of the id of an artifact.
+        query: an SQL condition over clips, instead of a source.
+        lake: where artifacts are; None if no lake was named.
+        at: tag, branch or version to look at.
+
+    Raises:
+        UsageError: neither a source nor a query, or both; artifacts without a lake; options of files for artifacts.
+        NotFoundError: nothing of that name, or no clip matches.
+        FlagdataError: a file that is no film.
+    """
+    if (source is None) == (query is None):
+        raise UsageError("name a film or give a query over clips, one of them", fix="see flagdata measure --help")
+    if source is not None and Path(source).exists():
+        path = Path(source)
+        film = CameraFilm(path, crop=reading.crop, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
+        return [Subject(film=film, path=path)]
+    if lake is None:
+        what = "a query needs a lake" if source is None else f"there is no file {source!r}, and no lake was named"
+        raise NotFoundError(what, fix="correct the path, or name the lake by --lake")
+    if reading.true_fps is not None or reading.sequence_fps is not None:
+        raise UsageError(
+            "the frames of a lake have their instants", where="--true-fps, --sequence-fps",
+            fix="leave the options out; they belong to ingest",
+        )  # fmt: skip
+    if source is not None:
+        return [_stored(lake, _named(lake, source, at), reading)]
+    rows = lake.rows(f"kind = '{Kind.CLIP}' and ({query})", at=at)
+    if not rows.num_rows:
+        raise NotFoundError("no clip matches", where=query, fix="look with flagdata query --where")
+    return [_stored(lake, Artifact.from_row(row), reading) for row in rows.to_pylist()]
+
+
+def _named(lake: Lake, source: str, at: str | None) -> Artifact:
+    kinds = ", ".join(f"'{kind}'" for kind in FILMED)
+    rows = lake.rows(f"kind in ({kinds})", at=at, columns=["artifact", "kind", "name"]).to_pylist()
+    meant = [row for row in rows if row["name"] == source and row["kind"] != Kind.CLIP]
+    if not meant and len(source) >= _LEAST_PREFIX:
+        meant = [row for row in rows if row["artifact"].startswith(source)]
+    if not meant:
+        raise UnknownNameError.of("file or film of the lake", source, {row["name"] for row in rows})
+    if len(meant) > 1:
+        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in meant[:4])
+        raise UsageError(f"{source!r} names {len(meant)} films: {several}", where="SOURCE", fix="give the id of one")
+    return lake.artifact(meant[0]["artifact"], at=at)
+
+
+def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
+    if artifact.object is None:
+        raise InputError(f"the {artifact.kind} has no frames of its own", where=artifact.name, fix="name its recording")
+    clip = artifact.kind is Kind.CLIP
+    film = RecordFilm(
+        lake.object_path(artifact.object), name=artifact.name, crop=reading.crop,
+        first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
+    )  # fmt: skip
+    return Subject(film=film, artifact=artifact, record=film.record)
+
+
+def gate_beside(found: Network, *, false_alarm: float) -> Gate:
+    """The gate of a network: the calibrated one where it lies in the model's folder, else the distance of summaries.
+
+    Raises:
+        CorruptError: the calibrated one is damaged, or another network's.
+        InputError: the model has neither.
+    """
+    if not (found.folder / storage.GATE).is_file():
+        return gate_of(found.estimator)
+    calibrated = storage.read(found.folder, found.estimator)
+    return CheckedGate(model=found.estimator, calibrated=calibrated, false_alarm=false_alarm)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Network:
+    """The model that measures, and which one it is.
+
+    Attributes:
+        estimator: at work.
+        identity: SHA-256 of its card and weights.
+        artifact: of the lake; None of a folder or of a model that comes with the package.
+        folder: of its files, where what belongs to it may lie beside them.
+    """
+
+    estimator: Estimator
+    identity: str
+    artifact: Artifact | None
+    folder: Path
+
+
+def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
+    """The model of a name.
+
+    Args:
+        name: of a model that comes with the package, a folder, or a network of the lake by its name or id; None is the
+            package's default.
+
+    Raises:
+        UnknownNameError: none of these.
+        UsageError: several networks of the lake.
+        CorruptError: the model is damaged.
+    """
+    shipped = {path.name for path in estimator.SHIPPED.iterdir() if (path / CARD).is_file()}
+    chosen = name if name is not None else estimator.DEFAULT
+    if (Path(chosen) / CARD).is_file():
+        return _loaded(Path(chosen), None)
+    if chosen in shipped:
+        return _loaded(estimator.SHIPPED / chosen, None)
+    rows: Sequence[Mapping[str, Any]] = []
+    if lake is not None:
+        rows = lake.rows(f"kind = '{Kind.NETWORK}'", at=at, columns=["artifact", "name"]).to_pylist()
+    meant = [row for row in rows if row["name"] == chosen]
+    meant = meant or [row for row in rows if len(chosen) >= _LEAST_PREFIX and row["artifact"].startswith(chosen)]
+    if not meant or lake is None:
+        raise UnknownNameError.of("model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model")
+    if len(meant) > 1:
+        raise UsageError(f"{len(meant)} networks are called {chosen!r}", where="--model", fix="give the id of one")
+    artifact = lake.artifact(meant[0]["artifact"], at=at)
+    return _loaded(lake.object_path(str(artifact.object)), artifact)
+
+
+def _loaded(folder: Path, artifact: Artifact | None) -> Network:
+    loaded = estimator.load(folder)
+    return Network(
+        estimator=loaded, identity=digest(f"{file_hash(folder / CARD)} {file_hash(folder / WEIGHTS)}"),
+        artifact=artifact, folder=folder,
+    )  # fmt: skip

@@ -1,0 +1,119 @@
+"""A model that is small and untrained, and films that it looks at: what it says means nothing, how it is used does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding
+from flagdata.rng import stream, torch_draws
+from models import estimator
+from models.crops import Cropping
+from models.estimator import CLOUD, Estimator
+from models.frontend import FrontEnd
+from models.learner import Learner, Loss
+from models.outliers import Familiarity
+from models.storage import WEIGHTS, write_card, write_tensors
+from models.wave import WaveNetwork
+
+FRAMES, SIZE, RATE = 12, 24, 25.0
+TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
+
+
+def pictures(count: int, *, seed: int = 3, height: int = 32, width: int = 40) -> NDArray[np.uint8]:
+    """(count, height, width): a patch of waves that travel across it."""
+    rng = stream(seed, "pictures")
+    t = np.arange(count)[:, None, None] / RATE
+    y, x = np.mgrid[0:height, 0:width]
+    patch = np.exp(-(((x - width / 2) / 10) ** 4) - ((y - height / 2) / 8) ** 4)
+    waves = np.cos(0.5 * x - 2 * np.pi * rng.uniform(2, 6) * t)
+    return np.clip(110 + 80 * patch * waves + rng.normal(0, 2, waves.shape), 0, 255).astype(np.uint8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pictures:
+    """Frames in memory as a film.
+
+    Attributes:
+        times: (n,) of the frames [s].
+        images: (n, height, width).
+    """
+
+    times: NDArray[np.float64]
+    images: NDArray[np.uint8]
+    name: str = "pictures"
+    start: int | None = None
+
+    @property
+    def rate(self) -> float:
+        return float(1 / np.median(np.diff(self.times)))
+
+    @property
+    def duration(self) -> float:
+        return float(self.times[-1])
+
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+        for time, image in zip(self.times.tolist(), self.images, strict=True):
+            if first <= time <= last:
+                yield time, image
+
+    def findings(self) -> tuple[Finding, ...]:
+        return ()
+
+
+def even(count: int, *, rate: float = RATE, seed: int = 3) -> Pictures:
+    """A film of an even rate."""
+    return Pictures(times=np.arange(count) / rate, images=pictures(count, seed=seed))
+
+
+@pytest.fixture(scope="session")
+def model_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The model as a folder, familiar with clips of `pictures`."""
+    folder = tmp_path_factory.mktemp("estimate") / "small"
+    folder.mkdir()
+    options = {"dimension": 4, "widths": (6, 6, 6)}
+    with torch_draws(1, "weights"):
+        learner = Learner(WaveNetwork(**options), loss=Loss.POSTERIOR, targets=TARGETS, components=2).eval()  # type: ignore[arg-type]
+    front_end = FrontEnd(maps="wave-maps", size=SIZE, frames=FRAMES, rate=RATE)
+    cropping = Cropping(frames=FRAMES, size=SIZE)
+    write_card(folder, {
+        "name": "small", "seed": 1, "front_end": asdict(front_end), "cropping": asdict(cropping),
+        "recipe": {
+            "network": {"name": "wave", "options": options},
+            "loss": {"name": "posterior", "targets": list(TARGETS), "components": 2, "margin": 1.0},
+            "data": {"dataset": "made", "sequences": None},
+        },
+    })  # fmt: skip
+    write_tensors(folder / WEIGHTS, learner.state_dict())
+    bare = estimator.load(folder)
+    clips = np.stack([pictures(FRAMES, seed=seed) for seed in range(48)])
+    with torch.no_grad():
+        summaries = bare.embeddings(bare.inputs(clips))[0].numpy()
+    cloud = Familiarity.of(summaries[:28], summaries[28:])
+    write_tensors(folder / CLOUD, {name: torch.from_numpy(value) for name, value in cloud.arrays().items()})
+    return folder
+
+
+@pytest.fixture(scope="session")
+def model(model_folder: Path) -> Estimator:
+    return estimator.load(model_folder)
+
+
+def write_video(path: Path, images: NDArray[np.uint8], *, rate: int = 25) -> Path:
+    """A film without loss."""
+    with av.open(str(path), "w") as container:
+        stream_ = container.add_stream("ffv1", rate=rate)
+        stream_.width, stream_.height, stream_.pix_fmt = images.shape[2], images.shape[1], "gray"
+        for image in images:
+            for packet in stream_.encode(av.VideoFrame.from_ndarray(image, format="gray")):
+                container.mux(packet)
+        for packet in stream_.encode():
+            container.mux(packet)
+    return path

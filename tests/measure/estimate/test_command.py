@@ -1,0 +1,268 @@
+"""`flagdata measure` from files and lakes: the answer, the refusal, the artifact, and clear errors."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from flagdata.cli import main
+from flagdata.dataset.clips import clip_rows
+from flagdata.lake import Artifact, Lake
+from flagdata.record import Record, RecordWriter
+from flagdata.schema import Kind
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import NANOSECONDS
+from measure.estimate.artifact import read
+from measure.estimate.nearest import nearest
+from models.estimator import Estimator
+from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
+
+START = 1_700_000_000 * NANOSECONDS
+SIZED = ("--flag-size", "1.5x1.0")
+
+
+class Said(NamedTuple):
+    stdout: str
+    stderr: str
+
+
+def run(*arguments: str | Path, code: int = 0) -> Said:
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
+        main(["measure", *map(str, arguments)])
+    assert ended.value.code == code, out.getvalue() + err.getvalue()
+    return Said(stdout=out.getvalue(), stderr=err.getvalue())
+
+
+def answer(*arguments: str | Path) -> dict[str, object]:
+    return json.loads(run(*arguments, "--json").stdout)
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_video(tmp_path_factory.mktemp("films") / "flag.mkv", pictures(4 * FRAMES, height=40, width=56))
+
+
+@pytest.fixture
+def strange(tmp_path: Path) -> Path:
+    noise = np.random.default_rng(1).integers(0, 256, size=(3 * FRAMES, 40, 40)).astype(np.uint8)
+    return write_video(tmp_path / "noise.mkv", noise)
+
+
+def record(path: Path, *, seed: int) -> None:
+    times = START + np.round(np.arange(4 * FRAMES) / RATE * NANOSECONDS).astype(np.int64)
+    with RecordWriter(path, metadata={"camera": {"name": "made"}}) as writer:
+        for time, frame in zip(times.tolist(), pictures(4 * FRAMES, seed=seed), strict=True):
+            writer.frame(log_time=time, publish_time=time, timestamp=time, image=frame)
+        seconds = START + np.arange(-70, 4, dtype=np.int64) * NANOSECONDS
+        writer.wind(
+            WindSeries(
+                time=seconds, channels={"wind_speed": np.full(len(seconds), 4.0)},
+                flags=np.zeros(len(seconds), dtype=np.uint16), sensor=Sensor(name="cup"),
+            )
+        )  # fmt: skip
+        writer.truth({"wind_speed": 4.0, "density": 0.12}, log_time=START)
+
+
+@pytest.fixture
+def lake(tmp_path: Path) -> Path:
+    """Two recordings with their clips."""
+    made = Lake.create(tmp_path / "lake")
+    with made.transaction("two films") as transaction:
+        for seed in (1, 2):
+            staged = transaction.staging(".mcap")
+            record(staged, seed=seed)
+            stored = transaction.put(staged)
+            artifact = Artifact(
+                kind=Kind.RECORDING, name=f"made-{seed}", seed=seed, object=stored, recipe={"seed": seed},
+                start=START, frame_count=4 * FRAMES, rate=RATE,
+            )  # fmt: skip
+            transaction.add(artifact)
+            for clip in clip_rows(Record.open(made.object_path(stored)), artifact, frames=FRAMES + 2):
+                transaction.add(clip)
+    return made.path
+
+
+def measurements(lake: Path) -> Sequence[dict[str, object]]:
+    return Lake.open(lake).rows("kind = 'measurement'").to_pylist()
+
+
+def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) -> None:
+    done = run(film, *SIZED, "--model", model_folder, "--anyway")
+    assert len(done.stdout.splitlines()) == 1
+    assert re.search(r"wind(: not told by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.stdout)
+
+
+def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "flag.mkv", pictures(40, height=240, width=320))
+    found = answer(path, "--anyway")
+    assert found["model"] == "wave"
+    assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
+
+
+def test_a_folder_of_images_and_the_video_of_them_say_the_same(film: Path, model_folder: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "images"
+    folder.mkdir()
+    for k, image in enumerate(pictures(4 * FRAMES, height=40, width=56)):
+        Image.fromarray(image).save(folder / f"{k:03d}.png")
+    options = (*SIZED, "--model", model_folder, "--anyway")
+    assert answer(folder, "--sequence-fps", "25", *options)["quantities"] == answer(film, *options)["quantities"]
+
+
+def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    done = run(strange, *SIZED, "--report", page, code=3)
+    assert "m/s" not in done.stdout + page.read_text()
+    assert "not like what the model was trained on" in done.stderr
+    assert "Refused" in page.read_text()
+    told = json.loads(run(strange, *SIZED, "--json", code=3).stdout)
+    assert told["kind"] == "refused"
+    marked = run(strange, *SIZED, "--anyway")
+    assert marked.stdout.startswith("refused by the gate, not to be relied on: ")
+
+
+def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder: Path, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    run(film, *SIZED, "--model", model_folder, "--anyway", "--report", page)
+    text = page.read_text()
+    assert not re.search(r'(src|href)="(?!data:|#)', text)
+    assert text.count("data:image/webp") == 1
+    assert text.count("data:image/png") == 2
+
+
+def test_a_crop_beyond_the_picture_is_refused_and_one_inside_changes_the_answer(film: Path, model_folder: Path) -> None:
+    options = (*SIZED, "--model", model_folder, "--anyway")
+    assert "reaches beyond" in run(film, *options, "--crop", "30,0,30,30", code=2).stderr
+    whole, part = answer(film, *options), answer(film, *options, "--crop", "0,0,30,30")
+    assert whole["quantities"] != part["quantities"]
+
+
+def test_a_recording_is_measured_once_with_its_parents(lake: Path, model_folder: Path) -> None:
+    options = ("--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--seed", "5")
+    first, again = answer("made-1", *options), answer("made-1", *options)
+    rows = measurements(lake)
+    assert [row["artifact"] for row in rows] == [first["artifact"]]
+    assert again["artifact"] == first["artifact"]
+    assert rows[0]["parents"] == [first["source"]]
+    assert rows[0]["seed"] == 5
+    stored, arrays = read(Lake.open(lake).object_path(str(rows[0]["object"])))
+    assert stored["quantities"] == first["quantities"]
+    assert arrays["draws"].shape[1] == 4
+    np.testing.assert_allclose(arrays["anemometer"], 4.0)
+    assert answer("made-1", *options, "--level", "0.8")["artifact"] != first["artifact"]
+    assert len(measurements(lake)) == 2
+
+
+def test_a_network_of_the_lake_is_a_parent_of_what_it_measured(lake: Path, model_folder: Path) -> None:
+    with Lake.open(lake).transaction("a network") as transaction:
+        network = Artifact(kind=Kind.NETWORK, name="small-net", object=transaction.put(_as_model(model_folder, lake)))
+        transaction.add(network)
+    found = answer("made-1", "--lake", lake, *SIZED, "--model", "small-net", "--anyway")
+    assert measurements(lake)[0]["parents"] == [found["source"], network.id]
+
+
+def _as_model(folder: Path, lake: Path) -> Path:
+    target = lake.parent / "copy.model"
+    target.mkdir()
+    for entry in folder.iterdir():
+        (target / entry.name).write_bytes(entry.read_bytes())
+    return target
+
+
+def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, model: Estimator) -> None:
+    opened = Lake.open(lake)
+    first, other = opened.rows("kind = 'recording'").to_pylist()
+    record_ = Record.open(opened.object_path(first["object"]))
+    with torch.no_grad():
+        summary = model.embeddings(model.inputs(record_.frames(0, FRAMES)[None]))[0][0].numpy()
+    found, compared = nearest(opened, model, summary, without=None, at=None, seed=0)
+    assert found[0].distance == pytest.approx(0, abs=1e-4)
+    assert found[0].distance <= found[1].distance <= found[2].distance
+    rest, fewer = nearest(opened, model, summary, without=first["artifact"], at=None, seed=0)
+    assert (compared, fewer) == (6, 3)
+    clips = opened.rows(f"kind = 'clip' and recording = '{other['artifact']}'")["artifact"].to_pylist()
+    assert {one.artifact for one in rest} == set(clips)
+    assert rest[0].known["density"] == 0.12
+
+
+def test_reading_only_adds_nothing_to_the_lake(lake: Path, model_folder: Path) -> None:
+    found = answer("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--read-only")
+    assert found["artifact"] is None
+    assert not measurements(lake)
+
+
+def test_a_refused_recording_leaves_no_measurement(lake: Path, film: Path) -> None:
+    run("made-1", "--lake", lake, *SIZED, "--false-alarm", "0.99", code=3)
+    assert not measurements(lake)
+
+
+def test_a_query_measures_each_clip(lake: Path, model_folder: Path) -> None:
+    options = ("--lake", lake, *SIZED, "--model", model_folder, "--anyway")
+    found = answer("--query", "wind between 3 and 5 and seed = 1", *options)["measurements"]
+    clips = Lake.open(lake).rows("kind = 'clip' and seed = 1", columns=["artifact"])["artifact"].to_pylist()
+    assert sorted(one["source"] for one in found) == sorted(clips)  # type: ignore[union-attr, index]
+    assert {one["simulated_with"]["wind_speed"] for one in found} == {4.0}  # type: ignore[union-attr, index]
+    assert "no clip matches" in run("--query", "wind > 90", *options, code=1).stderr
+
+
+def test_a_clip_is_its_part_of_the_recording(lake: Path, model_folder: Path) -> None:
+    clip = Lake.open(lake).rows("kind = 'clip' and seed = 1").to_pylist()[1]
+    options = ("--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--read-only")
+    begin = clip["frame_first"] / RATE
+    part = ("--start", f"{begin}s", "--end", f"{begin + (FRAMES + 1) / RATE}s")
+    assert answer(clip["artifact"], *options)["quantities"] == answer("made-1", *options, *part)["quantities"]
+
+
+def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path, tmp_path: Path) -> None:
+    import xarray
+
+    target = tmp_path / "series.zarr"
+    done = run("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--windows", "0.24s", "--csv",
+               "--zarr", target)  # fmt: skip
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert len(rows) == 7
+    assert {float(row["anemometer"]) for row in rows} == {4.0}
+    with xarray.open_zarr(target, consolidated=False) as data:
+        np.testing.assert_allclose(data["wind"], [float(row["wind"]) for row in rows], rtol=1e-5)
+        assert data["draws"].dims == ("draw", "target")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "name a film"),
+        (("nothing.mp4",), 1, "no lake was named"),
+        (("FILM", "--query", "true"), 2, "one of them"),
+        (("FILM", "--flag-size", "large"), 2, "metres"),
+        (("FILM", "--flag-size", "0.2x0.1"), 1, "needs"),
+        (("FILM", "--model", "wove"), 2, "did you mean 'wave'"),
+        (("FILM", "--start", "20s"), 2, "of a film of"),
+        (("FILM", "--crop", "whole"), 2, "not a box"),
+        (("FILM", "--json", "--csv"), 2, "more than one form"),
+        (("FILM", "--report", "nowhere/report.html"), 2, "create it first"),
+        (("FILM", "--lake", "nowhere"), 1, "no lake here"),
+    ],
+)
+def test_what_cannot_be_measured_is_told_with_the_fix(
+    film: Path, arguments: tuple[str, ...], code: int, words: str
+) -> None:
+    done = run(*(str(film) if argument == "FILM" else argument for argument in arguments), code=code)
+    assert words in done.stderr
+    assert "fix:" in done.stderr
+
+
+def test_a_text_file_is_no_film(tmp_path: Path) -> None:
+    path = tmp_path / "notes.txt"
+    path.write_text("no film")
+    assert "fix:" in run(path, code=1).stderr

@@ -1,0 +1,65 @@
+"""How alike windows err: recovered from problems with a known correlation, and read from a model's card."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flagdata.errors import CorruptError
+from flagdata.rng import stream
+from measure.estimate.combine import UNKNOWN
+from measure.estimate.dependence import CARD_KEY, Errors, card_entry, errors_of, of_model
+from models.estimator import Estimator
+
+
+def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
+    """Two windows of each film that observe wind and density under a standard normal prior."""
+    rng = stream(1, "films")
+    truth = rng.normal(size=(films, 2))
+    common = rng.normal(size=(films, 1, 2))
+    own = rng.normal(size=(films, 2, 2))
+    observed = truth[:, None] + np.sqrt(noise) * (np.sqrt(correlation) * common + np.sqrt(1 - correlation) * own)
+    variance = 1 / (1 + 1 / noise)
+    # Two draws with the mean and the variance of the posterior.
+    draws = (observed / noise * variance)[:, :, None] + np.sqrt(variance) * np.array([-1.0, 1.0])[:, None]
+    names = ("wind_speed", "density")
+    found = errors_of(draws, truth, names)
+    return Errors(names=names, first=found[:, 0], last=found[:, 1])
+
+
+@pytest.mark.parametrize("noise", [0.1, 20.0])
+@pytest.mark.parametrize("correlation", [0.0, 0.7])
+def test_the_correlation_of_the_cloths_likelihoods_is_found_whether_they_tell_much_or_little(
+    correlation: float, noise: float
+) -> None:
+    value, upper = simulated(correlation, noise=noise).correlation("density")
+    assert value == pytest.approx(correlation, abs=0.04)
+    assert value <= upper <= value + 0.05
+
+
+def test_the_winds_errors_count_with_what_the_prior_has_in_common() -> None:
+    # With noise ≫ 1 both posteriors are the prior, whose error is the same in both.
+    assert simulated(0.0, noise=50.0).correlation("wind_speed")[0] > 0.9
+    assert simulated(0.0, noise=0.01).correlation("wind_speed")[0] < 0.1
+
+
+def test_a_window_as_wide_as_the_prior_has_no_score() -> None:
+    draws = np.array([-1.5, 1.5])[None, None, :, None]
+    assert errors_of(draws, np.array([[0.4]]), ("density",))[0, 0, 0] == 0
+
+
+def test_a_model_without_an_entry_has_windows_that_count_as_one(model: Estimator) -> None:
+    assert of_model(model) is UNKNOWN
+    assert UNKNOWN.cloth == UNKNOWN.wind == 1
+
+
+def test_the_cards_entry_is_what_was_measured(model: Estimator) -> None:
+    found = simulated(0.5, noise=1.0)
+    entry = card_entry(found)
+    told = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
+    assert told == found.dependence()
+    assert told.cloth >= entry["targets"]["density"]["correlation"]
+    with pytest.raises(CorruptError, match="measure it anew"):
+        of_model(replace(model, card={**model.card, CARD_KEY: {"wind": 3}}))

@@ -1,0 +1,127 @@
+"""From film to measurement, whatever the model says: similarity, determinism, which windows count."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from measure.estimate.combine import Dependence
+from measure.estimate.gate import Reason, gate_of
+from measure.estimate.measuring import Measurement, Options, measure
+from measure.estimate.similarity import FlagSize
+from models.estimator import Estimator
+from models.learner import Loss
+from tests.measure.estimate.conftest import FRAMES, RATE, Pictures, even, pictures
+
+APART = Dependence(wind=0.2, cloth=0.2, source="given")
+WHOLE = FlagSize(length=1.5, height=1.0)
+
+
+class Listed:
+    """A gate that gives these p-values in turn."""
+
+    def __init__(self, *values: float) -> None:
+        self._values = iter(values)
+
+    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+        assert frames.ndim == 3
+        p = next(self._values)
+        return [Reason(kind="listed", what=f"p = {p}", p=p)]
+
+    def level(self, false_alarm: float) -> float:
+        return false_alarm
+
+
+def measured(film: Pictures, model: Estimator, **changes: object) -> Measurement:
+    options = replace(Options(size=WHOLE), **changes)  # type: ignore[arg-type]
+    return measure(film, model, gate=gate_of(model), dependence=APART, options=options)
+
+
+def test_the_same_pictures_of_a_smaller_flag_played_faster_are_a_similar_flag(model: Estimator) -> None:
+    # s = 1/4: the same frames twice as fast; wind by 1/2, area weight by 1/4, bending by 1/256.
+    images = pictures(4 * FRAMES)
+    slow = Pictures(times=np.arange(len(images)) / RATE, images=images)
+    fast = Pictures(times=np.arange(len(images)) / (2 * RATE), images=images)
+    whole = measured(slow, model)
+    quarter = measured(fast, model, size=FlagSize(length=0.375, height=0.25))
+    wind, density, bending, anisotropy = whole.draws.T
+    expected = np.stack([wind / 2, density / 4, bending - np.log10(256.0), anisotropy], axis=1)
+    np.testing.assert_allclose(quarter.draws, expected, rtol=1e-9)
+    assert quarter.quantities[1].assumed == pytest.approx((0.025, 0.0425))
+
+
+def test_the_same_seed_gives_the_same_draws_and_another_does_not(model: Estimator) -> None:
+    film = even(3 * FRAMES)
+    np.testing.assert_array_equal(measured(film, model).draws, measured(film, model).draws)
+    assert not np.array_equal(measured(film, model).draws, measured(film, model, seed=1).draws)
+
+
+def test_an_unknown_size_widens_the_interval_of_the_wind(model: Estimator) -> None:
+    film = even(8 * FRAMES, rate=50.0)
+    known, unknown = measured(film, model), measured(film, model, size=None)
+    assert "size-assumed" in {finding.kind for finding in unknown.findings}
+    assert unknown.quantities[0].sigma > known.quantities[0].sigma
+    low, high = unknown.quantities[1].assumed
+    assert low < 0.1
+    assert high > 0.17
+
+
+def test_windows_that_overlap_are_shown_and_not_counted_twice(model: Estimator) -> None:
+    film = even(4 * FRAMES)
+    apart, dense = (
+        measure(film, model, gate=Listed(*[0.5] * 20), dependence=APART, options=Options(size=WHOLE, step=step))
+        for step in (None, 0.08)
+    )
+    assert (len(apart.windows), apart.combined) == (4, 4)
+    assert len(dense.windows) > 4
+    assert dense.combined == 4
+
+
+def test_a_strange_window_of_a_familiar_film_is_left_out_of_the_answer(model: Estimator) -> None:
+    film = even(4 * FRAMES)
+    found = measure(film, model, gate=Listed(0.5, 0.001, 0.4, 0.6), dependence=APART, options=Options(size=WHOLE))
+    assert not found.verdict.refused
+    assert (len(found.windows), found.combined) == (4, 3)
+    assert "strange-windows" in {finding.kind for finding in found.findings}
+
+
+def test_what_was_refused_says_nothing_unless_asked_to(model: Estimator) -> None:
+    film = even(4 * FRAMES)
+    found = measure(film, model, gate=Listed(0.001, 0.002, 0.003, 0.01), dependence=APART, options=Options(size=WHOLE))
+    assert found.verdict.refused
+    shown, hidden = found.as_dict(anyway=True), found.as_dict(anyway=False)
+    assert hidden["quantities"] is hidden["windows"] is hidden["sentence"] is None
+    assert shown["sentence"] == found.sentence
+    assert hidden["gate"]["reasons"][0]["kind"] == "listed"
+
+
+def test_a_part_of_a_film_is_the_film_of_that_part(model: Estimator) -> None:
+    images = pictures(3 * FRAMES)
+    film = Pictures(times=np.arange(len(images)) / RATE, images=images)
+    part = Pictures(times=np.arange(FRAMES) / RATE, images=images[FRAMES : 2 * FRAMES])
+    cut = measured(film, model, first=FRAMES / RATE, last=(2 * FRAMES - 1) / RATE)
+    np.testing.assert_array_equal(cut.draws, measured(part, model).draws)
+
+
+def test_a_film_that_is_too_short_or_too_slow_is_refused_with_what_it_takes(model: Estimator) -> None:
+    with pytest.raises(InputError, match=r"at least 0\.44 s"):
+        measured(even(FRAMES - 3), model)
+    with pytest.raises(InputError, match="frames a second"):
+        measured(even(40, rate=10.0), model)
+
+
+def test_a_film_full_of_gaps_is_refused(model: Estimator) -> None:
+    times = np.delete(np.arange(60) / RATE, np.arange(5, 60, 8))
+    with pytest.raises(UsageError, match="gaps"):
+        measured(Pictures(times=times, images=pictures(len(times))), model)
+
+
+def test_a_model_without_distributions_measures_nothing(model: Estimator) -> None:
+    learner = model.learners[0]
+    regression = type(learner)(learner.network, loss=Loss.REGRESSION, targets=tuple(learner.scaling.names))
+    with pytest.raises(UsageError, match="without intervals"):
+        measured(even(2 * FRAMES), replace(model, learners=(regression,)))

@@ -1,0 +1,131 @@
+"""A wind series beside an anemometer: errors, spectra and delays that were put in come out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flagdata.rng import stream
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import NANOSECONDS
+from measure.estimate.measuring import Measurement
+from measure.estimate.series import Beside, agreement, beside, spectrum
+from models.estimator import Estimator
+from tests.measure.estimate.conftest import FRAMES, even
+from tests.measure.estimate.test_measuring import measured
+
+START = 1_700_000_000 * NANOSECONDS
+
+
+def gusts(count: int, *, correlation: float = 0.97) -> np.ndarray:
+    rng = stream(3, "gusts")
+    out = np.empty(count)
+    level = 0.0
+    for k in range(count):
+        level = correlation * level + np.sqrt(1 - correlation**2) * rng.normal()
+        out[k] = 5 + level
+    return out
+
+
+def log(times: np.ndarray, speed: np.ndarray) -> WindSeries:
+    """Stamps in seconds from the film's first frame."""
+    return WindSeries(
+        time=START + np.round(times * NANOSECONDS).astype(np.int64), channels={"wind_speed": speed},
+        flags=np.zeros(len(times), dtype=np.uint16), sensor=Sensor(name="sonic", averaging=0.0, distance_constant=0.0),
+    )  # fmt: skip
+
+
+def saying(model: Estimator, wind: np.ndarray, *, step: float) -> Measurement:
+    """A measurement whose windows, one each `step`, say these winds ± 0.5 m/s."""
+    found = measured(even(2 * FRAMES), model)
+    first = found.windows[0]
+    quantity = first.quantities[0]
+    windows = tuple(
+        replace(
+            first, start=k * step, end=k * step + 0.44,
+            quantities=(replace(quantity, value=float(v), low=float(v) - 0.5, high=float(v) + 0.5),),
+        )
+        for k, v in enumerate(wind)
+    )  # fmt: skip
+    return replace(found, windows=windows, verdict=replace(found.verdict, window_p=(0.5,) * len(wind)))
+
+
+def test_bias_and_rmse_are_those_that_were_put_in(model: Estimator) -> None:
+    wind = gusts(100)
+    found = beside(saying(model, wind + 0.3, step=1.0), start=START, wind=None)
+    assert found.logged is None
+    told = agreement(found, wind, seed=0)
+    assert told is not None
+    assert (told.bias, told.rmse) == (pytest.approx(0.3), pytest.approx(0.3))
+    assert told.covered == 1
+    shifted = agreement(found, wind - 1, seed=0)
+    assert shifted is not None
+    assert shifted.covered == 0
+    assert agreement(found, np.full(100, np.nan), seed=0) is None
+
+
+def test_the_window_sees_its_own_wind_and_the_minute_the_mean_before_it(model: Estimator) -> None:
+    # The wind rises from 0 by 0.1 m/s a second: a window of 0.44 s ends 0.22 s after its mean, a minute 30 s.
+    times = np.arange(-70, 40, 0.02)
+    ramp = np.maximum(0.1 * (times + 70), 0)
+    found = beside(saying(model, np.full(30, 7.0), step=1.0), start=START, wind=log(times, ramp))
+    assert found.logged is not None
+    assert found.minute is not None
+    ends = np.arange(30) + 0.44
+    np.testing.assert_allclose(found.logged, 0.1 * (ends - 0.22 + 70), atol=0.01)
+    np.testing.assert_allclose(found.minute, 0.1 * (ends - 30 + 70), atol=0.01)
+
+
+def test_series_that_share_a_slow_part_are_coherent_there_and_not_elsewhere() -> None:
+    rng = stream(5, "coherence")
+    time = np.arange(800) * 1.0
+    slow = np.convolve(rng.normal(size=900), np.ones(20) / 20, mode="valid")[:800] * 6
+    found = spectrum(time, slow + rng.normal(size=800) * 0.5, slow + rng.normal(size=800) * 0.5)
+    assert found is not None
+    below, above = found.frequency < 0.02, found.frequency > 0.2
+    assert found.coherence[below].mean() > 0.8
+    assert found.coherence[above].mean() < 0.5
+    # Parseval: the density integrates to the variance.
+    assert np.sum(found.logged) * found.frequency[0] == pytest.approx(np.var(slow) + 0.25, rel=0.3)
+
+
+def test_a_gap_or_a_constant_leaves_no_spectrum_of_what_is_too_short() -> None:
+    time = np.arange(60) * 1.0
+    wind = gusts(60)
+    assert spectrum(time, wind, wind) is not None
+    assert spectrum(np.concatenate([time[:30], time[30:] + 0.5]), wind, wind) is None
+    assert spectrum(time, wind, np.full(60, 4.0)) is None
+
+
+def test_the_delay_between_film_and_anemometer_is_found(model: Estimator) -> None:
+    times = np.arange(-40, 640, 0.1)
+    wind = gusts(len(times), correlation=0.99)
+    rng = stream(6, "noise")
+    seen = np.interp(np.arange(600) + 0.22, times, wind) + 0.3 * rng.normal(size=600)
+    late = 4.2  # the anemometer's clock is ahead
+    found = beside(saying(model, np.maximum(seen, 0), step=1.0), start=START, wind=log(times + late, wind))
+    assert found.delay is not None
+    assert not found.delay.reasons
+    assert found.delay.offset is not None
+    assert found.delay.sigma is not None
+    assert abs(found.delay.offset - late) < 3 * found.delay.sigma
+    assert found.delay.sigma < 0.6
+
+
+def test_a_short_film_has_no_delay_and_says_why(model: Estimator) -> None:
+    found = beside(saying(model, gusts(30), step=1.0), start=START, wind=log(np.arange(-70, 40, 1.0), gusts(110)))
+    assert found.delay is not None
+    assert found.delay.offset is None
+    assert "shorter than 120 s" in found.delay.reasons[0]
+
+
+def test_a_table_has_a_row_a_window_and_empty_cells_where_nothing_is_known() -> None:
+    nothing = np.array([np.nan, 4.0])
+    both = np.array([1.0, 2.0])
+    found = Beside(time=both, wind=both, low=both, high=both, p=both, logged=nothing, minute=nothing)
+    rows = list(found.rows())
+    assert rows[0] == ["time", "wind", "low", "high", "p", "anemometer", "anemometer_minute"]
+    assert rows[1][-2:] == ["", ""]
+    assert rows[2][-1] == "4"
