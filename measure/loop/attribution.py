@@ -73,12 +73,12 @@ RESPONSE = 0.25
 """Relative standard error of a strength by what the fit's mesh does to an effect, which nulls do not show: strengths of
 22 effects that were named rightly in two challenges scattered about the true ones by so much beyond their errors."""
 
-NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
-NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
+NO_HELP = "refitted and run on unseen recordings, it does not help more than the wrong-effect control"
+NOT_APART = "refitted beyond the linear model, its strength cannot be told from zero"
 """Why an effect named is withdrawn."""
-USUAL = "no effect of the library stands out by itself: nulls often have one that does as much"
-FLUCTUATING = "with it too, the wind's course swings most of all, and not as that of turbulence does"
-SWINGING = "with it too, the errors swing most of all, at a frequency that goes with the wind"
+USUAL = "no effect of the library stands out by itself: in nulls one often stands out as much by chance"
+FLUCTUATING = "even with it the errors tell of a wind that fluctuates, and not as turbulence does"
+SWINGING = "even with it the errors oscillate at a frequency that is proportional to the wind speed"
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
 """Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
@@ -456,11 +456,11 @@ def _reason(best: Weighed, other: Weighed) -> str:
     if not other.admissible and other.unlike:
         return other.unlike
     if not other.admissible and other.column == GUST_COLUMN:
-        return "their intensity cannot be told from none"
+        return "their intensity cannot be told from zero"
     if not other.admissible:
         strength = other.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"
-        return f"its strength would be {number(strength.value)}{unit}: not physical"
+        return f"its strength would be {number(strength.value)}{unit}, which is not physical"
     if other.gains.sum() <= 0:
         return "it predicts unseen recordings no better than the base model"
     return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"

@@ -126,11 +126,13 @@ class Variation:
     def words(self) -> str:
         """How it differs from turbulence's."""
         if self.whole[ALONG] <= 0:
-            return "the wind along itself does not vary as it does in turbulence"
+            return "the wind does not vary along its mean as it does in turbulence"
         turned = math.sqrt(max(self.whole[LEFT], 0.0) / self.whole[ALONG])
         if turned < _LEAST_TURNED:
-            return f"the wind turns by {turned:.2g} of what it varies along itself, in turbulence by 0.6 to 1"
-        return "the wind varies faster than turbulence does, within two seconds more than from one two to another"
+            return f"the wind varies across its mean by {turned:.2g} of what it varies along it; in turbulence it is 0.6 to 1"
+        return (
+            "the wind varies faster than turbulence does: more within two seconds than between stretches of two seconds"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
