@@ -36,7 +36,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 @click.command("close-loop")
 @click.argument("sources", metavar="SOURCE...", nargs=-1)
 @click.option("--recipe", "recipe_path", type=click.Path(path_type=Path), metavar="FILE.toml",
-              help="Recipe of the cloth, its pins, the wind and the test; it may name the recordings as well.")  # fmt: skip
+              help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.")  # fmt: skip
 @click.option(
     "--wind",
     "winds",
@@ -66,7 +66,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 @click.option("--size", metavar="WxH", help="Size of the flat cloth [m]; by default the outline of the markers.")
 @click.option(
     "--pins",
-    help="Where the cloth is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
+    help="Where it is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
 )
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second, if the source does not state them."
@@ -93,7 +93,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls.")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
-              help="Lake that artifacts are read from and that the verdict and the models go to; also FLAGDATA_LAKE.")  # fmt: skip
+              help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
 @click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,

@@ -129,7 +129,7 @@ class Variation:
             return "the wind does not vary along its mean as it does in turbulence"
         turned = math.sqrt(max(self.whole[LEFT], 0.0) / self.whole[ALONG])
         if turned < _LEAST_TURNED:
-            return f"the wind varies across its mean by {turned:.2g} of what it varies along it; in turbulence it is 0.6 to 1"
+            return f"the wind varies across its mean by {turned:.2g} of what it does along it; in turbulence it is 0.6 to 1"
         return (
             "the wind varies faster than turbulence does: more within two seconds than between stretches of two seconds"
         )

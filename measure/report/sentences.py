@@ -47,8 +47,9 @@ def test_sentence(test: NullTest) -> str:
     interval = f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}"
     return (
         f"The base model {says}: p = {probability(p.value)} {interval} at level {test.level:g}. {as_large(test)} of "
-        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}. Beyond the highest tenth of "
-        f"the nulls, p follows from an exponential tail fitted to them; its interval is a bootstrap over kinds of numerics."
+        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}. Beyond the highest tenth "
+        "of the nulls, p follows from an exponential tail fitted to them; its interval is a bootstrap over kinds of "
+        "numerics."
     )
 
 
@@ -57,8 +58,8 @@ def test_remark(test: NullTest) -> str:
     if test.critical is None:
         count = sum(map(math.isfinite, test.null))
         return (
-            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible, so that the test could not have "
-            f"rejected the base model at level {test.level:g}."
+            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible, so that the test could not "
+            f"have rejected the base model at level {test.level:g}."
         )
     if test.p_value.value > test.level:
         return "An effect that is too weak to show in these recordings may still act."
@@ -92,8 +93,8 @@ def control_summary(verdict: Verdict) -> str:
     control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
     told = "the named effect does better" if apart.low > 0 else "the named effect cannot be told from it"
     return (
-        f"With {control} instead, the misfit of the recordings left out is larger by {estimate_text(apart)} nat per segment "
-        f"({level_text(apart.level)}): {told}."
+        f"With {control} instead, the misfit of the recordings left out is larger by {estimate_text(apart)} nat per "
+        f"segment ({level_text(apart.level)}): {told}."
     )
 
 
