@@ -166,7 +166,10 @@ def measured(
     segments."""
     every = errors_of(models, forecaster, segments)
     return [
-        LeftOut(squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, chosen))
+        LeftOut(
+            squared=_squared(_array(errors))[outside] / segments.tracked[outside],
+            misfit=yardstick.of(errors).left_out(outside, chosen),
+        )
         for errors, outside in zip(every, outsides, strict=True)
     ]
 

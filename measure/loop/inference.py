@@ -20,6 +20,7 @@ from flagdata.errors import UsageError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.course import Course
 from measure.loop.statistics import Statistics
+from measure.loop.wind_log import by_recording
 
 Floats = NDArray[np.float64]
 Chosen = Sequence[int]
@@ -222,14 +223,15 @@ def _shrunk(covariance: Floats, count: int) -> Floats:
 class Evidence:
     """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
 
-    Its columns are the statistics', then the null model's shifts.
+    Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
+    by.
 
     Attributes:
         recording: (segment,) index of each one's recording.
         curvature: (segment, column, column) H = Rᵀ Σ⁻¹ R.
         score: (segment, column) g = Rᵀ Σ⁻¹ (r − μ).
         energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
-        columns: how many are the statistics' and those given beside; the null model's shifts follow.
+        columns: how many are the statistics' and those given beside; the nuisances follow.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of moments about the pole; None where they are not looked at.
         course: of the wind, as the errors tell it; None where not looked at.
@@ -279,6 +281,8 @@ class Evidence:
         left = r - null.mean(speeds)
         shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
         response = np.concatenate([statistics.response, shifts], axis=2)
+        if statistics.log is not None:
+            response = np.concatenate([response, by_recording(statistics.log, statistics.recording)], axis=2)
         precision = np.linalg.inv(null.covariance)
         weighted = np.einsum("sia,ij->saj", response, precision)
         return cls(
@@ -290,7 +294,8 @@ class Evidence:
 
     @property
     def nuisance(self) -> list[int]:
-        """Columns that are always fitted: the calibrated parameters and the shifts of the numerics."""
+        """Columns that are always fitted: the calibrated parameters, the shifts of the numerics, and what the logs of
+        the wind may be off by."""
         return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Evidence:

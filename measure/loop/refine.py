@@ -164,7 +164,7 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
     steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
     changes = [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
-    return reduced(base, changes, segments.recording, segments.noise)
+    return reduced(base, changes, segments.recording, segments.noise, segments.counted)
 
 
 def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:

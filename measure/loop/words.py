@@ -107,8 +107,8 @@ def blowing(variation: Variation) -> str:
     fast = math.sqrt(max(variation.fast[ALONG], 0.0))
     return (
         f"The errors look like those of a wind that varies by {number(100 * along, digits=2)} % of its mean along its "
-        f"own direction, by {number(100 * fast, digits=2)} % within two seconds, and by {number(100 * turned, digits=2)} % "
-        "across it."
+        f"own direction, by {number(100 * fast, digits=2)} % within two seconds, and by "
+        f"{number(100 * turned, digits=2)} % across it."
     )
 
 

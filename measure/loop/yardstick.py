@@ -36,12 +36,15 @@ class Yardstick:
         lines, turned = self.projection.lines(errors), self.projection.turned(errors)
         known = self.found.turning
         turning = None if known is None or turned is None else replace(known, r=turned)
+        course, whole = self.projection.course(errors), self.found.course
+        if course is not None and whole is not None:
+            course = replace(course, log=whole.log)
         found = replace(
             self.found,
             r=self.projection.of(errors),
             lines=lines,
             turning=turning,
-            course=self.projection.course(errors),
+            course=course,
         )
         return self.evidence(found)
 

@@ -66,8 +66,10 @@ class Lens:
         """The measure of any model's errors along the lens, of speeds by recording [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
         return Yardstick(
-            found=reduced(self.base, self.directions, recording, noise),
-            projection=Projection.along(self.directions, error_scale(self.base, recording, noise)),
+            found=reduced(self.base, self.directions, recording, noise, self.segments.counted),
+            projection=Projection.along(
+                self.directions, error_scale(self.base, recording, noise, self.segments.counted)
+            ),
             null=null, speeds=self.speeds(of_recordings),
         )  # fmt: skip
 
@@ -97,7 +99,9 @@ class Lens:
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
         """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
-        found = reduced(base, [*self.directions, *changes], self.segments.recording, self.segments.noise)
+        found = reduced(
+            base, [*self.directions, *changes], self.segments.recording, self.segments.noise, self.segments.counted
+        )
         count = len(self.directions)
         return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
 

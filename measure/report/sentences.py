@@ -58,8 +58,8 @@ def test_remark(test: NullTest) -> str:
     if test.critical is None:
         count = sum(map(math.isfinite, test.null))
         return (
-            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible, so that the test could not "
-            f"have rejected the base model at level {test.level:g}."
+            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible, so that the test could "
+            f"not have rejected the base model at level {test.level:g}."
         )
     if test.p_value.value > test.level:
         return "An effect that is too weak to show in these recordings may still act."

@@ -1,0 +1,69 @@
+"""What a logged wind may be off by: its gain, its direction and its clock, each with a prior.
+
+The wind at the flag is U(t) = (1 + g) Rz(α) L(t + τ), L the logged one: the log lags by τ. To first order in (g, α, τ)
+the errors of the predictions move by their sensitivities, found by simulation as those of every other regressor. Each
+recording has nuisances of its own, since loggers are set up and clocks are aligned anew for each; as with what numerics
+do, they are always fitted, under their priors, and nothing that they explain counts as an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from measure.loop.columns import Calibration
+from measure.loop.forecast import Forecaster, Segments
+from measure.observe.trajectory import WindTrack
+
+Floats = NDArray[np.float64]
+
+_STEPS = (0.03, 0.05, 0.1)
+"""Of the gain, the direction [rad] and the clock [s]: about as large as what is expected of them."""
+
+
+def misread(wind: WindTrack, *, gain: float = 0.0, direction: float = 0.0, clock: float = 0.0) -> WindTrack:
+    """The wind at the flag where the log is off.
+
+    Args:
+        gain: share by which the wind is stronger than logged.
+        direction: angle by which it blows further to the left, counter-clockwise seen from above [rad].
+        clock: time by which the log lags behind the recording [s].
+    """
+    cosine, sine = np.cos(direction), np.sin(direction)
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return replace(wind.later(clock), velocity=(1 + gain) * wind.velocity @ turn)
+
+
+def sensitivities(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+) -> list[Tensor]:
+    """Change of the predictions (frame, marker, 3, segment) [m] by a prior standard deviation of each nuisance.
+
+    Args:
+        base: errors of the base model [m].
+    """
+    batches = []
+    for place, step in enumerate(_STEPS):
+        off = [step if k == place else 0.0 for k in range(3)]
+        items = tuple(
+            replace(item, wind=misread(item.wind, gain=off[0], direction=off[1], clock=off[2]))
+            for item in segments.items
+        )
+        batches.append(forecaster.system(replace(segments, items=items), calibrations))
+    errors = forecaster.errors_abreast(batches, segments)
+    widths = np.array([item.wind.uncertainty for item in segments.items])  # (segment, nuisance)
+    return [
+        (base - own) / step * base.new_tensor(widths[:, place])
+        for place, (own, step) in enumerate(zip(errors, _STEPS, strict=True))
+    ]
+
+
+def by_recording(moved: Floats, recording: NDArray[np.int64]) -> Floats:
+    """(segment, row, nuisance · recording) of (segment, row, nuisance): each moves its own recording alone."""
+    numbers = np.unique(recording)
+    own = (recording[:, None] == numbers).astype(np.float64)
+    return np.einsum("srk,sn->srnk", moved, own).reshape(*moved.shape[:2], -1)
