@@ -49,7 +49,7 @@ from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
-from measure.loop.words import assumptions, blowing, proposal, sentence, separating, shedding
+from measure.loop.words import assumptions, blowing, proposal, ratios, sentence, separating, shedding
 from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment
 
@@ -115,7 +115,9 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
     reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
-    yardstick = Yardstick(found=found, projection=projection, null=bank.model(setting.design), speeds=speeds)
+    yardstick = Yardstick(
+        found=found, projection=projection, null=bank.model(setting.design).under(setting.prior), speeds=speeds
+    )
     evidence = yardstick.evidence(found)
     fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
     judgement = judge(evidence, reference, level=options.level)
@@ -287,7 +289,7 @@ def _verdict(
         },
     )  # fmt: skip
     return replace(
-        verdict, words=sentence(verdict), separating=separating(verdict),
+        verdict, words=" ".join([sentence(verdict), *ratios(setting.experiment)]), separating=separating(verdict),
         proposal=_proposal(solved, judgement), seconds=time.perf_counter() - began,
     )  # fmt: skip
 

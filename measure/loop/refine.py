@@ -155,7 +155,7 @@ def cut(step: Floats) -> tuple[float, ...]:
 def _part(null: NullModel, places: list[int]) -> NullModel:
     return NullModel(
         coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
-        shifts=null.shifts[:_FEW, places],
+        shifts=null.shifts[:_FEW, places], prior=null.prior,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from measure.loop.alignment import aligned
-from measure.loop.columns import Calibration
+from measure.loop.columns import PRIOR, PRIOR_WITHOUT_MASS, Calibration
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Design
 from measure.observe.trajectory import Experiment
@@ -49,6 +49,11 @@ class Setting:
             noise=float(self.segments.noise.max()), period=self.segments.period,
             cloth=self.experiment.specimen.material.fingerprint,
         )  # fmt: skip
+
+    @property
+    def prior(self) -> Floats:
+        """(theta,) standard deviations of the calibrated parameters."""
+        return PRIOR if self.experiment.specimen.mass_known else PRIOR_WITHOUT_MASS
 
     @property
     def recording(self) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ from measure.loop.attribution import RESPONSE, unsteady
 from measure.loop.columns import FieldColumn
 from measure.loop.course import ALONG, LEFT, Variation
 from measure.loop.field import Mode
+from measure.loop.forecast import Cut
 from measure.loop.lines import STROUHAL, Line
 from measure.loop.quantity import number, probability, with_error, with_level
 from measure.loop.titles import readable, titles
@@ -71,6 +72,17 @@ def _incomplete(verdict: Verdict) -> str:
     return "the errors that remain are larger than those of simulated nulls"
 
 
+def ratios(experiment: Experiment) -> tuple[str, ...]:
+    """What the numbers are of where the mass of the cloth is not known; nothing where it is."""
+    if experiment.specimen.mass_known:
+        return ()
+    told = (
+        "The mass of the cloth is not known: motion tells forces per mass alone, so that density, bending and the "
+        f"strengths of forces are ratios to a density of {number(experiment.specimen.material.density)} kg/m²."
+    )
+    return (told,)
+
+
 def separating(verdict: Verdict) -> str:
     """The cheapest experiment known that tells the named effects apart."""
     if verdict.conclusion is not Conclusion.ONE_OF:
@@ -125,6 +137,15 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     specimen = experiment.specimen
     size = np.ptp(specimen.mesh.rest, axis=0)
     air = specimen.air.plain
+    cut = Cut.of(experiment.recordings[0].rate, min(len(r.positions) for r in experiment.recordings))
+    every = "every frame" if cut.stride == 1 else f"every {cut.stride}th frame"
+    winds = [recording.wind.uncertainty for recording in experiment.recordings]
+    gain, direction, clock = (max(parts) for parts in zip(*winds, strict=True))
+    logged = (
+        "the wind at the flag is the same all over it, and the logged one within standard deviations of "
+        f"{number(100 * gain, digits=2)} % in speed, {number(math.degrees(direction), digits=2)}° in direction and "
+        f"{number(clock, digits=2)} s in time"
+    )
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
     places = "" if specimen.anchors_told else ", tied at their mean observed places"
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
@@ -132,7 +153,8 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
         f"it is held at {len(specimen.held)} points {held}{places}",
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
-        "the wind at the flag is the logged one and the same all over it",
+        logged,
+        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
         f"the coarse mesh of the fit alone may bias a strength by {100 * RESPONSE:.0f} %, which its interval includes",
         "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",

@@ -51,7 +51,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     known = [seen.known for seen in prepared]
     mesh, held = hold(mesh, _pins(known, setup, low))
     specimen = Specimen(
-        mesh=mesh, material=_material(known, setup), held=held,
+        mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known, held=held,
         anchors=anchors_of(recordings, mesh.rest[list(held)]), anchors_told=False,
         stiffness=_agreed([k.stiffness for k in known], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins"),
         gravity=(
@@ -133,7 +133,8 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
         found += surroundings.check_sides(recording)
         surroundings.check_accelerations(recording, specimen)
         found += surroundings.check_strength(recording, specimen)
-        found += inertia.check_inertia(recording, specimen)
+        if specimen.mass_known:
+            found += inertia.check_inertia(recording, specimen)
     attachment.check_places(experiment.recordings, specimen)
     return tuple(found)
 

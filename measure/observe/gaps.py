@@ -22,7 +22,7 @@ LONGEST = 0.12
 _TRACKED = 0.9  # of what is usual: a recording begins and ends with a frame in which so many markers were tracked
 _LEAST = 0.5  # of the frames: a marker that was tracked in fewer is left out
 _LOST = 0.5  # of the markers: a recording that loses more is refused
-_NEIGHBOURS = 8  # tracked markers that tell by an affine map where one of them is that was not
+_NEIGHBOURS = 12  # tracked markers that tell by a quadratic map where one among them is that was not
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,7 +70,7 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
 
     The recording is cut to begin and end with frames in which about as many markers were tracked as usually. A marker
     that was tracked in fewer than half of the frames is left out. A gap of up to `LONGEST` is filled by the cubic
-    spline through the marker's other frames. In a longer one, or one at an end, the marker is where the affine map of
+    spline through the marker's other frames. In a longer one, or one at an end, the marker is where the quadratic map of
     its tracked neighbours takes it, less what that is off by at the ends of the gap.
 
     Args:
@@ -147,11 +147,12 @@ def _filled(positions: Floats, there: NDArray[np.bool_], markers: Floats, longes
 
 
 def _carried(frame: Floats, there: NDArray[np.bool_], markers: Floats, near: NDArray[np.int64], marker: int) -> Floats:
-    """(3,) where the affine map of the nearest tracked markers takes a marker [m]."""
+    """(3,) where the quadratic map of the nearest tracked markers takes a marker [m]."""
     chosen = near[there[near]][:_NEIGHBOURS]
     arms = markers[chosen] - markers[marker]
-    basis = np.c_[np.ones(len(chosen)), arms]
-    solved, *_ = np.linalg.lstsq(basis, frame[chosen], rcond=1e-6)
+    u, v = (arms / np.abs(arms).max()).T
+    basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)
+    solved, *_ = np.linalg.lstsq(basis, frame[chosen], rcond=1e-3)
     return solved[0]
 
 

@@ -157,6 +157,7 @@ class Specimen:
     Attributes:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.
         material: nominal.
+        mass_known: whether its density is known about as well as a material's name tells it.
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
@@ -174,6 +175,7 @@ class Specimen:
     anchors: Floats
     stiffness: float = ARCSIM_STIFFNESS
     anchors_told: bool = True
+    mass_known: bool = True
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
 
