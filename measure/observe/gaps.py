@@ -69,9 +69,10 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     """Positions (frame, marker, 3) without their NaN.
 
     The recording is cut to begin and end with frames in which about as many markers were tracked as usually. A marker
-    that was tracked in fewer than half of the frames is left out. A gap of up to `LONGEST` is filled by the cubic
-    spline through the marker's other frames. In a longer one, or one at an end, the marker is where the quadratic map of
-    its tracked neighbours takes it, less what that is off by at the ends of the gap.
+    that was tracked in fewer than half of the frames is left out. A gap of up to `LONGEST`, or one with frames in which
+    hardly a marker was tracked, is filled by the cubic spline through the marker's other frames. In a longer one, or one
+    at an end, the marker is where the quadratic map of its tracked neighbours takes it, less what that is off by at the
+    ends of the gap.
 
     Args:
         markers: (marker, 2) rest coordinates [m].
@@ -133,7 +134,7 @@ def _filled(positions: Floats, there: NDArray[np.bool_], markers: Floats, longes
         spline = CubicSpline(index[seen], positions[seen, marker])
         for begin, end in _gaps(seen):
             inner = begin > 0 and end < len(seen)
-            if inner and end - begin <= longest:
+            if (inner and end - begin <= longest) or there[begin:end].sum(axis=1).min() < _NEIGHBOURS:
                 whole[begin:end, marker] = spline(index[begin:end])
                 continue
             ends = [frame for frame, real in ((begin - 1, begin > 0), (end, end < len(seen))) if real]

@@ -141,8 +141,8 @@ def test_frames_that_the_times_say_are_missing_are_interpolated(seen: Observatio
     observed = observe([cut], SETUP)
     assert {f.kind for f in observed.findings} == {"frames-missing", "markers-missing"}
     assert observed.experiment.recordings[0].positions.shape == seen.positions.shape
-    keep[50:56] = False
-    with pytest.raises(InputError, match="6 frames on end are missing"):
+    keep[50:70] = False
+    with pytest.raises(InputError, match="20 frames on end are missing"):
         observe([replace(seen, positions=seen.positions[keep], times=seen.times[keep])], SETUP)
 
 
