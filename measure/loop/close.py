@@ -1,7 +1,7 @@
 """Closing the loop on trajectories: from recordings to a verdict about what the base model lacks.
 
 The steps are those of the method: align, predict one horizon ahead, compare with nulls of other numerics, weigh the
-library's effects, judge, and run the chosen model again on what it was not fitted to.
+library's effects, judge, and run the refitted model on what it was not fitted to.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from flagdata.errors import UsageError
 from flagdata.provenance import code_version
 from measure.loop import bank as banks
 from measure.loop import supply
-from measure.loop.again import Fits, run_again
 from measure.loop.attribution import (
     EQUIVALENT,
     GUST_COLUMN,
@@ -40,24 +39,24 @@ from measure.loop.attribution import (
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration
 from measure.loop.comparison import LeftOut, Predictions, Trial, compare, folds, predict
 from measure.loop.course import ALONG
+from measure.loop.criteria import CRITERIA
 from measure.loop.field import corrective_field
 from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
 from measure.loop.reference import NullBank, Reference
 from measure.loop.refine import Refined
+from measure.loop.refit import Fits, refit
 from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
+from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.loop.words import assumptions, blowing, proposal, ratios, sentence, separating, shedding
-from measure.loop.yardstick import Yardstick
 from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
-_INTERVAL = 0.9
-_KINDS = 20
-FEWEST_NULLS = _KINDS * banks.BATCH
+FEWEST_NULLS = CRITERIA.simulated_kinds * banks.BATCH
 """So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
 
 
@@ -71,14 +70,14 @@ class Options:
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
-        workers: processes for the nulls, then threads for the models that are run again.
+        workers: processes for the nulls, then threads for the models that are refitted.
 
     Raises:
         UsageError: a level or counts that make no sense.
     """
 
     seed: int = 0
-    level: float = 0.03
+    level: float = CRITERIA.level
     nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1
@@ -115,16 +114,16 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
     reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
-    yardstick = Yardstick(
+    whitened = WhitenedMisfit(
         found=found, projection=projection, null=bank.model(setting.design).under(setting.prior), speeds=speeds
     )
-    evidence = yardstick.evidence(found)
-    fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
+    evidence = whitened.evidence(found)
+    fits = Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
     judgement = judge(evidence, reference, level=options.level)
     if judgement.conclusion is not Conclusion.SUFFICIENT:
         tell("before and after", 0, 1)
-        again = run_again(fits, reference, finalists(judgement), workers=options.workers)
-        judgement = judge(evidence, reference, level=options.level, again=again)
+        refits = refit(fits, reference, finalists(judgement), workers=options.workers)
+        judgement = judge(evidence, reference, level=options.level, refits=refits)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     if solved.doubtful and solved.doubtful == judgement.named[1:]:
         solved = replace(solved, judgement=alone(judgement, NOT_APART))
@@ -149,7 +148,7 @@ class Solved:
     @cached_property
     def evidence(self) -> Evidence:
         """Of the nominal model."""
-        return self.fits.yardstick.evidence(self.fits.yardstick.found)
+        return self.fits.whitened.evidence(self.fits.whitened.found)
 
     @property
     def base(self) -> Refined:
@@ -205,7 +204,7 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
 
 
 def _settled(solved: Solved, options: Options, tell: Stage) -> tuple[Judgement, Trial]:
-    """The judgement after the models were run again, with what they did."""
+    """The judgement after the models were refitted, with what they did."""
     judgement = solved.judgement
     if solved.doubtful:
         return withdrawn(judgement, NOT_APART), Trial()
@@ -270,14 +269,14 @@ def _verdict(
     setting, larger = solved.setting, solved.larger if judgement.named else None
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
-    rarity = solved.reference.rarity
-    low, high = rarity.interval(judgement.statistic, level=_INTERVAL)
+    tail = solved.reference.tail
+    low, high = tail.interval(judgement.statistic, level=CRITERIA.interval)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
-            statistic=judgement.statistic, null=[float(v) for v in rarity.null],
-            p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=_INTERVAL),
-            level=options.level, critical=rarity.critical(options.level), nulls=bank.words,
+            statistic=judgement.statistic, null=[float(v) for v in tail.null],
+            p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+            level=options.level, critical=tail.critical(options.level), nulls=bank.words,
         ),
         parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
         comparisons=trial.comparisons, apart=trial.control,
@@ -285,6 +284,7 @@ def _verdict(
         assumptions=assumptions(setting.experiment),
         provenance={
             "seed": options.seed, "code": code_version(),
+            "criteria": replace(CRITERIA, level=options.level).as_dict(),
             "parents": [r.source for r in setting.experiment.recordings if r.source],
         },
     )  # fmt: skip
@@ -301,7 +301,7 @@ def _proposal(solved: Solved, judgement: Judgement) -> str:
     larger = solved.larger if judgement.named else None
     left = None if larger is None else solved.fits.errors(larger)
     modes = corrective_field(
-        solved.setting, solved.fits.yardstick, left=left, beside=() if larger is None else larger.chosen
+        solved.setting, solved.fits.whitened, left=left, beside=() if larger is None else larger.chosen
     )
     field = proposal(modes, whole=larger is None)
     told = [] if judgement.line is None else [shedding(judgement.line)]

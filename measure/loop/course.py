@@ -24,14 +24,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.loop.criteria import CRITERIA
+
 Floats = NDArray[np.float64]
 
 ALONG, LEFT = 0, 1
 _WINDOW = 0.2
 """s: most of what a whipping edge does is slower, most of what noise does faster."""
-_LEAST_TURNED = 0.3
-_MOST_WITHIN = 2.0
-"""Beyond these, a course is not turbulence's: see above."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,8 +136,8 @@ class Variation:
         slow = self.whole[ALONG] - self.fast[ALONG]
         return bool(
             self.whole[ALONG] > 0
-            and self.whole[LEFT] >= _LEAST_TURNED**2 * self.whole[ALONG]
-            and self.fast[ALONG] <= _MOST_WITHIN * slow
+            and self.whole[LEFT] >= CRITERIA.least_turned**2 * self.whole[ALONG]
+            and self.fast[ALONG] <= CRITERIA.most_within * slow
         )
 
     @property
@@ -147,7 +146,7 @@ class Variation:
         if self.whole[ALONG] <= 0:
             return "the wind does not vary along its mean as it does in turbulence"
         turned = math.sqrt(max(self.whole[LEFT], 0.0) / self.whole[ALONG])
-        if turned < _LEAST_TURNED:
+        if turned < CRITERIA.least_turned:
             return f"the wind varies across its mean by {turned:.2g} of what it does along it, in turbulence 0.6 to 1"
         return (
             "the wind varies faster than turbulence does: more within two seconds than between stretches of two seconds"

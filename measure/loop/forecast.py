@@ -34,7 +34,7 @@ from measure.loop.columns import (
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.handles import Handles
-from sim.integrate.abreast import Abreast
+from sim.integrate.joint_batch import JointBatch
 from sim.integrate.split import SplitEuler
 from sim.scene import Scene, assemble
 from sim.state import State
@@ -372,14 +372,14 @@ class Forecaster:
     ) -> list[Tensor]:
         """The same of each parameter of `THETA`, then of each column.
 
-        All that are steps run abreast.
+        All that are steps run in one joint batch.
         """
         nominal = self.system(segments, calibrations)
         steps = [
             (size, self.system(segments, _moved(calibrations, place, size))) for place, (_, _, size) in enumerate(THETA)
         ]
         steps += [(column.step, column.system(*nominal)) for column in columns if isinstance(column, StepColumn)]
-        errors = self.errors_abreast([moved for _, moved in steps], segments)
+        errors = self.errors_jointly([moved for _, moved in steps], segments)
         changes = [(base - own) / size for own, (size, _) in zip(errors, steps, strict=True)]
         found = iter(changes[len(THETA) :])
         return [
@@ -392,18 +392,18 @@ class Forecaster:
             ),
         ]
 
-    def errors_abreast(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
+    def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
         """`errors` of each of some batches of the same segments.
 
-        They run abreast: small batches cost nearly as much as larger ones.
+        They run in one joint batch: small batches cost nearly as much as larger ones.
         """
         together = math.ceil(len(batches) * len(segments) / WIDEST)
         found: list[Tensor] = []
         for chosen in np.array_split(np.arange(len(batches)), together):
             copies = segments.select(list(range(len(segments))) * len(chosen))
-            abreast, start = Abreast.of([batches[place] for place in chosen])
+            joint, start = JointBatch.of([batches[place] for place in chosen])
             errors, _ = self._run(
-                partial(self.integrator.advance_abreast, abreast, duration=segments.period), start, copies
+                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, copies
             )
             found += errors.split(len(segments), dim=-1)
         return found

@@ -25,8 +25,8 @@ from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column, winds
 from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.lever import Lever
 from measure.loop.lines import Spectrum
+from measure.loop.moment import PoleMoment
 from measure.loop.wind_log import sensitivities
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Statistics:
         error: (segment,) mean squared prediction error [m²].
         marker_error: (segment, marker) the same of each marker.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
-        turning: the same of the errors' moment about the pole, see `lever`, its `error` in m⁸/s⁴; None where not
+        turning: the same of the errors' moment about the pole, see `pole_moment`, its `error` in m⁸/s⁴; None where not
             looked at.
         course: of the wind, as the errors tell it; None where not looked at.
         log: (segment, column, nuisance) how r moves with a prior standard deviation of what the wind's log may be off
@@ -134,7 +134,7 @@ class Projection:
         directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
         scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
         spectrum: what their periodograms are taken along; None where lines are not looked at.
-        lever: what their moments are taken by; None where they are not looked at.
+        pole_moment: what their moments are taken by; None where they are not looked at.
         turning: (segment, column, frame) the sensitivities' moments, of length 1.
         gauge: what the wind's course is told by; None where not looked at.
     """
@@ -142,7 +142,7 @@ class Projection:
     directions: Tensor
     scale: Tensor
     spectrum: Spectrum | None = None
-    lever: Lever | None = None
+    pole_moment: PoleMoment | None = None
     turning: Tensor | None = None
     gauge: Gauge | None = None
 
@@ -165,9 +165,9 @@ class Projection:
 
     def turned(self, errors: Tensor) -> Floats | None:
         """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
-        if self.lever is None or self.turning is None:
+        if self.pole_moment is None or self.turning is None:
             return None
-        moment = self.lever.moment(errors[None])[0].to(self.turning)
+        moment = self.pole_moment.moment(errors[None])[0].to(self.turning)
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def course(self, errors: Tensor) -> Course | None:
@@ -208,19 +208,19 @@ def projected(
     """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
     pieces: list[Projection] = []
-    levers: list[Lever] = []
+    pole_moments: list[PoleMoment] = []
     turning: list[Tensor] = []
     gauges: list[Gauge] = []
-    for found, changes, scale, lever, gauge in _pieces(forecaster, segments, calibrations, columns, log=True):
+    for found, changes, scale, pole_moment, gauge in _pieces(forecaster, segments, calibrations, columns, log=True):
         parts.append(found)
         pieces.append(Projection.along(changes, scale))
-        levers.append(lever)
-        turning.append(_moments(lever, changes)[1])
+        pole_moments.append(pole_moment)
+        turning.append(_moments(pole_moment, changes)[1])
         gauges.append(gauge)
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
-        lever=Lever.joined(levers), turning=torch.cat(turning), gauge=Gauge.joined(gauges),
+        pole_moment=PoleMoment.joined(pole_moments), turning=torch.cat(turning), gauge=Gauge.joined(gauges),
     )  # fmt: skip
     return Statistics.joined(parts), whole
 
@@ -232,8 +232,8 @@ def _pieces(
     columns: Sequence[Column],
     *,
     log: bool = False,
-) -> Iterator[tuple[Statistics, list[Tensor], Tensor, Lever, Gauge]]:
-    """Statistics of some segments at a time, with the sensitivities, the scale of the errors, lever and gauge.
+) -> Iterator[tuple[Statistics, list[Tensor], Tensor, PoleMoment, Gauge]]:
+    """Statistics of some segments at a time, with the sensitivities, the scale of the errors, pole_moment and gauge.
 
     Args:
         log: whether the wind was logged, so that what its log may be off by is looked at.
@@ -247,23 +247,29 @@ def _pieces(
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities((*columns, *winds()), own, starts, base)
         changes, blown = changes[: -len(winds())], changes[-len(winds()) :]
-        lever, scale = (
-            Lever.of(base, own, forecaster.specimen),
+        pole_moment, scale = (
+            PoleMoment.of(base, own, forecaster.specimen),
             error_scale(base, recording[chosen], noise, own.counted),
         )
         gauge = Gauge.of(blown, scale, period=own.period)
         found = replace(
             reduced(base, changes, recording[chosen], noise, own.counted),
             lines=_spectrum(forecaster, own).prominence(base),
-            turning=_turned(lever, base, changes, recording[chosen]), course=gauge.course(_over_scale(base, scale)),
+            turning=_turned(pole_moment, base, changes, recording[chosen]),
+            course=gauge.course(_over_scale(base, scale)),
         )  # fmt: skip
         if log:
-            found = _with_log(found, sensitivities(forecaster, own, starts, base), changes, scale, lever, gauge)
-        yield found, changes, scale, lever, gauge
+            found = _with_log(found, sensitivities(forecaster, own, starts, base), changes, scale, pole_moment, gauge)
+        yield found, changes, scale, pole_moment, gauge
 
 
 def _with_log(
-    found: Statistics, off: Sequence[Tensor], changes: Sequence[Tensor], scale: Tensor, lever: Lever, gauge: Gauge
+    found: Statistics,
+    off: Sequence[Tensor],
+    changes: Sequence[Tensor],
+    scale: Tensor,
+    pole_moment: PoleMoment,
+    gauge: Gauge,
 ) -> Statistics:
     """Statistics with how they move with what the wind's log may be off by.
 
@@ -273,8 +279,8 @@ def _with_log(
     """
     turning, course = found.turning, found.course
     if turning is not None:
-        moved = lever.moment(torch.stack(list(off))).double().permute(2, 0, 1)
-        along = _moments(lever, changes)[1] @ moved.transpose(1, 2)
+        moved = pole_moment.moment(torch.stack(list(off))).double().permute(2, 0, 1)
+        along = _moments(pole_moment, changes)[1] @ moved.transpose(1, 2)
         turning = replace(turning, log=along.cpu().numpy())
     if course is not None:
         course = replace(course, log=np.stack([gauge.course(_plain(own, scale)).score for own in off], axis=-1))
@@ -287,20 +293,22 @@ def _plain(changes: Tensor, scale: Tensor) -> Tensor:
     return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
-def _turned(lever: Lever, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]) -> Statistics:
+def _turned(
+    pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
+) -> Statistics:
     """Of moments of errors and sensitivities (frame, marker, 3, segment)."""
-    moment = lever.moment(base[None])[0].double()  # (frame, segment)
-    moved, directions = _moments(lever, changes)
-    size = ((moment * lever.scale) ** 2).mean(0).cpu().numpy()
+    moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
+    moved, directions = _moments(pole_moment, changes)
+    size = ((moment * pole_moment.scale) ** 2).mean(0).cpu().numpy()
     return Statistics(
         recording=recording, r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
         response=(directions @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
     )  # fmt: skip
 
 
-def _moments(lever: Lever, changes: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+def _moments(pole_moment: PoleMoment, changes: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
     """(segment, column, frame) of sensitivities (frame, marker, 3, segment); and of length 1, where there is any."""
-    moved = lever.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
+    moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
     return moved, moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
 
 

@@ -54,7 +54,7 @@ def sensitivities(
             for item in segments.items
         )
         batches.append(forecaster.system(replace(segments, items=items), calibrations))
-    errors = forecaster.errors_abreast(batches, segments)
+    errors = forecaster.errors_jointly(batches, segments)
     widths = np.array([item.wind.uncertainty for item in segments.items])  # (segment, nuisance)
     return [
         (base - own) / step * base.new_tensor(widths[:, place])

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from measure.loop.attribution import RESPONSE, unsteady
+from measure.loop.attribution import heterogeneous
 from measure.loop.columns import FieldColumn
 from measure.loop.course import ALONG, LEFT, Variation
+from measure.loop.criteria import CRITERIA
 from measure.loop.field import Mode
 from measure.loop.forecast import Cut
 from measure.loop.lines import STROUHAL, Line
@@ -62,12 +63,12 @@ def sentence(verdict: Verdict) -> str:
 def _incomplete(verdict: Verdict) -> str:
     """Why what is named is not enough."""
     for candidate in verdict.ranking:
-        if not candidate.why_not and unsteady(candidate):
+        if not candidate.why_not and heterogeneous(candidate):
             each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
             unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
             return (
                 f"fitted to each recording alone it is {each}{unit}, which differs by more than chance "
-                f"(p = {probability(candidate.steady)}): an effect that depends otherwise on the wind would fit better"
+                f"(p = {probability(candidate.heterogeneity)}): another dependence on the wind would fit better"
             )
     return "the errors that remain are larger than those of simulated nulls"
 
@@ -156,6 +157,6 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         logged,
         f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
-        f"the coarse mesh of the fit alone may bias a strength by {100 * RESPONSE:.0f} %, which its interval includes",
+        f"the coarse mesh of the fit may bias a strength by {100 * CRITERIA.response:.0f} %: its interval says so",
         "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
     )

@@ -70,9 +70,9 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
 
     The recording is cut to begin and end with frames in which about as many markers were tracked as usually. A marker
     that was tracked in fewer than half of the frames is left out. A gap of up to `LONGEST`, or one with frames in which
-    hardly a marker was tracked, is filled by the cubic spline through the marker's other frames. In a longer one, or one
-    at an end, the marker is where the quadratic map of its tracked neighbours takes it, less what that is off by at the
-    ends of the gap.
+    hardly a marker was tracked, is filled by the cubic spline through the marker's other frames. In a longer one, or
+    one at an end, the marker is where the quadratic map of its tracked neighbours takes it, less what that is off by at
+    the ends of the gap.
 
     Args:
         markers: (marker, 2) rest coordinates [m].

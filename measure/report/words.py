@@ -75,8 +75,8 @@ def _weighed(candidate: Candidate) -> str:
         f"held-out gain {gain} nat",
         f"p = {probability(candidate.leftover)} for the errors that remain with it",
     ]
-    if candidate.steady is not None:
-        parts.append(f"p = {probability(candidate.steady)} for the same strength in all recordings")
+    if candidate.heterogeneity is not None:
+        parts.append(f"p = {probability(candidate.heterogeneity)} for the same strength in all recordings")
     return _joined(parts)
 
 

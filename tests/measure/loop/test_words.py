@@ -34,7 +34,7 @@ def test_the_modes_that_are_told_best_are_said_first() -> None:
 def test_a_strength_that_is_another_in_every_recording_is_told_with_its_values() -> None:
     partly = verdict(Conclusion.PARTLY)
     assert "the errors that remain are larger than those of simulated nulls" in sentence(partly)
-    ranking = [replace(c, steady=None if c.why_not else 0.001) for c in partly.ranking]
+    ranking = [replace(c, heterogeneity=None if c.why_not else 0.001) for c in partly.ranking]
     said = sentence(replace(partly, ranking=tuple(ranking)))
     each = ", ".join(f"{e.value:.2g}" for e in next(c for c in ranking if not c.why_not).by_recording)
     assert f"fitted to each recording alone it is {each}" in said

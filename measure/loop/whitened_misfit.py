@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Yardstick:
+class WhitenedMisfit:
     """A squared distance of markers is mostly what the fit's mesh cannot show, and its bias by the mesh is larger than
     what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
 
