@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -48,10 +49,11 @@ from measure.loop.refine import Refined
 from measure.loop.refit import Fits, refit
 from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
-from measure.loop.statistics import projected
+from measure.loop.statistics import Projection, Statistics, projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 from measure.loop.whitened_misfit import WhitenedMisfit
-from measure.loop.words import assumptions, blowing, proposal, ratios, sentence, separating, shedding
+from measure.loop.wind_log import lags
+from measure.loop.words import assumptions, blowing, clocks, proposal, ratios, sentence, separating, shedding
 from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
@@ -107,9 +109,11 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     tell = stage or (lambda what, done, total: None)
     setting = Setting.of(experiment)
     tell("sensitivities", 0, 1)
-    found, projection = projected(
-        setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns()
-    )
+    found, projection = _looked_at(setting)
+    late = (0.0,) * len(setting.speeds) if found.course is None else lags(found.course, setting.segments)
+    if any(late):
+        setting = setting.moved(late)
+        found, projection = _looked_at(setting)
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
@@ -129,7 +133,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
         solved = replace(solved, judgement=alone(judgement, NOT_APART))
     judgement, trial = _settled(solved, options, tell)
     tell("before and after", 1, 1)
-    return _verdict(solved, judgement, bank, trial, options, began)
+    return _verdict(solved, judgement, bank, trial, options, began, late)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -195,6 +199,12 @@ class Solved:
                 if fitted is not None:
                     return wrong, fitted
         return None
+
+
+def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
+    """Errors of the nominal model along all columns, and the directions."""
+    starts = [setting.nominal] * len(setting.segments)
+    return projected(setting.forecaster, setting.segments, starts, banks.columns())
 
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
@@ -264,7 +274,13 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
 
 
 def _verdict(
-    solved: Solved, judgement: Judgement, bank: NullBank, trial: Trial, options: Options, began: float
+    solved: Solved,
+    judgement: Judgement,
+    bank: NullBank,
+    trial: Trial,
+    options: Options,
+    began: float,
+    late: Sequence[float],
 ) -> Verdict:
     setting, larger = solved.setting, solved.larger if judgement.named else None
     before = _unseen(setting, solved.base)
@@ -281,7 +297,7 @@ def _verdict(
         parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
         comparisons=trial.comparisons, apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
-        assumptions=assumptions(setting.experiment),
+        assumptions=(*assumptions(setting.experiment), *clocks(setting.experiment, late)),
         provenance={
             "seed": options.seed, "code": code_version(),
             "criteria": replace(CRITERIA, level=options.level).as_dict(),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,18 @@ class Setting:
         return Design(
             noise=float(self.segments.noise.max()), period=self.segments.period,
             cloth=self.experiment.specimen.material.fingerprint,
+        )  # fmt: skip
+
+    def moved(self, lags: Sequence[float]) -> Setting:
+        """With each recording's log moved by what it lags [s]."""
+        recordings = tuple(
+            replace(recording, wind=recording.wind.later(lag))
+            for recording, lag in zip(self.experiment.recordings, lags, strict=True)
+        )
+        items = tuple(replace(item, wind=recordings[item.recording].wind) for item in self.segments.items)
+        return replace(
+            self, experiment=replace(self.experiment, recordings=recordings),
+            segments=replace(self.segments, items=items),
         )  # fmt: skip
 
     @property

@@ -84,6 +84,16 @@ def ratios(experiment: Experiment) -> tuple[str, ...]:
     return (told,)
 
 
+def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
+    """By how much the logs of the wind were moved, as the errors told it [s]; nothing where none was."""
+    moved = [
+        f"{recording.name} by {number(lag, digits=2)} s"
+        for recording, lag in zip(experiment.recordings, late, strict=True)
+        if lag
+    ]
+    return (f"the log of the wind lags, as the motion tells it, and was moved: {', '.join(moved)}",) if moved else ()
+
+
 def separating(verdict: Verdict) -> str:
     """The cheapest experiment known that tells the named effects apart."""
     if verdict.conclusion is not Conclusion.ONE_OF:

@@ -43,7 +43,7 @@ METHOD = {
     "residuals": {"_SHOWN"},
     "statistics": {"_CHUNK", "_CLIP", "_NEVER", "_NOISE"},
     "tail_probability": {"_RESAMPLES"},
-    "wind_log": {"_STEPS"},
+    "wind_log": {"_STEPS", "_REACH", "_LAGS", "_CALM"},
 }
 """Numbers that say what is simulated, how errors are brought down and how it is shown; no verdict is decided by one."""
 PLAIN = {0, 1, 2, 3, -1}

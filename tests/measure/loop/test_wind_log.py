@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from measure.loop.columns import THETA, Calibration, library
-from measure.loop.forecast import Forecaster, Segments
+from measure.loop.course import Course
+from measure.loop.forecast import Cut, Forecaster, Segment, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.statistics import Statistics, projected
-from measure.loop.wind_log import by_recording, misread
+from measure.loop.wind_log import by_recording, lags, misread
 from measure.observe.trajectory import Floats, Trajectory, WindTrack
 
 COLUMNS = (next(c for c in library() if c.name == "lift.coefficient"),)
@@ -87,3 +88,33 @@ def test_a_forecast_never_compares_with_what_was_filled_in(forecaster: Forecaste
         segments = Segments.of([replace(own_recording, seen=seen, positions=positions)]).select([0])
         found.append(forecaster.errors(*forecaster.system(segments, [Calibration()]), segments).numpy())
     np.testing.assert_array_equal(found[0], found[1])
+
+
+@pytest.mark.parametrize("lag", [-0.45, 0.0, 0.3])
+def test_the_course_of_a_log_that_lags_tells_by_how_much(lag: float) -> None:
+    period, count, window = 0.04, 10, 5
+    fine = np.arange(-3.0, 16.0, 0.1)
+    speed = 5 + 0.7 * np.sin(2 * np.pi * 0.3 * fine) + 0.4 * np.sin(2 * np.pi * 0.17 * fine + 1)
+    log = WindTrack(times=fine, velocity=np.stack([speed, 0 * speed, 0 * speed], axis=1))
+    cut = Cut(stride=1, period=period, warm=6, length=count * window)
+    items = tuple(
+        Segment(recording=0, start=place * 2.0, positions=np.zeros((cut.length + 8, 1, 3)), wind=log, noise=0.0)
+        for place in range(4)
+    )
+    segments = Segments(items=items, markers=np.zeros((1, 2)), cut=cut)
+    frames = (segments.first + np.arange(cut.length)) * period
+    value = np.zeros((4, count, 3))
+    for place, item in enumerate(items):
+        times = item.start + frames
+        share = log.at(times + lag)[:, 0] / log.at(times)[:, 0] - 1
+        value[place, :, 0] = share.reshape(count, window).mean(axis=1)
+    value += 0.01 * np.random.default_rng(0).standard_normal(value.shape)
+    course = Course(score=50 * value, curvature=np.broadcast_to(50 * np.eye(3), (4, count, 3, 3)))
+    # Noise of 1 % in 40 windows against a slope of 25 % a second: known to some 0.01 s.
+    assert lags(course, segments) == pytest.approx((lag,), abs=0.03)
+
+
+def test_a_steady_wind_tells_no_lag(own_recording: Trajectory) -> None:
+    segments = Segments.of([own_recording])
+    course = Course(score=np.ones((len(segments), 10, 3)), curvature=np.ones((len(segments), 10, 3, 3)))
+    assert lags(course, segments) == (0.0,)
