@@ -197,7 +197,7 @@ def test_a_wind_in_other_units_by_far_is_told_or_refused(seen: Observation):
 
 def test_slow_motion_played_as_if_real_is_refused(seen: Observation):
     with pytest.raises(InputError, match="slow motion"):
-        observe([replace(seen, times=seen.times * 20.0)], SETUP)
+        observe([replace(seen, times=seen.times * 5.0)], SETUP)
 
 
 def test_rest_coordinates_upside_down_are_told(seen: Observation):
