@@ -58,6 +58,10 @@ class TimeError(FlagdataError):
     kind = "time"
 
 
+class ZoneMissingError(TimeError):
+    """Stamps of a wall clock whose zone nobody named."""
+
+
 class NotFoundError(FlagdataError):
     """An artifact, ref, file or row that is not there."""
 

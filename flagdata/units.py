@@ -37,6 +37,8 @@ UNITS: dict[str, Unit] = {
     "km/h": Unit(si="m/s", scale=1 / 3.6),
     "kn": Unit(si="m/s", scale=1852 / 3600),
     "mph": Unit(si="m/s", scale=0.44704),
+    "dm/s": Unit(si="m/s", scale=0.1),
+    "cm/s": Unit(si="m/s", scale=0.01),
     "ft/s": Unit(si="m/s", scale=0.3048),
     "ft/min": Unit(si="m/s", scale=0.3048 / 60),
     "rad": Unit(si="rad", scale=1.0),
@@ -65,6 +67,7 @@ UNITS: dict[str, Unit] = {
 SPELLINGS: dict[str, str] = {
     "mps": "m/s", "ms-1": "m/s", "m.s-1": "m/s", "m/sec": "m/s", "meters/sec": "m/s", "meter/sec": "m/s",
     "meters/second": "m/s", "meter/second": "m/s", "metres/second": "m/s", "metre/second": "m/s", "metres/sec": "m/s",
+    "0.1m/s": "dm/s", "0,1m/s": "dm/s", "cms-1": "cm/s", "cm.s-1": "cm/s", "cm/sec": "cm/s",
     "m+1s-1": "m/s", "meterspersecond": "m/s",
     "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h", "kmh-1": "km/h", "km.h-1": "km/h",
     "kilometers/hour": "km/h", "kilometres/hour": "km/h",

@@ -20,9 +20,8 @@ from flagdata.errors import CorruptError, InputError
 from flagdata.rng import torch_generator
 from models.crops import Cropping
 from models.frontend import FrontEnd
-from models.learner import Learner, Loss
+from models.learner import Learner, Loss, build
 from models.outliers import Familiarity
-from models.registry import NETWORKS
 from models.storage import WEIGHTS, read_card, read_tensors
 from models.targets import TARGETS, Target
 
@@ -179,11 +178,8 @@ def load(folder: Path) -> Estimator:
         for place in range(int(card.get("members", 1))):
             prefix = f"{place}." if "members" in card else ""
             own = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
-            options = {
-                key: tuple(value) if isinstance(value, list) else value for key, value in network["options"].items()
-            }
-            learner = Learner(
-                NETWORKS[network["name"]](**options), loss=Loss(loss["name"]), targets=tuple(loss["targets"]),
+            learner = build(
+                network["name"], network["options"], loss=Loss(loss["name"]), targets=tuple(loss["targets"]),
                 components=loss["components"], margin=loss["margin"],
             )  # fmt: skip
             learner.load_state_dict(

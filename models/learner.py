@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -10,6 +12,7 @@ from torch import Tensor, nn
 from flagdata.errors import InputError
 from models.losses import contrastive_loss
 from models.mixture import Mixture, MixtureHead
+from models.registry import NETWORKS
 from models.targets import Scaling
 
 
@@ -117,3 +120,28 @@ class Learner(nn.Module):
 
     def _values(self, learned: Tensor) -> Tensor:
         return self.scaling.values(learned) if self.objective is Loss.POSTERIOR else learned
+
+
+def build(
+    network: str, options: Mapping[str, Any], *, loss: Loss, targets: tuple[str, ...], components: int, margin: float
+) -> Learner:
+    """A named network with its head, its weights drawn by torch's generator as it stands.
+
+    Args:
+        network: name in `models.registry.NETWORKS`.
+        options: the network's own; lists, as JSON and TOML have them, stand for tuples.
+        loss, targets, components, margin: see `Learner`.
+
+    Raises:
+        UnknownNameError: no such network.
+        InputError: options that the network does not take, or targets that do not go with the loss.
+    """
+    given = {key: tuple(value) if isinstance(value, list) else value for key, value in options.items()}
+    try:
+        built = NETWORKS[network](**given)
+    except TypeError as error:
+        raise InputError(
+            f"the network {network} does not take that: {error}", where="[network]",
+            fix="see its docstring for what it takes",
+        ) from None  # fmt: skip
+    return Learner(built, loss=loss, targets=targets, components=components, margin=margin)

@@ -1,54 +1,12 @@
-"""Losses: physical similarity by contrast, regression of wind and material, likelihood of a mixture."""
+"""The contrastive loss, which learns physical similarity; what a head's own loss is, `models.learner` says."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 from torch.nn.functional import pdist
 
 from flagdata.errors import InputError
-from models.mixture import Mixture
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Standardisation:
-    """Means and standard deviations of targets over the training set, which make their losses comparable.
-
-    Attributes:
-        mean: (targets,), in the targets' own units.
-        deviation: (targets,), likewise, above 0.
-    """
-
-    mean: Tensor
-    deviation: Tensor
-
-    def __post_init__(self) -> None:
-        if self.mean.ndim != 1 or self.mean.shape != self.deviation.shape:
-            raise InputError(
-                f"means of shape {tuple(self.mean.shape)} and deviations of {tuple(self.deviation.shape)}",
-                fix="give one of each for every target",
-            )
-        if not bool((self.deviation > 0).all()) or not bool(torch.isfinite(self.mean).all()):
-            raise InputError(
-                "a target that is constant or not finite in the training set cannot be learned",
-                where=f"means {self.mean.tolist()}, deviations {self.deviation.tolist()}",
-                fix="leave that target out, or widen its range in the data set",
-            )
-
-    @classmethod
-    def of(cls, targets: Tensor) -> Standardisation:
-        """Measure targets (n, targets) of the training set."""
-        return cls(mean=targets.mean(dim=0), deviation=targets.std(dim=0, correction=0))
-
-    def standardised(self, targets: Tensor) -> Tensor:
-        """Return targets (…, targets) less their mean, over their deviation."""
-        return (targets - self.mean) / self.deviation
-
-    def restored(self, standardised: Tensor) -> Tensor:
-        """Return standardised targets (…, targets) in their own units."""
-        return standardised * self.deviation + self.mean
 
 
 def contrastive_loss(
@@ -100,45 +58,3 @@ def contrastive_loss(
     if positive_share is None:
         return (pulled.sum() + pushed.sum()) / len(positive)
     return positive_share * pulled.mean() + (1 - positive_share) * pushed.mean()
-
-
-def regression_loss(
-    prediction: Tensor, target: Tensor, *, standardisation: Standardisation, weights: Tensor | None = None
-) -> Tensor:
-    """Mean squared error of standardised targets: of the wind speed, of material parameters, or of both together.
-
-    Wind speed [m/s] is linear in its range. Material parameters that are positive and span a decade (bending) are to be
-    given as logarithms. Each target counts alike: an error of one standard deviation of the training set costs 1.
-
-    Args:
-        prediction: (n, targets), standardised, as a linear head gives it.
-        target: (n, targets), in the targets' own units.
-        standardisation: of the training set.
-        weights: (targets,), not negative, of which only the ratios matter; None for equal ones.
-
-    Raises:
-        InputError: sizes that differ, or weights that are negative or all zero.
-    """
-    targets = len(standardisation.mean)
-    if prediction.shape != target.shape or target.shape[-1] != targets or target.ndim != 2:
-        raise InputError(
-            f"predictions of shape {tuple(prediction.shape)} for targets of shape {tuple(target.shape)}",
-            fix=f"give (n, {targets}) of both",
-        )
-    error = (prediction - standardisation.standardised(target)).square().mean(dim=0)
-    if weights is None:
-        return error.mean()
-    if weights.shape != (targets,) or bool((weights < 0).any()) or not bool(weights.sum() > 0):
-        raise InputError(f"weights {weights.tolist()}", fix=f"give {targets} numbers, none negative, not all zero")
-    return (weights * error).sum() / weights.sum()
-
-
-def negative_log_likelihood(mixture: Mixture, target: Tensor, *, standardisation: Standardisation) -> Tensor:
-    """Mean of −log p(standardised target) under the mixtures of a batch [nats].
-
-    Args:
-        mixture: of n clips, of standardised targets.
-        target: (n, targets), in the targets' own units.
-        standardisation: of the training set.
-    """
-    return -mixture.log_prob(standardisation.standardised(target)).mean()

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from flagdata.align.apart import by_offset
 from flagdata.align.clock import ClockModel
 from flagdata.align.motion import MotionSeries, motion_energy
+from flagdata.align.present import find_made, provenance
 from flagdata.dataset.clips import clip_rows
-from flagdata.errors import ConflictError, InputError, UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
-from flagdata.provenance import canonical, code_version, recipe_hash
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
 from flagdata.record.parent import open_parent
@@ -90,6 +90,11 @@ class Pair:
             artifacts.append(artifact)
         records = [open_parent(lake, str(artifact.object)) for artifact in artifacts]
         return cls(camera=artifacts[0], wind=artifacts[1], camera_record=records[0], wind_record=records[1])
+
+    @property
+    def parents(self) -> dict[str, Artifact]:
+        """Both artifacts by what they are, in the order of a recording's parents."""
+        return {"camera": self.camera, "wind": self.wind}
 
     @property
     def span(self) -> tuple[int, int]:
@@ -186,19 +191,12 @@ def find_recording(
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
     """
-    rows = lake.rows(f"kind = 'recording' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
-    for row in rows:
-        if list(row["parents"]) == [pair.camera.id, pair.wind.id]:
-            artifact = Artifact.from_row(row)
-            for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
-                if asked is not None and asked != kept:
-                    raise ConflictError(
-                        f"the recording is there already with the {label} {kept!r}",
-                        where=artifact.id,
-                        fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
-                    )
-            return RecordingResult(recording=artifact, clips=_clips_of(lake, artifact, branch), created=False)
-    return None
+    artifact = find_made(
+        lake, Kind.RECORDING, pair.parents, recipe, what="recording", name=name, session=session, branch=branch
+    )
+    if artifact is None:
+        return None
+    return RecordingResult(recording=artifact, clips=_clips_of(lake, artifact, branch), created=False)
 
 
 def make_recording(
@@ -278,13 +276,7 @@ def _write(
 ) -> None:
     source, clock = pair.camera_record, alignment.clock
     metadata: dict[str, Mapping[str, str]] = {
-        PROVENANCE: {
-            "camera": pair.camera.id,
-            "wind": pair.wind.id,
-            "recipe": canonical(alignment.recipe),
-            "recipe_hash": recipe_hash(alignment.recipe),
-            "code_version": code_version(),
-        },
+        PROVENANCE: provenance(pair.parents, alignment.recipe),
         f"{CLOCK}/{clock.device}": {"model": clock.to_json()},
     }
     if CAMERA in source.metadata:

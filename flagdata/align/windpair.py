@@ -14,9 +14,9 @@ from typing import Any
 
 from flagdata.align.clock import NINETY
 from flagdata.align.logs import LogClock
-from flagdata.errors import ConflictError, InputError, UsageError
+from flagdata.align.present import find_made, provenance
+from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
-from flagdata.provenance import canonical, code_version, recipe_hash
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import PROVENANCE
 from flagdata.schema import Kind
@@ -61,6 +61,11 @@ class WindPair:
         return cls(reference=found[0], sensor=found[1], reference_series=series[0], sensor_series=series[1])
 
     @property
+    def parents(self) -> dict[str, Artifact]:
+        """Both artifacts by what they are, in the order of an aligned log's parents."""
+        return {"reference": self.reference, "sensor": self.sensor}
+
+    @property
     def names(self) -> tuple[str, str]:
         return self.reference.name, self.sensor.name
 
@@ -73,18 +78,9 @@ def find_aligned(
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
     """
-    rows = lake.rows(f"kind = 'wind' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
-    for row in rows:
-        if list(row["parents"]) == [pair.reference.id, pair.sensor.id]:
-            artifact = Artifact.from_row(row)
-            for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
-                if asked is not None and asked != kept:
-                    raise ConflictError(
-                        f"the aligned log is there already with the {label} {kept!r}", where=artifact.id,
-                        fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
-                    )  # fmt: skip
-            return artifact
-    return None
+    return find_made(
+        lake, Kind.WIND, pair.parents, recipe, what="aligned log", name=name, session=session, branch=branch
+    )
 
 
 def make_aligned(
@@ -104,15 +100,7 @@ def make_aligned(
         session: one set-up at one place; the sensor's if `None`.
     """
     clock, own = found.model, pair.sensor_series.time
-    metadata = {
-        PROVENANCE: {
-            "reference": pair.reference.id,
-            "sensor": pair.sensor.id,
-            "recipe": canonical(recipe),
-            "recipe_hash": recipe_hash(recipe),
-            "code_version": code_version(),
-        }
-    }
+    metadata = {PROVENANCE: provenance(pair.parents, recipe)}
     with lake.transaction(f"align {pair.sensor.name} with {pair.reference.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata=metadata) as record:

@@ -66,7 +66,9 @@ from flagdata.errors import UsageError
 @click.option(
     "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
 )
-@click.option("--date-order", type=click.Choice(["dmy", "mdy"]), help="Wind: of dates written with numbers only.")
+@click.option(
+    "--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: of dates written with numbers only."
+)
 @click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
 @click.option("--talker", metavar="ID", help="Wind: of NMEA 0183, where several instruments share a stream.")
 @click.option(

@@ -104,8 +104,11 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
             click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
             click.echo(f"    to say: {doubt}")
+        for need in guess["needs"]:
+            click.echo(f"    to say when it is ingested: {need}")
         if guess["draft"]:
-            state = "complete it where it says ?" if guess["doubts"] else "nothing is missing"
+            unfinished = guess["doubts"] or guess["kind"] == "other"
+            state = "complete it where it says ?" if unfinished else "nothing is missing"
             click.echo(f"    the recipe ({state}; name it by --recipe FILE.toml to change anything):")
             click.echo("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
     if "problem" in entry:

@@ -123,6 +123,7 @@ def _guess(guess: Guess) -> dict[str, Any]:
         "draft": guess.draft,
         "notes": list(guess.notes),
         "doubts": list(guess.doubts),
+        "needs": list(guess.needs),
         "winds": list(guess.winds),
     }
 

@@ -25,7 +25,7 @@ from flagdata.recipes import Shelf, parsed
 from flagdata.tables import Table
 from models.crops import Cropping
 from models.frontend import FrontEnd, Maps
-from models.learner import Learner, Loss
+from models.learner import Learner, Loss, build
 from models.registry import NETWORKS
 from models.targets import TARGETS
 
@@ -156,15 +156,11 @@ class TrainingRecipe:
         Raises:
             InputError: options that the network does not take.
         """
-        try:
-            network = NETWORKS[self.network.name](**self.network.options)
-        except TypeError as error:
-            raise InputError(
-                f"the network {self.network.name} does not take that: {error}", where="[network]",
-                fix="see its docstring for what it takes",
-            ) from None  # fmt: skip
         loss = self.loss
-        return Learner(network, loss=loss.name, targets=loss.targets, components=loss.components, margin=loss.margin)
+        return build(
+            self.network.name, self.network.options, loss=loss.name, targets=loss.targets, components=loss.components,
+            margin=loss.margin,
+        )  # fmt: skip
 
     @cached_property
     def hash(self) -> str:
@@ -231,7 +227,7 @@ def _network(table: Table, front_end: FrontEnd) -> NetworkSpec:
             fix=f'write maps = "{takes}" in [input]',
         )  # fmt: skip
     options = {
-        key.replace("-", "_"): tuple(value) if isinstance(value, list) else value
+        key.replace("-", "_"): value
         for key, value in ((key, table.value(key)) for key in table.names() if key != "name")
     }
     return NetworkSpec(name=name, options=options)

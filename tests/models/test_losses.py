@@ -1,15 +1,17 @@
-"""Losses against values worked out by hand, and their gradients against finite differences."""
+"""Losses of heads and pairs against values worked out by hand, and their gradients against finite differences."""
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 import pytest
 import torch
+from torch import Tensor, nn
 
 from flagdata.errors import InputError
-from models.losses import Standardisation, contrastive_loss, negative_log_likelihood, regression_loss
-from models.mixture import Mixture
+from models.learner import Learner, Loss
+from models.losses import contrastive_loss
 
 SEEDS = torch.tensor([1, 1, 2, 3])
 
@@ -67,55 +69,60 @@ def test_a_batch_without_positive_or_negative_pairs_is_an_error() -> None:
         contrastive_loss(embedding(), SEEDS[:3])
 
 
-def standardisation() -> Standardisation:
-    return Standardisation(mean=torch.tensor([5.0, 0.2]), deviation=torch.tensor([2.0, 0.1]))
+class Passing(nn.Module):
+    """A network whose embedding is what it is given."""
+
+    dimension = 2
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        return inputs
+
+
+def regression() -> Learner:
+    """A learner of two targets whose head passes the embedding on; means 5 and 0.2, deviations 2 and 0.1."""
+    learner = Learner(Passing(), loss=Loss.REGRESSION, targets=("wind_speed", "density"))
+    assert isinstance(learner.head, nn.Linear)
+    with torch.no_grad():
+        learner.head.weight.copy_(torch.eye(2))
+        learner.head.bias.zero_()
+    learner.fit_scale(torch.tensor([[3.0, 0.1], [7.0, 0.3]]))
+    return learner
 
 
 def test_the_regression_loss_counts_errors_in_deviations_of_the_training_set() -> None:
-    """Errors of 1 and 0 deviations of the first target, 2 and 0 of the second: means 0.5 and 2."""
+    """Errors of 1 and 0 deviations of the first target, 2 and 0 of the second: means of squares 0.5 and 2."""
     target = torch.tensor([[5.0, 0.2], [7.0, 0.3]])
-    prediction = torch.tensor([[1.0, 2.0], [1.0, 1.0]])
-    loss = regression_loss(prediction, target, standardisation=standardisation())
-    assert loss.item() == pytest.approx(1.25, rel=1e-5)
-    weighed = regression_loss(prediction, target, standardisation=standardisation(), weights=torch.tensor([3.0, 1.0]))
-    assert weighed.item() == pytest.approx((3 * 0.5 + 2) / 4, rel=1e-5)
+    embedding = torch.tensor([[1.0, 2.0], [1.0, 1.0]])
+    assert regression().loss(embedding, target, torch.arange(2)).item() == pytest.approx(1.25, rel=1e-5)
 
 
 def test_predicting_the_training_mean_costs_one() -> None:
-    target = torch.randn(50, 2, generator=torch.Generator().manual_seed(3), dtype=torch.float64) * 7 - 3
-    loss = regression_loss(torch.zeros_like(target), target, standardisation=Standardisation.of(target))
-    assert loss.item() == pytest.approx(1)
+    target = torch.randn(50, 2, generator=torch.Generator().manual_seed(3)) * 7 - 3
+    learner = regression()
+    learner.fit_scale(target)
+    assert learner.loss(torch.zeros_like(target), target, torch.arange(50)).item() == pytest.approx(1, rel=1e-5)
 
 
-def test_standardising_is_undone() -> None:
-    scale = standardisation()
-    target = torch.tensor([[3.0, 0.15]])
-    torch.testing.assert_close(scale.restored(scale.standardised(target)), target)
+def test_what_a_regression_tells_is_in_the_targets_units() -> None:
+    told = regression().told(torch.tensor([[1.0, -1.0]]))
+    torch.testing.assert_close(told, torch.tensor([[7.0, 0.1]]))
 
 
-def test_gradients_of_the_regression_loss_agree_with_finite_differences() -> None:
-    target = torch.tensor([[4.0, 0.3]], dtype=torch.float64)
-    prediction = torch.tensor([[0.3, -0.2]], dtype=torch.float64, requires_grad=True)
-    scale = Standardisation(mean=target[0] - 1, deviation=target[0])
-    weights = torch.tensor([1.0, 3.0], dtype=torch.float64)
-    assert torch.autograd.gradcheck(
-        lambda p: regression_loss(p, target, standardisation=scale, weights=weights), prediction
-    )
+def test_the_posterior_loss_is_the_mean_negative_log_likelihood_of_standardised_logits() -> None:
+    """One component at zero with unit deviation, targets one deviation from their mean: ½ log 2π + ½ a dimension."""
+    learner = Learner(Passing(), loss=Loss.POSTERIOR, targets=("wind_speed",), components=1)
+    values = torch.tensor([[4.0], [9.0]])
+    learner.fit_scale(values)
+    with torch.no_grad():
+        for parameter in learner.head.parameters():
+            parameter.zero_()
+    mixture = learner.mixture(torch.zeros(1, 2))
+    scale = mixture.factor.flatten().item()
+    assert mixture.location.abs().max().item() == 0
+    found = learner.loss(torch.zeros(2, 2), values, torch.arange(2)).item()
+    assert found == pytest.approx(0.5 * 1.8378771 + math.log(scale) + 0.5 / scale**2, rel=1e-5)
 
 
-def test_the_likelihood_is_of_standardised_targets() -> None:
-    """A standard normal mixture at one deviation from the mean: ½ log 2π + ½, in one dimension."""
-    mixture = Mixture(log_weight=torch.zeros(2, 1), location=torch.zeros(2, 1, 1), factor=torch.ones(2, 1, 1, 1))
-    scale = Standardisation(mean=torch.tensor([5.0]), deviation=torch.tensor([2.0]))
-    loss = negative_log_likelihood(mixture, torch.tensor([[7.0], [3.0]]), standardisation=scale)
-    assert loss.item() == pytest.approx(0.5 * 1.8378771 + 0.5, rel=1e-6)
-
-
-def test_unfit_targets_are_errors() -> None:
-    scale = standardisation()
-    with pytest.raises(InputError, match="leave that target out"):
-        Standardisation.of(torch.tensor([[1.0, 2.0], [1.0, 3.0]]))
-    with pytest.raises(InputError, match=r"give \(n, 2\)"):
-        regression_loss(torch.zeros(3, 1), torch.zeros(3, 2), standardisation=scale)
-    with pytest.raises(InputError, match="none negative"):
-        regression_loss(torch.zeros(3, 2), torch.zeros(3, 2), standardisation=scale, weights=torch.tensor([1.0, -1.0]))
+def test_a_target_of_one_value_is_an_error() -> None:
+    with pytest.raises(InputError, match="leave it out"):
+        regression().fit_scale(torch.tensor([[1.0, 2.0], [1.0, 3.0]]))

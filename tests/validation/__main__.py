@@ -8,14 +8,18 @@ from tests.validation.page import draw_page
 VALIDATIONS = {
     "arcsim": "tests.validation.arcsim",
     "arcsim-loop": "tests.validation.arcsim_loop",
+    "clip-information": "tests.validation.clip_information",
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
+    "gate": "tests.validation.gate",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",
+    "refinement": "tests.validation.refinement",
     "renderers": "tests.validation.renderers",
+    "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
 }
 

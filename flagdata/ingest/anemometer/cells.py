@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from flagdata.ingest.anemometer.recipe import MISSING
+from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 
 _NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?$"
 _INFINITE = r"^[+-]?(inf|infinity|1\.#inf0*)$"
@@ -41,14 +41,20 @@ class Numbers:
     state: NDArray[np.uint8]
 
 
-def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missing: Sequence[str] = ()) -> Numbers:
+def numbers(
+    cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missing: Sequence[str] = (), suffix: str = ""
+) -> Numbers:
     """Read a column of cells.
 
     Args:
         decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
+        suffix: what stands behind each number, such as its unit; a number without it is unreadable.
     """
     text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
+    if suffix:
+        text = _without(text, suffix)
+    written = text
     if decimal == ",":
         pointed = pc.match_substring(text, ".")
         text = pc.if_else(pointed, "?", pc.replace_substring(text, ",", "."))
@@ -61,7 +67,7 @@ def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missin
         absent = pc.is_in(lower, pa.array([*MISSING, *missing], pa.string()))
         endless = pc.match_substring_regex(lower, _INFINITE)
         state[~_mask(readable)] = Cell.UNREADABLE
-        state[_mask(absent)] = Cell.MISSING
+        state[_mask(pc.or_(absent, pc.match_substring_regex(written, MISSING_SIGNS)))] = Cell.MISSING
         state[_mask(endless)] = Cell.INFINITE
         parsed = pc.cast(pc.if_else(readable, text, None), pa.float64())
     value = parsed.to_numpy(zero_copy_only=False).astype(np.float64)
@@ -71,6 +77,13 @@ def numbers(cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missin
         state[(value == code) & (state == Cell.NUMBER)] = Cell.MISSING
     value[state != Cell.NUMBER] = np.nan
     return Numbers(value=value, state=state)
+
+
+def _without(text: pa.StringArray, suffix: str) -> pa.StringArray:
+    """Trimmed cells without the suffix that each number must have; numbers without it become "?"."""
+    known = pc.ends_with(text, suffix)
+    bare = pc.utf8_trim_whitespace(pc.if_else(known, pc.utf8_slice_codeunits(text, 0, -len(suffix)), text))
+    return pc.if_else(pc.and_(pc.invert(known), pc.match_substring_regex(bare, r"\d")), "?", bare)
 
 
 def _mask(array: pa.BooleanArray) -> NDArray[np.bool_]:

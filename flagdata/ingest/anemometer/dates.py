@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer.stamps import DAY, parse
@@ -39,12 +40,12 @@ class Decision:
         return self.separator.join({"y": year, "m": "%m", "d": "%d"}[letter] for letter in self.order)
 
 
-def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: str) -> Decision:
+def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
     """The order in which dates at the start of `texts` are written.
 
     Evidence: a number above 12 is a day; where there is none, points between the numbers (every locale of the Unicode
     CLDR that writes them so puts the day first), or the order in which the log moves on by less than two days between
-    rows while the other jumps.
+    rows while the other jumps. Years of two digits may also stand first, between hyphens ("26-03-14").
 
     Args:
         told: the user's word; refused when a date contradicts it.
@@ -56,7 +57,7 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
     year_first = [text.strip() for text in dated if _ISO.match(text)]
     if len(year_first) * 2 > len(dated):
         first = year_first[0]
-        if told is not None:
+        if told not in (None, "ymd"):
             raise TimeError(f"dates are not {told}, but {first[:10]}", where=where, fix="leave out --date-order")
         return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
     parts = [match for text in dated if (match := _PARTS.match(text))]
@@ -65,6 +66,11 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
     separator, long_year = parts[0][2], len(parts[0][4]) == 4
     first = np.array([int(match[1]) for match in parts])
     second = np.array([int(match[3]) for match in parts])
+    if not long_year and (told == "ymd" or (told is None and separator == "-")):
+        third = np.array([int(match[4]) for match in parts])
+        found = _short_year_first(first, second, third, told=told, separator=separator, text=dated[0], where=where)
+        if found is not None:
+            return found
     days_first, days_second = int((first > 12).sum()), int((second > 12).sum())
     if days_first and days_second:
         raise TimeError(
@@ -80,6 +86,8 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
                 f"dates are not {told}: {reason}", where=where, fix=f"leave out --date-order, it is {order}"
             )
         return Decision(order=order, separator=separator, long_year=long_year, reason=reason)
+    if told == "ymd":
+        raise TimeError("years of four digits do not come first here", where=where, fix="give --date-order dmy or mdy")
     if told is not None:
         return Decision(order=told, separator=separator, long_year=long_year, reason=f"the date order {told} was given")
     if separator == ".":
@@ -95,6 +103,36 @@ def decide(texts: Sequence[str], *, told: Literal["dmy", "mdy"] | None, where: s
     raise TimeError(
         f"{dated[0].strip()[:10]} may be day/month or month/day, and nothing in the log tells", where=where,
         fix="give --date-order dmy or mdy",
+    )  # fmt: skip
+
+
+def _short_year_first(
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    third: NDArray[np.int64],
+    *,
+    told: Order | None,
+    separator: str,
+    text: str,
+    where: str,
+) -> Decision | None:
+    """That dates are year, month, day with years of two digits; `None` where they are not.
+
+    Raises:
+        TimeError: they may be, and as well day, month, year.
+    """
+    possible = bool(np.all((second >= 1) & (second <= 12) & (third >= 1) & (third <= 31)))
+    if told == "ymd" or (possible and bool((first > 31).any() or (first < 1).any())):
+        reason = "the date order ymd was given" if told else "first numbers are no days"
+        return Decision(order="ymd", separator=separator, long_year=False, reason=reason)
+    if not possible or len(set(first.tolist())) > len(set(third.tolist())):
+        return None
+    if len(set(third.tolist())) > len(set(first.tolist())):
+        reason = "the last number of the dates changes more often than the first"
+        return Decision(order="ymd", separator=separator, long_year=False, reason=reason)
+    raise TimeError(
+        f"{text.strip()[:8]} may be year-month-day or day-month-year, and nothing in the log tells", where=where,
+        fix="give --date-order ymd or dmy",
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform
 from flagdata.ingest.anemometer import recipe as recipes
@@ -69,14 +69,19 @@ class Delimited:
             raise UsageError("the format delimited needs a recipe", where=where, fix="name one by --recipe")
         if proposal.doubts:
             what = "; ".join(doubt.what for doubt in proposal.doubts)
-            raise InputError(what, where=where, fix="; ".join(doubt.fix for doubt in proposal.doubts))
+            open_needs = [need.fix for need in proposal.needs if need.without(options)]
+            raise InputError(what, where=where, fix="; ".join([*(doubt.fix for doubt in proposal.doubts), *open_needs]))
         if len(proposal.winds) > 1 and options.wind is None:
             names = ", ".join(proposal.winds)
             raise InputError(
                 f"the file holds {len(proposal.winds)} anemometers: {names}", where=where,
                 fix=f"name the one to read: --wind {_argument(proposal.winds[0])}; ingest takes each by itself",
             )  # fmt: skip
-        reading = _read(source, recipes.parse(proposal.toml, where=f"the draft for {where}"), options, where)
+        try:
+            reading = _read(source, recipes.parse(proposal.toml, where=f"the draft for {where}"), options, where)
+        except TimeError as error:
+            rest = [n.fix for n in proposal.needs if n.without(options) and f"--{n.option}" not in error.fix]
+            raise type(error)(error.what, where=error.where, fix="; ".join([error.fix, *rest])) from None
         found = [
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in proposal.warnings
@@ -84,7 +89,8 @@ class Delimited:
         if proposal.remarks:
             text = "; ".join(proposal.remarks)
             found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, what=text))
-        return replace(reading, findings=(*reading.findings, *found), drafted=proposal.toml)
+        findings = (*reading.findings, *found)
+        return replace(reading, findings=findings, drafted=proposal.toml, understood=proposal.understood)
 
 
 def guess(proposal: Draft) -> Guess:
@@ -94,6 +100,7 @@ def guess(proposal: Draft) -> Guess:
         reasons=proposal.understood, notes=(*proposal.warnings, *proposal.remarks),
         doubts=tuple(f"{doubt.what}: {doubt.fix}" for doubt in proposal.doubts), winds=proposal.winds,
         fix="; ".join(doubt.fix for doubt in proposal.doubts) or None, draft=proposal.toml or None,
+        needs=tuple(f"{need.what}: {need.fix}" for need in proposal.needs),
     )  # fmt: skip
 
 

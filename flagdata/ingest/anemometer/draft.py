@@ -13,17 +13,30 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, unitcheck
+from flagdata.ingest.anemometer import counted, unitcheck, zones
 from flagdata.ingest.anemometer.cells import numbers
-from flagdata.ingest.anemometer.headings import interest
-from flagdata.ingest.anemometer.instruments import Wind, find_winds, named_wind, sites
+from flagdata.ingest.anemometer.headings import interest, understand
+from flagdata.ingest.anemometer.instruments import (
+    COMPONENTS,
+    Column,
+    Wind,
+    beaufort,
+    find_winds,
+    mixed_units,
+    named_wind,
+    sites,
+)
 from flagdata.ingest.anemometer.layout import Layout, lay_out
+from flagdata.ingest.anemometer.long_table import winds_by_name
+from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
+from flagdata.ingest.anemometer.unitcheck import FASTEST
+from flagdata.units import unit as unit_of
 
 CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
 """Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
-_ORDER = Literal["dmy", "mdy"]
+_ORDER = Literal["dmy", "mdy", "ymd"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +45,19 @@ class Doubt:
 
     what: str
     fix: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Need:
+    """What a table's stamps do not tell and no recipe can: what, how to say it, and the option that says it."""
+
+    what: str
+    fix: str
+    option: Literal["zone", "date", "start"]
+
+    def without(self, options: WindOptions) -> bool:
+        """Whether the user has not said it yet."""
+        return getattr(options, self.option) is None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +70,8 @@ class Draft:
         remarks: what was left out, and why.
         warnings: what is odd, but does not keep the table from being read.
         doubts: what must be said before it can be read.
+        needs: what must be said beside, since its stamps do not tell it.
+        unsure: labels of the anemometers that may be something else, such as the speed of a vehicle.
         winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
         site: index of the column that tells sites apart, `None` where there is one site.
         delimiter: of the cells.
@@ -54,6 +82,8 @@ class Draft:
     remarks: tuple[str, ...]
     warnings: tuple[str, ...]
     doubts: tuple[Doubt, ...]
+    needs: tuple[Need, ...] = ()
+    unsure: tuple[str, ...] = ()
     winds: tuple[str, ...] = ()
     site: int | None = None
     delimiter: str = ","
@@ -76,12 +106,16 @@ def draft(
     time = find_time(layout, order=order)
     columns = time.columns if time is not None else ()
     winds, remarks, warnings = find_winds(layout, time=columns, told=unit)
-    if wind is not None and wind not in {one.label for one in winds}:
-        said = named_wind(layout, wind, told=unit)
-        winds = (*winds, *((said,) if said is not None else ()))
+    named = () if winds else winds_by_name(layout, time=columns, told=unit)
+    winds = winds or named
+    if wind is not None and not named and wind not in {one.label for one in winds}:
+        said, odd = named_wind(layout, wind, told=unit)
+        winds, warnings = (*winds, *said), (*warnings, *odd)
     if time is None and not winds:
         return None
-    mixed = sites(layout, time=columns, stamps=_stamps(layout, columns)) if time is not None else None
+    mixed = None
+    if time is not None and not named:
+        mixed = sites(layout, time=columns, stamps=_stamps(layout, columns))
     if mixed is not None:
         winds = tuple(
             replace(one, site=(mixed[0], site), label=site if len(winds) == 1 else f"{site}:{one.label}")
@@ -99,16 +133,36 @@ def draft(
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
     chosen = chosen or (winds[0] if winds else None)
-    toml = _toml(layout, time, chosen) if time is not None else ""
+    toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+        doubts=tuple(doubts), needs=_needs(lines, time), unsure=tuple(one.label for one in winds if not one.sure),
+        winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
     )  # fmt: skip
 
 
 def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
     return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
+
+
+def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
+    """What the stamps of a time leave open: its start, its day, its zone."""
+    if time is None or time.counts:
+        return ()
+    if time.form is not None and counted.is_elapsed(time.form):
+        fix = "give the instant of the first: --start TIME"
+        return (Need(what="its rows count from a start", fix=fix, option="start"),)
+    found: list[Need] = []
+    if time.form is not None and counted.is_time_of_day(time.form):
+        fix = "give the day of the first row: --date DATE"
+        found.append(Need(what="its stamps have no date", fix=fix, option="date"))
+    if not time.zoned and time.zone is None:
+        statement = zones.stated(lines)
+        fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
+        fix = f"{fix}; {statement.advice()}" if statement is not None else fix
+        found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
+    return tuple(found)
 
 
 def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None) -> list[Doubt]:
@@ -119,9 +173,18 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
         found.append(Doubt(what=time.doubt, fix=time.fix))
-    if not winds:
+    classes = beaufort(layout)
+    if not winds and classes:
+        what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
+        found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
+    elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
+    for wind in winds if chosen is None else (chosen,):
+        changing = mixed_units(layout, next(iter(wind.columns.values())).index)
+        if changing:
+            what = f"the rows of {wind.label!r} are in different units: {', '.join(changing)}"
+            found.append(Doubt(what=what, fix="make a file of the rows in each unit, and ingest them apart"))
     for wind in (chosen,) if chosen is not None else winds:
         missing = wind.without_unit()
         if missing:
@@ -139,6 +202,10 @@ def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
     column = wind.columns[missing[0]].index
     value = numbers(layout.column(column), decimal=layout.decimal).value
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
+    known = value[np.isfinite(value)]
+    if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
+        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), --unit km/h or another"
+        return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
     likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
     name = layout.names[column] or f"number {column + 1}"
     fix = (
@@ -162,7 +229,9 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         zone = "which state their zone" if time.zoned else f"in {time.zone}" if time.zone else "without a zone"
         if time.form is not None and (counted.is_elapsed(time.form) or counted.is_time_of_day(time.form)):
             zone = "without a date"
-        found.append(f"column {stamps} is the time, as {time.form or 'a date in an order that is not told'}, {zone}")
+        unknown = "a count in a unit that is not told" if time.counts else "a date in an order that is not told"
+        zone = "from a start" if time.counts else zone
+        found.append(f"column {stamps} is the time, as {time.form or unknown}, {zone}")
     for wind in winds:
         height = f" at {wind.height:g} m" if wind.height is not None else ""
         site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""
@@ -197,7 +266,21 @@ def _reference(layout: Layout, index: int) -> str:
     return _quoted(name) if layout.by_name and name and layout.names.count(name) == 1 else str(index + 1)
 
 
-def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
+def skeleton(lines: Sequence[str]) -> tuple[str, str] | None:
+    """What a table is of which nothing is known but its columns, and a recipe to complete; `None` for no table."""
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
+        return None
+    names = ", ".join(repr(name) for name in layout.names if name)
+    first = ", ".join(layout.rows[0])[:200]
+    what = (
+        f"a table of {layout.number_of_columns()} columns divided by {delimiter_name(layout.delimiter)!r}, "
+        f"{f'called {names}' if names else 'which no line names'}, the first row {first}"
+    )
+    return what, _toml(layout, None, None)
+
+
+def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
     preamble = layout.preamble if layout.by_name else layout.preamble + layout.header
     label = wind.label if wind is not None else "anemometer"
     lines = [
@@ -205,12 +288,15 @@ def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
         "[file]", f"delimiter = {_quoted(delimiter_name(layout.delimiter))}", f"decimal = {_quoted(layout.decimal)}",
         f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
         f"missing = [{', '.join(_quoted(f'{code:g}') for code in _codes(layout, wind))}]", "",
-        "[time]", f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]",
-        f"format = {_quoted(time.form or '?')}",
+        "[time]",
     ]  # fmt: skip
-    if time.form is None:
-        lines[-1] += f"  # {time.doubt}"
-    if time.zone is not None:
+    if time is None:
+        lines += ['columns = ["?"]  # names, or numbers from 1', 'format = "?"  # such as "%Y %j %H%M" or "epoch-s"']
+    else:
+        lines.append(f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]")
+        doubt = f"  # {time.doubt}" if time.form is None else ""
+        lines.append(f"format = {_quoted(time.form or '?')}{doubt}")
+    if time is not None and time.zone is not None:
         lines.append(f"zone = {_quoted(time.zone)}")
     if wind is not None and wind.site is not None:
         lines += ["", "[rows]", f"column = {_reference(layout, wind.site[0])}", f"value = {_quoted(wind.site[1])}"]
@@ -221,10 +307,24 @@ def _toml(layout: Layout, time: TimeChoice, wind: Wind | None) -> str:
     for channel, column in (wind.columns if wind is not None else {}).items():
         lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
         lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
+        suffix = layout.suffixes[column.index]
+        lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
+    own = wind.columns.values() if wind is not None else ()
+    for column in dict.fromkeys(other for one in own for other in _beside(layout, one)):
+        text = next(row[column].strip() for row in layout.rows if row[column].strip())
+        lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
+        lines += ['about = "unit"']
     lines += ["", "[sensor]", f"name = {_quoted(label)}"]
     if wind is not None and wind.height is not None:
         lines.append(f"height = {wind.height:g}")
     return "\n".join([*lines, ""])
+
+
+def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
+    """The column that spells a column's unit in every row, where that is how the unit is known."""
+    other = layout.unit_columns[column.index]
+    alone = understand(layout.names[column.index]).unit is None
+    return (other,) if other is not None and alone else ()
 
 
 def _codes(layout: Layout, wind: Wind | None) -> list[float]:
@@ -233,6 +333,11 @@ def _codes(layout: Layout, wind: Wind | None) -> list[float]:
     for channel, column in (wind.columns if wind is not None else {}).items():
         value = numbers(layout.column(column.index), decimal=layout.decimal).value
         known = value[np.isfinite(value)]
+        if channel in COMPONENTS and column.unit is not None:
+            # What no component can be in m/s, -99, it can be in cm/s.
+            codes = [code for code in codes if abs(code) * unit_of(column.unit).scale > FASTEST]
+        if channel.endswith("direction") and bool(np.any((known < 0) & ~np.isin(known, CODES))):
+            codes = [code for code in codes if code < -180]
         for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
             others = known[known != code]
             if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:

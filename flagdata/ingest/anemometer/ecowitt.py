@@ -30,7 +30,6 @@ _NAMES = (
 )
 _WIND = re.compile(r"(?:wind )?wind(?: speed)?\s*\([^)]*\)", re.IGNORECASE)
 _GUST = re.compile(r"(?:wind )?(?:wind )?gust\s*\([^)]*\)", re.IGNORECASE)
-_MISSING = ("--.-", "--.--", "---.-")
 
 
 class Ecowitt:
@@ -72,7 +71,7 @@ class Ecowitt:
         direction = assigned.channels.get("wind_direction")
         export = Export(
             name=self.name,
-            file=FileLayout(delimiter=delimiter, decimal="," if commas else ".", preamble=count - 1, missing=_MISSING),
+            file=FileLayout(delimiter=delimiter, decimal="," if commas else ".", preamble=count - 1),
             time=TimeLayout(columns=(stamp,), format=form),
             sensor=Sensor(name="Ecowitt weather station", resolution=0.1),
             assigned=assigned,

@@ -14,15 +14,13 @@ import struct
 import warnings
 import zipfile
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
-from flagdata.ingest.anemometer.source import TextFile
+from flagdata.ingest.anemometer.source import TableText
 
 ZIP = b"PK\x03\x04"
 _WORKBOOK = "xl/workbook.xml"
@@ -33,31 +31,6 @@ _DAMAGE = (
 )  # fmt: skip
 _WIDEST = 2000
 """Columns of the widest sheet that is read."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SheetText(TextFile):
-    """A sheet as lines of comma-separated text.
-
-    Attributes:
-        text: one line a row.
-    """
-
-    text: tuple[str, ...]
-
-    def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
-        """See `TextFile.blocks`."""
-        for first in range(0, len(self.text), size):
-            yield first + 1, list(self.text[first : first + size])
-
-    def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
-        """See `TextFile.raw_blocks`: the rows' text, not the workbook's bytes."""
-        for _, lines in self.blocks():
-            yield "".join(f"{line}\n" for line in lines).encode(self.encoding)
-
-    def head(self, count: int = 60) -> list[str]:
-        """See `TextFile.head`."""
-        return list(self.text[:count])
 
 
 def is_workbook(path: Path, head: bytes) -> bool:
@@ -71,7 +44,7 @@ def is_workbook(path: Path, head: bytes) -> bool:
         return False
 
 
-def open_sheet(path: Path, *, limits: Limits) -> SheetText:
+def open_sheet(path: Path, *, limits: Limits) -> TableText:
     """The first sheet of a workbook that holds a table.
 
     Raises:
@@ -107,7 +80,7 @@ def open_sheet(path: Path, *, limits: Limits) -> SheetText:
             ) from None  # fmt: skip
 
 
-def _read(openpyxl: Any, path: Path, limits: Limits) -> SheetText:
+def _read(openpyxl: Any, path: Path, limits: Limits) -> TableText:
     where = str(path)
     with path.open("rb") as stream:  # opened here: openpyxl leaves a damaged workbook open
         book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
@@ -126,7 +99,7 @@ def _read(openpyxl: Any, path: Path, limits: Limits) -> SheetText:
         fix = "save another sheet as a file of its own to read it"
         found = (Finding(kind="several-sheets", severity=Severity.WARNING, count=len(filled), what=text, fix=fix),)
     lines = filled[title]
-    return SheetText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))
+    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))
 
 
 def _lines(sheet: Any, limits: Limits, where: str) -> list[str]:

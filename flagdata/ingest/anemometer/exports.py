@@ -28,7 +28,7 @@ from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
-from flagdata.timebase import NANOSECONDS, zone
+from flagdata.timebase import NANOSECONDS
 from flagdata.units import spelled, unit
 
 Names = Sequence[tuple[str, str]]
@@ -197,7 +197,7 @@ def read_export(source: TextFile, export: Export, options: WindOptions) -> Readi
     )  # fmt: skip
     rows = CompassRows(source, export.file, export.compass)
     reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
-    found = [*_zone(export.time.zone, options.zone), *column_findings(assigned)]
+    found = [*column_findings(assigned)]
     if rows.points:
         text = f"{rows.points} directions are points of the compass, 22.5° apart"
         found.append(Finding(kind="compass-points", severity=Severity.NOTE, count=rows.points, what=text))
@@ -249,18 +249,6 @@ def _with_period(reading: Reading) -> Reading:
         return reading
     period = float(np.median(np.abs(np.diff(reading.time)))) / NANOSECONDS
     return replace(reading, sensor=replace(reading.sensor, averaging=period))
-
-
-def _zone(stated: str | None, given: str | None) -> list[Finding]:
-    if stated is None or given is None or zone(stated) == zone(given):
-        return []
-    return [
-        Finding(
-            kind="zone-contradicts", severity=Severity.WARNING,
-            what=f"the file says that its stamps are of {stated}; {given} was given and is used",
-            fix="leave out --zone unless the file is known to be wrong",
-        )
-    ]  # fmt: skip
 
 
 def column_findings(assigned: Assigned) -> tuple[Finding, ...]:

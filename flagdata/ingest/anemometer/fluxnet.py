@@ -1,5 +1,9 @@
 """FLUXNET, AmeriFlux and ICOS ecosystem tables: TIMESTAMP_START, TIMESTAMP_END and variables with fixed units.
 
+ICOS stations' raw files have one TIMESTAMP (YYYYMMDDHHMMSS) and the same variables and units (Sabbatini et al., ICOS
+Ecosystem Instructions for Raw Data Format for Meteorological Measurements, doi 10.18160/tpp4-4smp); their rows are as
+sampled, no averages.
+
 Source: AmeriFlux, "Half-hourly and hourly data upload format" and "Data variables": stamps YYYYMMDDHHMM of local
 standard time without daylight saving, WS [m/s], WD [deg], TA [°C], PA [kPa], RH [%], -9999 for no value, position as
 "_H_V_R" behind a name, "_F" for values with gaps filled. Filled values are not read: they are no measurement. Rows are
@@ -20,6 +24,7 @@ from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.signals import Sensor
 
+_RAW = re.compile(r"TIMESTAMP,(?:[^,]*,)*WS_\d+_\d+_\d+(?:,|$)")
 _PLACE = r"(_\d+_\d+_\d+|_\d+)?"
 _NAMES = (
     (rf"WS{_PLACE}", "wind_speed"),
@@ -39,11 +44,11 @@ class Fluxnet:
     uses = frozenset({"zone"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """A heading that begins with TIMESTAMP_START,TIMESTAMP_END."""
+        """A heading that begins with TIMESTAMP_START,TIMESTAMP_END, or with TIMESTAMP and holds WS_1_1_1."""
         at = _heading(head.lines)
         if at is None:
             return None
-        reasons = (f"line {at + 1} begins with TIMESTAMP_START, TIMESTAMP_END, as flux networks write",)
+        reasons = (f"line {at + 1} names stamps and variables with fixed units, as flux networks write",)
         return Guess(format=self.name, score=0.97, reasons=reasons)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
@@ -57,23 +62,30 @@ class Fluxnet:
             Column(number=number, name=name, unit=_UNITS.get(re.split("_", name, maxsplit=1)[0], ""))
             for number, name in enumerate(cut(lines[at], ","), start=1)
         ]
+        raw = columns[0].name == "TIMESTAMP"
         assigned = assign(
-            columns[2:], _NAMES, where=f"{where}, line {at + 1}", fix="give a table that holds WS, not WS_F alone"
+            columns[1 if raw else 2 :],
+            _NAMES,
+            where=f"{where}, line {at + 1}",
+            fix="give a table that holds WS, not WS_F alone",
         )
         export = Export(
             name=self.name,
             file=FileLayout(preamble=at, missing=("-9999", "-6999")),
-            time=TimeLayout(columns=(2,), format="%Y%m%d%H%M"),
+            time=TimeLayout(columns=(1,), format="%Y%m%d%H%M%S")
+            if raw
+            else TimeLayout(columns=(2,), format="%Y%m%d%H%M"),
             sensor=Sensor(name="flux tower"),
             assigned=assigned,
-            described_by="AmeriFlux' data format",
-            averaged=True,
+            described_by="ICOS' instructions" if raw else "AmeriFlux' data format",
+            averaged=not raw,
         )
         return read_export(source, export, options)
 
 
 def _heading(lines: Sequence[str]) -> int | None:
     for index, line in enumerate(lines[:5]):
-        if line.lstrip("\ufeff").replace('"', "").startswith("TIMESTAMP_START,TIMESTAMP_END,"):
+        text = line.lstrip("\ufeff").replace('"', "")
+        if text.startswith("TIMESTAMP_START,TIMESTAMP_END,") or _RAW.match(text):
             return index
     return None

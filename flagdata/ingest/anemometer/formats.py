@@ -50,6 +50,7 @@ FORMATS = Registry(
         "ecowitt": "flagdata.ingest.anemometer.ecowitt:Ecowitt",
         "eddypro": "flagdata.ingest.anemometer.eddypro:EddyPro",
         "fluxnet": "flagdata.ingest.anemometer.fluxnet:Fluxnet",
+        "icos": "flagdata.ingest.anemometer.icos:Icos",
         "hobo": "flagdata.ingest.anemometer.hobo:Hobo",
         "surfrad": "flagdata.ingest.anemometer.surfrad:Surfrad",
         "gill": "flagdata.ingest.anemometer.gill:Gill",

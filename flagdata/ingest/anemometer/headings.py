@@ -10,7 +10,9 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
+from flagdata.errors import FlagdataError
 from flagdata.schema import CHANNELS
+from flagdata.timebase import zone
 from flagdata.units import UNITS, spelled
 
 _WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
@@ -20,13 +22,14 @@ _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
+_PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
 _WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
 _SPEED = frozenset(
     {
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
         "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
-        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots",
+        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
     }
 )  # fmt: skip
 _DIRECTION = frozenset(
@@ -43,6 +46,7 @@ _OTHER = frozenset(
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
         "load", "density", "elevation", "vertical", "gyro", "acc", "accel", "course", "heading", "track", "duration",
+        "id", "unit", "units",
     }
 )  # fmt: skip
 _SPREAD = frozenset(
@@ -186,11 +190,15 @@ def names_time(name: str) -> bool:
         "utc", "tijd", "tid", "dato", "data", "dt", "timestamps", "isotime", "when", "year", "month", "day", "hour",
         "doy", "jday", "tstamp", "ora", "tmstamp", "dateutc", "ms", "observed", "obs",
     }  # fmt: skip
-    return bool(words & known) or bool(re.search(r"time|date", "".join(words)))
+    labview = name.strip() == "X_Value"
+    return bool(words & known) or labview or bool(re.search(r"time|date", "".join(words)))
 
 
 def zone_of(name: str) -> str | None:
     """The zone that the heading of a time states: "UTC", or an offset."""
+    place = _PLACE.search(name)
+    if place is not None and _is_zone(place[0]):
+        return place[0]
     found = _ZONE.search(re.sub(r"_", " ", name))
     if found is None and re.search(r"utc|gmt", name, re.IGNORECASE):
         return "UTC"
@@ -201,6 +209,14 @@ def zone_of(name: str) -> str | None:
     sign, digits = found[1][0], found[1][1:].strip().replace(":", "")
     hours, minutes = (digits[:-2], digits[-2:]) if len(digits) > 2 else (digits, "00")
     return f"{sign}{int(hours):02d}:{minutes}"
+
+
+def _is_zone(name: str) -> bool:
+    try:
+        zone(name)
+    except FlagdataError:
+        return False
+    return True
 
 
 def words_of(name: str) -> list[str]:
@@ -288,7 +304,7 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
         for word, channel in _ABBREVIATED.items():
             if word in known and (si == "m/s") <= channel.endswith("speed"):
                 return channel, True, {word}
-        named = known & _SPEED
+        named = known & _SPEED or (known & {"strength"} if windy else set())
         if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
             return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
         if windy and len(known - _WIND - _MEAN - _PLAIN) == 0:

@@ -12,7 +12,7 @@ from flagdata.ingest.anemometer import unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout
-from flagdata.units import unit
+from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -27,6 +27,8 @@ _SITES = frozenset(
         "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
     }
 )  # fmt: skip
+_CLASSES = frozenset({"bft", "beaufort", "bf"})
+_VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 _UNREADABLE = 0.1
 
 
@@ -96,7 +98,7 @@ def find_winds(
     headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
     found = _Found(layout=layout, headings=headings)
     for index, heading in enumerate(headings):
-        if index in time or not heading.quantity:
+        if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
         if float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
@@ -107,21 +109,71 @@ def find_winds(
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     winds = [*_speeds(found, told), *_components(found, told)]
     winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
+    _doubt_headings(found, winds)
     _check_gusts(found, winds)
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
 
 
-def named_wind(layout: Layout, column: str, *, told: str | None) -> Wind | None:
-    """The anemometer whose speed is in the column that the user names, by heading or number; `None` without such."""
+def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
+    """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
+    words = [set(words_of(name)) for name in found.layout.names]
+    windy = any("wind" in word for name in words for word in name) or any(found.of("wind_direction", *COMPONENTS))
+    for wind in winds:
+        speed = wind.columns.get("wind_speed")
+        if speed is not None and not windy and words[speed.index] & {"speed", "velocity", "vel"}:
+            found.warnings.append(
+                f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind"
+            )
+        afloat = [name for name, said in zip(found.layout.names, words, strict=True) if said & _VESSEL]
+        relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
+        if speed is not None and afloat and not relative:
+            found.warnings.append(
+                f"{afloat[0]!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over "
+                "ground or apparent wind: taken as over ground"
+            )
+
+
+def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
+    """The units that the column next to a column of numbers spells, where they change from row to row."""
+    if index + 1 >= layout.number_of_columns():
+        return ()
+    cells = sorted({cell for cell in layout.column(index + 1) if cell})
+    names = {spelled(cell) for cell in cells[:50]}
+    return tuple(cells) if len(names) > 1 and None not in names else ()
+
+
+def beaufort(layout: Layout) -> tuple[str, ...]:
+    """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
+    return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def _day_of_month(layout: Layout, index: int) -> bool:
+    """Whether a column DD stands in a date written in parts, so that it is no direction."""
+    names = [name.strip().upper() for name in layout.names]
+    if names[index] not in ("DD", "D"):
+        return False
+    before, after = names[index - 1] if index else "", names[index + 1] if index + 1 < len(names) else ""
+    return before in ("MM", "MO", "M", "MONTH") or after.startswith("HH")
+
+
+def named_wind(layout: Layout, column: str, *, told: str | None) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
+    """The anemometer whose speed is in the column that the user names by heading or number, if any, and what is odd."""
     indices = [index for index, name in enumerate(layout.names) if name == column]
     if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
         indices = [int(column) - 1]
-    if len(indices) != 1:
-        return None
-    stated = understand(layout.names[indices[0]], layout.units[indices[0]])
+    if len(indices) != 1 or layout.names[indices[0]] in beaufort(layout):
+        return (), ()
+    name = layout.names[indices[0]]
+    stated = understand(name, layout.units[indices[0]])
     known = stated.unit if fits("wind_speed", stated.unit) else None
-    speed = Column(index=indices[0], unit=told or known, told="as you said")
-    return Wind(label=column, height=stated.height, columns={"wind_speed": speed}, sure=True)
+    odd = (_otherwise(name, known, told),) if told is not None and known is not None and told != known else ()
+    how = f"in {told}, as you said" if told else f"in {known} by its heading" if known else ""
+    speed = Column(index=indices[0], unit=told or known, told=how)
+    return (Wind(label=column, height=stated.height, columns={"wind_speed": speed}, sure=True),), odd
+
+
+def _otherwise(name: str, stated: str, told: str) -> str:
+    return f"the heading of {name!r} states {stated}; taken as {told}, as you said"
 
 
 def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
@@ -147,7 +199,7 @@ def _column(found: _Found, index: int, channel: str, told: str | None) -> Column
         return Column(index=index, unit=stated, told="" if stated is None else f"in {stated} by its heading")
     if stated is not None:
         name = found.layout.names[index]
-        found.warnings.append(f"the heading of {name!r} states {stated}; taken as {told}, as you said")
+        found.warnings.append(_otherwise(name, stated, told))
     return Column(index=index, unit=told, told=f"in {told}, as you said")
 
 
@@ -180,6 +232,12 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
                 label=found.name(first), height=found.headings[first].height, columns=columns,
                 sure=found.headings[first].sure and not (lone and moving),
             ))  # fmt: skip
+    if any(wind.sure for wind in winds):
+        found.remarks.extend(
+            f"column {wind.label!r} is a speed, but beside positions nothing says that it is the wind's: left out"
+            for wind in winds if not wind.sure
+        )  # fmt: skip
+        winds = [wind for wind in winds if wind.sure]
     return winds
 
 
@@ -247,7 +305,7 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     )
     lone = candidates if len(candidates) == 1 else []
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
-    chosen = exact or near[:1] or lone or plain
+    chosen = sorted(exact, key=lambda i: found.headings[i].unit is None) or near[:1] or lone or plain
     if not chosen:
         if candidates:
             names = ", ".join(repr(found.layout.names[i]) for i in candidates)

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from flagdata.ingest.anemometer.recipe import MISSING
+from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.rows import blank_cells
-from flagdata.units import spelled
+from flagdata.units import UNITS, spelled
 
 TAIL = 200
 """Lines at the end of those looked at by which the delimiter is told; half of them where the file is short."""
@@ -22,8 +22,11 @@ _STAMP = re.compile(
     r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?)?"
 )
 _MONTH_STAMP = re.compile(r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*")
+_QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:;+-]\s?){{1,8}}(?:-1)?)")
+_BEHIND = frozenset({"m/s", "rad", "K", "Pa", "1"})
+"""SI units of quantities that tables write with their unit in every cell ("4.3 mph", "210°")."""
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
-_MISSING = frozenset({*MISSING, "nan.", "inf", "-inf", "m", "///", "////"})
+_MISSING = frozenset({*MISSING, "nan.", "inf", "-inf"})
 _UNITS_OF_OTHERS = frozenset(
     {
         "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
@@ -51,6 +54,8 @@ class Layout:
         by_name: whether a recipe can find the columns by these names (else by number).
         rows: the first rows, each of as many cells.
         lines: of `rows`, counted from 1.
+        suffixes: of the columns, the unit behind every number ("4.3 mph"); "" where there is none.
+        unit_columns: of the columns, the index of the next one where that spells their unit in every row; else `None`.
         strange: what of the heading is not understood.
     """
 
@@ -63,11 +68,14 @@ class Layout:
     by_name: bool
     rows: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
+    suffixes: tuple[str, ...] = ()
+    unit_columns: tuple[int | None, ...] = ()
     strange: tuple[str, ...] = ()
 
     def column(self, index: int) -> list[str]:
-        """Cells of a column, trimmed."""
-        return [row[index].strip() for row in self.rows]
+        """Cells of a column, trimmed, without the unit behind their numbers."""
+        suffix = self.suffixes[index] if self.suffixes else ""
+        return [row[index].strip().removesuffix(suffix).rstrip() for row in self.rows]
 
     def number_of_columns(self) -> int:
         return len(self.names)
@@ -100,11 +108,17 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     rows = tuple(tuple(cells) for _, cells in kept)
     full = Counter(len(cells) for (_, cells), fit in zip(table, fits, strict=True) if fit).most_common(1)[0][0]
     names, units, at, by_name, strange = _heading(lines, start, delimiter, (width, full), interest)
+    suffixes = tuple(_suffix([row[index] for row in rows]) for index in range(width))
+    beside = tuple(_unit_column(rows, index) if index in typed else None for index in range(width))
+    units = tuple(
+        unit or suffix or ("" if other is None else _first(rows, other))
+        for unit, suffix, other in zip(units, suffixes, beside, strict=True)
+    )
     decimal: Literal[".", ","] = "," if delimiter != "," and _decimal_commas(rows) else "."
     return Layout(
         delimiter=delimiter, decimal=decimal, preamble=start if at is None else at,
         header=0 if at is None else start - at, names=names, units=units, by_name=by_name, rows=rows,
-        lines=tuple(number + 1 for number, _ in kept), strange=strange,
+        lines=tuple(number + 1 for number, _ in kept), suffixes=suffixes, unit_columns=beside, strange=strange,
     )  # fmt: skip
 
 
@@ -120,9 +134,9 @@ def cut(line: str, delimiter: str) -> list[str]:
 def cell_kind(cell: str) -> CellKind:
     """What a cell seems to hold."""
     text = cell.strip().strip('"').strip()
-    if text.lower() in _MISSING:
+    if text.lower() in _MISSING or re.match(MISSING_SIGNS, text):
         return "missing"
-    if _NUMBER.fullmatch(text):
+    if _NUMBER.fullmatch(text) or _unit_behind(text):
         return "number"
     if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text):
         return "stamp"
@@ -133,6 +147,37 @@ def is_unit(text: str) -> bool:
     """Whether a cell of a line of units spells one; brackets are looked through."""
     bare = text.strip().strip("[]()<>").strip()
     return bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
+
+
+def _unit_behind(text: str) -> str:
+    """The unit that is written behind a number, as written; "" where there is none."""
+    match = _QUANTITY.fullmatch(text[:60])
+    if match is None or (match["unit"].isalpha() and len(match["unit"]) == 1):
+        return ""
+    name = spelled(match["unit"])
+    return match["unit"].strip() if name is not None and UNITS[name].si in _BEHIND else ""
+
+
+def _suffix(cells: Sequence[str]) -> str:
+    """The unit behind the numbers of a column; "" where nine of ten do not share one."""
+    known = [cell.strip() for cell in cells if cell_kind(cell) != "missing"]
+    if not known or not _unit_behind(known[0]):
+        return ""
+    suffix, count = Counter(map(_unit_behind, known)).most_common(1)[0]
+    return suffix if count >= 0.9 * len(known) else ""
+
+
+def _unit_column(rows: Sequence[Sequence[str]], index: int) -> int | None:
+    """The column next to a column of numbers, where all its cells spell one unit of what a log measures."""
+    if index + 1 >= len(rows[0]):
+        return None
+    cells = {row[index + 1].strip() for row in rows} - {""}
+    name = spelled(cells.pop()) if len(cells) == 1 else None
+    return index + 1 if name is not None and UNITS[name].si in _BEHIND and name != "1" else None
+
+
+def _first(rows: Sequence[Sequence[str]], index: int) -> str:
+    return next((row[index].strip() for row in rows if row[index].strip()), "")
 
 
 def _delimiter(lines: Sequence[str]) -> str | None:
@@ -199,7 +244,8 @@ def _mostly(fits: Sequence[bool]) -> bool:
 
 
 def _decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
-    return any(re.fullmatch(r"[-+]?\d+,\d+", cell.strip()) for row in rows for cell in row)
+    cells = (cell.strip() for row in rows for cell in row)
+    return any(re.match(r"[-+]?\d+,\d+(?![\d,])", cell) and cell_kind(cell) == "number" for cell in cells)
 
 
 def _heading(
@@ -229,11 +275,11 @@ def _heading(
         candidates.append((number, cells, plain))
     if not candidates:
         return nothing, nothing, None, False, tuple(strange)
-    scored = [(sum(map(interest, cells)), number, cells, plain) for number, cells, plain in candidates]
+    scored = [(sum(map(interest, set(cells))), number, cells, plain) for number, cells, plain in candidates]
     worded = [item for item in scored if _worded(item[2])]
     if not worded:
         return nothing, nothing, None, False, tuple(strange)
-    _, at, names, plain = max(worded, key=lambda item: (item[0], -item[1]))
+    _, at, names, plain = max(worded, key=lambda item: (item[0], item[3], -item[1]))
     units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), list(nothing))
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
     by_name = plain and len(lines[at]) > 0
@@ -256,6 +302,9 @@ def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] 
         # R writes the heading of its row names not at all.
         if len(cells) == width - 1 and len(cells) > 1 and not any(cell_kind(c) == "missing" for c in cells):
             return ["", *cells], False
+    # Names beyond the cells of a row, as LabVIEW's "Comment"; not with commas, which also stand inside of names.
+    if delimiter in ("\t", ";") and width < len(plain) <= width + 2 and all(plain):
+        return plain[:width], False
     # A title that a spreadsheet padded, or a heading that its writer did not pad.
     if delimiter != " " and 1 < len(plain) < width and sum(map(bool, plain)) > 0.6 * width:
         return [*plain, *[""] * (width - len(plain))], False

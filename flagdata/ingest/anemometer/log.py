@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import platform, possible, quality, zero
+from flagdata.ingest.anemometer import platform, possible, quality, zero, zones
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
@@ -48,7 +48,17 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise UsageError(
             f"the format {name} has no use for: {', '.join(sorted(unused))}", where=str(path), fix="leave it out"
         )
-    reading = reader.read(source, options)
+    statement = zones.stated(source.head(zones.LINES))
+    try:
+        reading = reader.read(source, options)
+    except ZoneMissingError as error:
+        if statement is None:
+            raise
+        raise ZoneMissingError(error.what, where=error.where, fix=f"{error.fix}; {statement.advice()}") from None
+    told = {finding.kind for finding in reading.findings}
+    if statement is not None and options.zone is not None and told.isdisjoint({"zone-contradicts", "zone-not-needed"}):
+        says = f"line {statement.line} ({statement.text!r}) says"
+        reading = reading.with_findings(zones.contradiction(says, statement.name, options.zone, reading.time))
     if "platform" not in reader.uses:
         reading = platform.settle(reading, options.platform, where=str(path))
     reading = reading.with_findings(source.findings)
@@ -65,6 +75,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
         host_time=reading.host_time,
     )  # fmt: skip
+    reasons = reading.understood or reasons
     return WindLog(series=series, format=name, findings=findings, reasons=reasons, drafted=reading.drafted)
 
 

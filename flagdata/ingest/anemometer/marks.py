@@ -19,6 +19,8 @@ from flagdata.timebase import NANOSECONDS
 DAY = 86_400 * NANOSECONDS
 # The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
 _TRUST = ("ZDA", "RMC", "GGA", "GLL")
+NO_TIME = "the stream carries no time"
+NO_TIME_FIX = "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line"
 FEW = 10
 """Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
 DISORDER = 2 * NANOSECONDS
@@ -128,10 +130,7 @@ class TimeLine:
     def _kind(self, where: str) -> str:
         counts = {kind: len(lines) for kind, lines in self.line.items()}
         if max(counts.values(), default=0) < 2:
-            raise TimeError(
-                "the stream carries no time" if not counts else "the stream carries only one time", where=where,
-                fix="record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line",
-            )  # fmt: skip
+            raise TimeError(NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX)
         if counts.get("TAG", 0) >= 2:
             return "TAG"
         enough = max(counts.values()) / 2

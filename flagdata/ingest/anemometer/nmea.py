@@ -16,7 +16,7 @@ import numpy as np
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import possible
-from flagdata.ingest.anemometer.marks import Placed, TimeLine
+from flagdata.ingest.anemometer.marks import NO_TIME, NO_TIME_FIX, Placed, TimeLine
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sentences import (
@@ -109,10 +109,11 @@ class Nmea:
                 fix="have the instrument send MWV, or check its baud rate if sentences are broken",
             )  # fmt: skip
         if len(stream.talkers) > 1:
-            raise InputError(
-                f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments",
-                where=where, fix=f"choose one, e.g. --talker {min(stream.talkers)}",
-            )  # fmt: skip
+            what = f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments"
+            fix = f"choose one, e.g. --talker {min(stream.talkers)}"
+            if not stream.times.line:
+                raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
+            raise InputError(what, where=where, fix=fix)
         line = np.array(stream.line, dtype=np.int64)
         placed = stream.times.place(line, date=options.date, where=where, choice=options.clock)
         channels = {

@@ -47,7 +47,8 @@ class WindOptions:
         zone: of wall-clock stamps: IANA name or fixed offset; goes before the recipe's.
         encoding: of the text, a Python codec name; `None` decides by byte-order mark and validity as UTF-8.
         date: of the first sentence, for streams that carry the time of day alone.
-        date_order: "dmy" or "mdy" for dates that are written with numbers only; `None` decides by evidence or refuses.
+        date_order: "dmy", "mdy" or "ymd" for dates that are written with numbers only; `None` decides by evidence or
+            refuses.
         platform: "fixed" for a mast, "moving" for a boat or vehicle; `None` where the log shows it or does not need it.
         talker: NMEA talker whose wind is read, for streams with several instruments.
         azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative
@@ -66,7 +67,7 @@ class WindOptions:
     zone: str | None = None
     encoding: str | None = None
     date: dt.date | None = None
-    date_order: Literal["dmy", "mdy"] | None = None
+    date_order: Literal["dmy", "mdy", "ymd"] | None = None
     platform: Literal["fixed", "moving"] | None = None
     talker: str | None = None
     azimuth: float | None = None
@@ -78,8 +79,8 @@ class WindOptions:
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        if self.date_order not in (None, "dmy", "mdy"):
-            raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy or mdy")
+        if self.date_order not in (None, "dmy", "mdy", "ymd"):
+            raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy, mdy or ymd")
         if self.platform not in (None, "fixed", "moving"):
             raise UsageError(f"platform {self.platform!r}", where="platform", fix="give fixed or moving")
         if self.clock not in (None, "first", "last"):

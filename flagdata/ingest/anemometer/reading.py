@@ -37,6 +37,7 @@ class Reading:
         host_time: (n,) the logging computer's clock, where the file has it.
         findings: of the format.
         drafted: the recipe (TOML) that was drafted from the file, "" where it was read by another.
+        understood: what in the file spoke for that draft, completed by what the user said.
     """
 
     time: Instants
@@ -49,6 +50,7 @@ class Reading:
     host_time: Instants | None = None
     findings: tuple[Finding, ...] = ()
     drafted: str = ""
+    understood: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.time)

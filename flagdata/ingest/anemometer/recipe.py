@@ -6,7 +6,8 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
     [file]                    delimiter, decimal, encoding, preamble, header, comment, missing, host
     [time]                    columns, format, zone
     [rows]                    column, value: only rows whose cell is this text are read
-    [channels.<channel>]      column, unit, gain, offset, range, convention, rotation, optional
+    [channels.<channel>]      column, unit, gain, offset, range, convention, rotation, optional,
+                              suffix
     [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
                               accuracy-relative (all SI)
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
@@ -37,8 +38,10 @@ SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "|": "|", "space": " "}
 COLUMNS_LIMIT = 10_000
 """Highest number of a column."""
-MISSING = ("", "-", "--", "---", "nan", "na", "n/a", "null", "none", "***")
+MISSING = ("", "nan", "na", "n/a", "n.a.", "#n/a", "#value!", "null", "none", "m", "mm", "missing", "no data")
 """Spellings of "no value" that every recipe knows, lower-case."""
+MISSING_SIGNS = r"^[-–—_./*#]+$"
+"""Cells of signs alone ("----", "--.-", "/////", "***") are no value either."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,6 +124,7 @@ class ChannelLayout:
         convention: of a direction: the wind blows "from" it or "to" it.
         rotation: added to a direction [deg in the file's sense, clockwise].
         optional: whether files without the column are read all the same.
+        suffix: text behind every number of the column, such as its unit; numbers with another are unreadable.
     """
 
     column: str | int
@@ -131,6 +135,7 @@ class ChannelLayout:
     convention: Literal["from", "to"] = "from"
     rotation: float = 0.0
     optional: bool = False
+    suffix: str = ""
 
     def __post_init__(self) -> None:
         unit(self.unit, where=f"unit of column {self.column}")
@@ -317,7 +322,7 @@ class _Reader:
 
     def _channel(self, name: str, table: Mapping[str, Any]) -> ChannelLayout:
         where = f"[channels.{name}]"
-        self._known(table, where, "column unit gain offset range convention rotation optional")
+        self._known(table, where, "column unit gain offset range convention rotation optional suffix")
         if "column" not in table:
             raise InputError("no column", where=where, fix="name the column or give its number (from 1)")
         bounds = self._typed(table, "range", list, None)
@@ -332,6 +337,7 @@ class _Reader:
             convention=self._typed(table, "convention", str, "from"),  # type: ignore[arg-type]
             rotation=self._number(table, "rotation", 0.0),
             optional=self._typed(table, "optional", bool, False),
+            suffix=self._typed(table, "suffix", str, ""),
         )
 
     def _sensor(self, table: Mapping[str, Any]) -> Sensor:

@@ -37,6 +37,11 @@ _STAMP = re.compile(
     r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
 )
 _EPOCH = re.compile(r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?[\s,;>|]+(?P<raw>\S.*)")
+_MONTH = re.compile(
+    r"\s*[\"\[(]?(?P<day>\d{1,2})[-/ ](?P<month>[A-Za-z]{3})[-/ ](?P<year>\d{4})[T ,;:\t]"
+    r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
+)
+MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 LONGEST = 2000
 """Characters of the longest line of an instrument; longer ones are something else."""
 _SECONDS = re.compile(r"\d{10}(\.\d+)?")
@@ -97,6 +102,10 @@ def split_stamp(line: str) -> tuple[str, str]:
     if match is not None:
         stamp = f"{match['date']}T{match['time']}{match['zone'] or ''}"
         return stamp, _unquoted(match["raw"])
+    match = _MONTH.match(line)
+    if match is not None and match["month"].lower() in MONTHS:
+        month = MONTHS.index(match["month"].lower()) + 1
+        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}", _unquoted(match["raw"])
     match = _EPOCH.match(line)
     return (match["epoch"], _unquoted(match["raw"])) if match is not None else ("", _unquoted(line))
 

@@ -28,7 +28,9 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
         if not guesses or guesses[0].format != "delimited" or guesses[0].recipe is not None:
             return ()
     proposal = drafted(source, options)
-    labels = sites(source, proposal) if proposal is not None else ()
+    if proposal is None or proposal.unsure:
+        return ()  # which of them is a wind is the user's to say
+    labels = sites(source, proposal)
     return labels if len(labels) > 1 else ()
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import excel
+from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+_METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
 _MESHES = {".obj", ".ply", ".stl", ".off"}
 
 
@@ -44,6 +47,21 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     guesses = recognise(source)
     if guesses:
         return guesses
+    start = next((line for line in source.head() if line.strip()), "")
+    if start.lstrip("\ufeff \t").startswith(("<?xml", "<gpx", "<html", "<!DOCTYPE")):
+        text = "this is XML or HTML, not a table of text"
+        fix = "convert it to CSV with one row a reading: its time and its wind (GPX: with the program that wrote it)"
+        return (Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix),)
+    if sum(bool(_METAR.search(line)) for line in source.head()) > len(source.head()) / 3:
+        text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"
+        fix = "decode them to a table with one row a report: its time, speed and direction, each with its unit"
+        return (Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix),)
+    table = skeleton(source.head(HEAD_LINES))
+    if table is not None:
+        what, recipe = table
+        fix = "name time and wind in a recipe: flagdata ingest --sniff prints one to complete, then --recipe FILE.toml"
+        reason = f"{what}; which of them are the time and the wind, nothing tells"
+        return (Guess(format="unknown", score=0.0, reasons=(reason,), kind="other", fix=fix, draft=recipe),)
     text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
     fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
     return (Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix),)

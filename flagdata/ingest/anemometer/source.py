@@ -118,6 +118,31 @@ class TextFile:
             return [line.rstrip("\n") for line in islice(stream, count)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class TableText(TextFile):
+    """What is no table of text, made one: a workbook's sheet, or JSON, as lines of comma-separated text.
+
+    Attributes:
+        text: one line a row.
+    """
+
+    text: tuple[str, ...]
+
+    def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
+        """See `TextFile.blocks`."""
+        for first in range(0, len(self.text), size):
+            yield first + 1, list(self.text[first : first + size])
+
+    def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
+        """See `TextFile.raw_blocks`: the rows' text, not the file's bytes."""
+        for _, lines in self.blocks():
+            yield "".join(f"{line}\n" for line in lines).encode(self.encoding)
+
+    def head(self, count: int = 60) -> list[str]:
+        """See `TextFile.head`."""
+        return list(self.text[:count])
+
+
 def opened(path: Path) -> IO[bytes]:
     """The bytes of a file, of one compressed by gzip those that are in it."""
     with path.open("rb") as stream:
@@ -170,7 +195,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             where=where,
             fix="split it, or give read_log wider limits",
         )
-    from flagdata.ingest.anemometer import excel  # a sheet is a TextFile: excel imports this module
+    from flagdata.ingest.anemometer import excel, json_text  # both make a TextFile: they import this module
 
     if excel.is_workbook(path, head):
         return excel.open_sheet(path, limits=limits)
@@ -191,7 +216,9 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         raise InputError(
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
-    return TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
+    text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
+    table = json_text.as_table(text) if json_text.is_json(text.head()) else None
+    return table or text
 
 
 def _looks_utf16(head: bytes) -> bool:

@@ -11,11 +11,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, TimeError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import counted, possible, unitcheck
+from flagdata.ingest.anemometer import counted, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
+from flagdata.ingest.anemometer.growing import Growing
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
@@ -73,18 +74,19 @@ class _Column:
     """One column as its blocks come in."""
 
     index: int
-    values: list[NDArray[np.float64]] = field(default_factory=list)
-    states: list[NDArray[np.uint8]] = field(default_factory=list)
+    suffix: str = ""
+    values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
+    states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
     def value(self, order: slice) -> NDArray[np.float64]:
-        """All values; the blocks are let go, so that a long log is not held twice."""
-        blocks, self.values = self.values, []
-        return np.concatenate(blocks)[order]
+        """All values; they are let go, so that a long log is not held twice."""
+        found, self.values = self.values.view()[order], Growing(np.float64)
+        return found
 
     def state(self, order: slice) -> NDArray[np.uint8]:
         """All states; likewise."""
-        blocks, self.states = self.states, []
-        return np.concatenate(blocks)[order]
+        found, self.states = self.states.view()[order], Growing(np.uint8)
+        return found
 
 
 @dataclass
@@ -113,8 +115,8 @@ class _Clock:
     columns: list[int]
     step: int = 2**62
     bare_dates: int = 0
-    ns: list[NDArray[np.int64]] = field(default_factory=list)
-    utc: list[NDArray[np.bool_]] = field(default_factory=list)
+    ns: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
+    utc: Growing[np.bool_] = field(default_factory=lambda: Growing(np.bool_))
 
     def parse(self, block: Block) -> Stamps:
         if len(self.columns) == 1:
@@ -130,17 +132,17 @@ class _Clock:
         return stamps
 
     def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
-        self.ns.append(stamps.ns[keep])
-        self.utc.append(stamps.utc[keep])
+        self.ns.add(stamps.ns[keep])
+        self.utc.add(stamps.utc[keep])
         self.step = min(self.step, stamps.step)
 
     def stated(self) -> bool:
         """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
-        return counted.is_elapsed(self.form) or all(bool(utc.all()) for utc in self.utc)
+        return counted.is_elapsed(self.form) or bool(self.utc.view().all())
 
     def order(self) -> slice:
         """The rows from the oldest on, for logs that list the newest first."""
-        steps = np.diff(np.concatenate(self.ns))
+        steps = np.diff(self.ns.view())
         turned = len(steps) > 1 and float((steps < 0).mean()) > NEWEST_FIRST
         return slice(None, None, -1) if turned else slice(None)
 
@@ -148,8 +150,8 @@ class _Clock:
         self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
     ) -> tuple[Instants, tuple[Finding, ...]]:
         """The instants and what was found; the blocks are let go."""
-        wall, utc = np.concatenate(self.ns)[order], np.concatenate(self.utc)[order]
-        self.ns, self.utc = [], []
+        wall, utc = self.ns.view()[order], self.utc.view()[order]
+        self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
         if counted.is_elapsed(self.form):
             return counted.since_start(wall, self.form, start=given.start, line=line, where=where)
         found: tuple[Finding, ...] = ()
@@ -176,7 +178,7 @@ class _Gathered:
     extra: dict[str, _Column]
     checks: list[_Check]
     rows: int | None = None
-    lines: list[NDArray[np.int64]] = field(default_factory=list)
+    lines: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
 
@@ -203,17 +205,20 @@ class _Gathered:
         self.clock.add(stamps, keep)
         self.bad_stamps.extend(line[~keep].tolist())
         self.distant += int(stamps.distant.sum())
-        self.lines.append(line[keep])
+        self.lines.add(line[keep])
         for column in self.columns():
-            parsed = numbers(_cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing)
-            column.values.append(parsed.value[keep])
-            column.states.append(parsed.state[keep])
+            parsed = numbers(
+                _cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing,
+                suffix=column.suffix,
+            )  # fmt: skip
+            column.values.add(parsed.value[keep])
+            column.states.add(parsed.state[keep])
         for check in self.checks:
             right = _among(block, check.index, check.layout.values)
             check.right.append(right[keep])
 
     def line(self) -> NDArray[np.int64]:
-        return np.concatenate(self.lines) if self.lines else np.zeros(0, dtype=np.int64)
+        return self.lines.view()
 
 
 def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
@@ -262,7 +267,10 @@ def read_table(
     gathered = _Gathered(
         clock=_Clock(form=recipe.time.format, columns=own) if own or host is None else host,
         host=host if own else None,
-        channels={name: _Column(index=i) for name, i in _channel_columns(recipe, rows, where).items()},
+        channels={
+            name: _Column(index=i, suffix=recipe.channels[name].suffix)
+            for name, i in _channel_columns(recipe, rows, where).items()
+        },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
         checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
         rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
@@ -273,17 +281,19 @@ def read_table(
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
     order = gathered.clock.order()
     line = gathered.line()[order]
-    gathered.lines = [line]
     if order.step == -1:
         text = "the newest row comes first: read from the end"
         findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))
     if zone_name is not None and gathered.host is None and gathered.clock.stated():
         text = f"the stamps state their own zone: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
-    zone_name = zone_name or recipe.time.zone
+        zone_name = None
+    told, zone_name = zone_name, zone_name or recipe.time.zone
     given = given or Given()
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
+    if told is not None and recipe.time.zone is not None:
+        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, told, time))
     host_time = None
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
@@ -387,7 +397,7 @@ def instants(
         return wall, ()
     if zone_name is None:
         at = int(np.flatnonzero(~utc)[0])
-        raise TimeError(
+        raise ZoneMissingError(
             "the stamps carry no time zone", where=f"{where}, line {line[at]}", fix=zone_advice(wall, line)
         )  # fmt: skip
     time = wall.copy()
@@ -398,7 +408,10 @@ def instants(
 
 def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
     """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
-    return unit(layout.unit).to_si(value * layout.gain + layout.offset)
+    if layout.gain != 1.0 or layout.offset != 0.0:
+        value = value * layout.gain + layout.offset
+    stated = unit(layout.unit)
+    return value if stated.scale == 1.0 and stated.offset == 0.0 else stated.to_si(value)
 
 
 def turned(angle: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import Cell, numbers
-from flagdata.ingest.anemometer.dates import decide
+from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
@@ -33,6 +32,7 @@ _CLOCKS = (
     "%H",
 )
 _MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
+_CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
 )
@@ -42,8 +42,9 @@ _STAMPLIKE = re.compile(
 )
 """What a cell must have in it to be a date and a time."""
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31), ("%H", r"h|hh|hr|hour|stunde", 0, 23),
-    ("%M", r"mi|min|mm|minute|m", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31),
+    ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 23),
+    ("%M", r"mi|min|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
 )  # fmt: skip
 
 
@@ -59,6 +60,7 @@ class TimeChoice:
         doubt: what the rows do not tell; `None` where nothing is in doubt.
         fix: what the user can say.
         score: how well it fits, for the choice among several.
+        counts: whether it counts from a start, by a unit that may not be known.
     """
 
     columns: tuple[int, ...]
@@ -68,9 +70,10 @@ class TimeChoice:
     score: float
     doubt: str | None = None
     fix: str | None = None
+    counts: bool = False
 
 
-def find_time(layout: Layout, *, order: Literal["dmy", "mdy"] | None = None) -> TimeChoice | None:
+def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | None:
     """The columns that are the time; `None` where there are none.
 
     Args:
@@ -83,7 +86,7 @@ def find_time(layout: Layout, *, order: Literal["dmy", "mdy"] | None = None) -> 
     return best
 
 
-def _choices(layout: Layout, order: Literal["dmy", "mdy"] | None) -> Iterator[TimeChoice]:
+def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     columns = [layout.column(index) for index in range(layout.number_of_columns())]
     if layout.decimal == ",":
         columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
@@ -94,7 +97,7 @@ def _choices(layout: Layout, order: Literal["dmy", "mdy"] | None) -> Iterator[Ti
             continue
         if _share(_DATE, texts):
             dates.append(index)
-        elif _share(_CLOCK, texts) or (words_of(layout.names[index])[:1] in (["time"], ["hhmm"], ["hhmmss"], ["hour"])
+        elif _share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
                                        and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
             clocks.append(index)
         found = _whole(layout, (index,), texts, order)
@@ -143,9 +146,7 @@ def _choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, 
     )
 
 
-def _whole(
-    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Literal["dmy", "mdy"] | None
-) -> TimeChoice | None:
+def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None) -> TimeChoice | None:
     """Date and time in `texts`."""
     if not any(_STAMPLIKE.search(text) for text in texts[:5]):
         return None
@@ -172,6 +173,10 @@ def _whole(
     except TimeError as error:
         if "may be" not in error.what:
             return None
+        if "ymd" in error.fix:
+            return TimeChoice(
+                columns=columns, form=None, zone=None, zoned=False, score=2.5, doubt=error.what, fix=error.fix
+            )
         found = next((f for f in _dated(texts, "%d", "%m", zoned) if f is not None), None)
         if found is None:
             return None
@@ -214,7 +219,7 @@ def _compact(shape: str) -> tuple[str, ...]:
         "00000000000000": "%Y%m%d%H%M%S%f", "000000000000": "%Y%m%d%H%M", "00000000T000000": "%Y%m%d %H%M%S%f",
         "00000000 000000": "%Y%m%d %H%M%S", "00000000 0000": "%Y%m%d %H%M", "00000000 00:00:00": "%Y%m%d %H:%M:%S%f",
         "00000000T0000": "%Y%m%d %H%M", "00000000_000000": "%Y%m%d_%H%M%S", "00000000 00:00": "%Y%m%d %H:%M",
-        "00000000-000000": "%Y%m%d-%H%M%S",
+        "00000000-000000": "%Y%m%d-%H%M%S", "00000000 00": "%Y%m%d %H", "00000000 0": "%Y%m%d %H",
     }  # fmt: skip
     known = forms.get(bare.split(".")[0])
     return (known,) if known else ()
@@ -233,7 +238,9 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
     names = [" ".join(words_of(name)) for name in layout.names]
     for index, name in enumerate(names):
-        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr)( utc)?", name) or not _whole_numbers(columns[index], 1990, 2100):
+        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not _whole_numbers(
+            columns[index], 1990, 2100
+        ):
             continue
         chosen, form = [index], "%Y"
         at = index + 1
@@ -295,7 +302,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         usual = float(np.median(steps[steps > 0]))
         unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"
         yield TimeChoice(
-            columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1,
+            columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
             doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated (likely {unit})",
             fix=f'save the draft, complete format = "elapsed-s" or "elapsed-ms" (likely elapsed-{unit}), and name it: '
             "--recipe FILE.toml --start TIME",

@@ -56,7 +56,7 @@ def to_utc(
         return wall.copy(), ()
     first, last = int(wall.min()) - 26 * _HOUR, int(wall.max()) + 26 * _HOUR
     changes = _changes(place, first, last)
-    offset = np.full(len(wall), _offset(place, first), dtype=np.int64)
+    offset = np.full(len(wall), offset_at(place, first), dtype=np.int64)
     found: list[Finding] = []
     jumps = _whole_jumps(wall) if changes else ()
     for change in changes:
@@ -207,7 +207,8 @@ def _with_jumps(fix: str, jumps: Sequence[Jump], lines: NDArray[np.int64]) -> st
     )
 
 
-def _offset(place: tzinfo, instant: int) -> int:
+def offset_at(place: tzinfo, instant: int) -> int:
+    """How far a zone's clocks are east of UTC at an instant [ns]."""
     moment = (_EPOCH + timedelta(seconds=instant // NANOSECONDS)).astimezone(place)
     delta = moment.utcoffset()
     return 0 if delta is None else (delta.days * 86_400 + delta.seconds) * NANOSECONDS
@@ -217,15 +218,15 @@ def _changes(place: tzinfo, low: int, high: int) -> Sequence[_Change]:
     """Offset jumps of the zone between two instants, each found to the second by bisection of steps of a day."""
     found: list[_Change] = []
     step = 24 * _HOUR
-    edge, known = low, _offset(place, low)
+    edge, known = low, offset_at(place, low)
     while edge < high:
         upper = min(edge + step, high)
-        value = _offset(place, upper)
+        value = offset_at(place, upper)
         if value != known:
             left, right = edge // NANOSECONDS, upper // NANOSECONDS
             while right - left > 1:
                 middle = (left + right) // 2
-                left, right = (middle, right) if _offset(place, middle * NANOSECONDS) == known else (left, middle)
+                left, right = (middle, right) if offset_at(place, middle * NANOSECONDS) == known else (left, middle)
             found.append(_Change(instant=right * NANOSECONDS, before=known, after=value))
         edge, known = upper, value
     return found

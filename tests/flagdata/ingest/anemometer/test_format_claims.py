@@ -44,6 +44,7 @@ SAMPLES = {
     "eddypro": "filename,date,time,wind_speed,wind_dir\n,[yyyy-mm-dd],[HH:MM],[m+1s-1],[deg_from_north]\n"
     "a,2026-05-01,12:30,3,90\n",
     "fluxnet": "TIMESTAMP_START,TIMESTAMP_END,WS,WD\n202605011200,202605011230,3,90\n",
+    "icos": "#Site;SamplingHeight;Year;Month;Day;Hour;Minute;WS;WD\nLIN;40.0;2026;05;01;12;00;4.2;210\n",
     "surfrad": " X\n 40.05 -88.37 230 m version 1\n" + " 2026 121 5 1 12 0 12.0 40.0" + " 1.0 0" * 20 + "\n",
 }
 

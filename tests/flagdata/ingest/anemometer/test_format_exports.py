@@ -337,3 +337,20 @@ def test_surfrad_is_in_utc_and_its_quality_flag_is_heeded(read: Read) -> None:
     assert log.series.sensor.height == 10.0
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [4, 5]
     assert kinds(log)["cut-off"] == 1
+
+
+def test_icos_atmosphere_is_in_utc_and_its_flag_is_heeded(read: Read) -> None:
+    heading = "#Site;SamplingHeight;Year;Month;Day;Hour;Minute;DecimalDate;AT;WS;WS-Flag;WD"
+    rows = "LIN;40.0;2026;05;01;12;00;2026.33;12.1;4.2;O;210\nLIN;40.0;2026;05;01;13;00;2026.33;12.2;9.9;K;215\n"
+    log = read(f"# TITLE: meteorology\n{heading}\n{rows}")
+    assert log.format == "icos"
+    assert log.series.time[0] == 1_777_636_800_000_000_000
+    assert log.series.sensor.height == 40.0
+    assert kinds(log)["sensor-fault"] == 1
+
+
+def test_icos_ecosystem_raw_files_have_one_stamp_and_fixed_units(read: Read) -> None:
+    log = read("TIMESTAMP,TA_1_1_1,WS_1_1_1\n20260501120000,12.1,4.2\n20260501120010,12.1,4.4\n", zone="UTC")
+    assert log.format == "fluxnet"
+    assert log.series.channels["wind_speed"].tolist() == [4.2, 4.4]
+    assert log.series.sensor.averaging is None

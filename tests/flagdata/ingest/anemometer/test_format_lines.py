@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
 from flagdata.ingest.anemometer import canboat, gill, metek, trisonica, vaisala, young
 from flagdata.ingest.anemometer.serial_lines import Defect, checksum, split_stamp
 from flagdata.schema import SampleFlag
@@ -363,3 +363,27 @@ def test_sentences_of_n2kd_without_status_are_taken_with_a_finding(read: Read) -
     log = read(stamped(lines), platform="fixed")
     assert kinds(log)["no-status"] == 4
     assert log.series.channels["wind_speed"] == pytest.approx([1.89 * 1852 / 3600] * 4)
+
+
+def test_metek_telegrams_with_semicolons_are_in_metres_a_second(read: Read) -> None:
+    """A published sample; its speed and direction are those of its x and y."""
+    telegram = "1B010000322000000300100000000000;-0.015;0.053;0.062;16.486;0.055;164.451;0.055;1"
+    log = read(f"2026-05-01T12:00:00Z,{telegram}\n2026-05-01T12:00:01Z,{telegram}\n")
+    assert log.format == "metek"
+    channels = log.series.channels
+    assert channels["wind_speed"][0] == pytest.approx(np.hypot(0.015, 0.053), abs=6e-4)
+    assert channels["wind_direction"][0] == pytest.approx(np.arctan2(0.015, -0.053), abs=0.02)
+    assert channels["sonic_temperature"][0] == pytest.approx(289.636)
+
+
+def test_sentences_after_stamps_with_names_of_months_are_read(read: Read) -> None:
+    lines = "".join(f"[01-May-2026 12:00:0{second}] $WIMWV,210.0,R,8.4,N,A\n" for second in range(3))
+    log = read(lines, zone="UTC")
+    assert log.series.time[0] == 1_777_636_800_000_000_000
+
+
+def test_a_stream_of_several_talkers_without_time_names_both_at_once(read: Read) -> None:
+    with pytest.raises(FlagdataError, match=r"several talkers .* and the stream carries no time") as caught:
+        read("$36MWV,353.4,R,0.92,M\n$37MWV,353.4,R,0.92,M\n$36MWV,350.4,R,0.97,M\n")
+    assert "--talker" in caught.value.fix
+    assert "ZDA" in caught.value.fix

@@ -88,7 +88,7 @@ REFUSED = [
         {"content": b"The wind blew all day.\nThen it stopped.\n", "error": InputError, "says": "recipe"}, id="prose"
     ),
     pytest.param(
-        {"content": b'{"time": 1, "wind_speed": 3}\n', "error": InputError, "says": "known format"}, id="json"
+        {"content": b'{"time": 1, "wind_speed": 3}\n', "error": InputError, "says": "unit of column"}, id="json"
     ),
     pytest.param({"content": b"<!doctype html><html><body>404</body></html>\n", "error": InputError}, id="html"),
     pytest.param({"content": b'[file]\ndelimiter = ","\n', "error": InputError}, id="toml"),

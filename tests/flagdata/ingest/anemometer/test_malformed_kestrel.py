@@ -79,7 +79,7 @@ REFUSED = [
         id="no-wind-column",
     ),
     pytest.param(
-        {"content": kestrel(kestrel_day(13)), "error": UsageError, "options": {"date_order": "ymd"}},
+        {"content": kestrel(kestrel_day(13)), "error": UsageError, "options": {"date_order": "ydm"}},
         id="date-order-in-words",
     ),
 ]

@@ -1,0 +1,57 @@
+"""What an alignment of two artifacts is known by: its parents and its recipe, in the catalog and in its record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flagdata.errors import ConflictError
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical, code_version, recipe_hash
+from flagdata.schema import Kind
+
+
+def find_made(
+    lake: Lake,
+    kind: Kind,
+    parents: Mapping[str, Artifact],
+    recipe: Mapping[str, Any],
+    *,
+    what: str,
+    name: str | None,
+    session: str | None,
+    branch: str,
+) -> Artifact | None:
+    """The artifact that these parents and this recipe make, if it is on the branch.
+
+    Args:
+        parents: in their order, by what each is.
+        what: the artifact is, for messages.
+        name, session: asked for; `None` takes any.
+
+    Raises:
+        ConflictError: it is there under another name or session than the one asked for.
+    """
+    wanted = [parent.id for parent in parents.values()]
+    rows = lake.rows(f"kind = '{kind.value}' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
+    for row in rows:
+        if list(row["parents"]) != wanted:
+            continue
+        artifact = Artifact.from_row(row)
+        for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
+            if asked is not None and asked != kept:
+                raise ConflictError(
+                    f"the {what} is there already with the {label} {kept!r}", where=artifact.id,
+                    fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
+                )  # fmt: skip
+        return artifact
+    return None
+
+
+def provenance(parents: Mapping[str, Artifact], recipe: Mapping[str, Any]) -> dict[str, str]:
+    """What a record says of where it comes from."""
+    return {role: parent.id for role, parent in parents.items()} | {
+        "recipe": canonical(recipe),
+        "recipe_hash": recipe_hash(recipe),
+        "code_version": code_version(),
+    }

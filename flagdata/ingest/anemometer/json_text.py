@@ -1,0 +1,196 @@
+"""JSON with one object a reading, as lines or in a list, made a table that every format reads.
+
+    {"time":"2026-05-01T12:00:00Z","wind_avg_m_s":4.2,"wind_dir_deg":210}       as rtl_433 and many loggers write
+    weather/station {"ts":1777636800,"wind":{"speed_kmh":15.1}}                 as mosquitto_sub -v writes
+    {"context":"vessels.self","updates":[{"timestamp":"…","values":[{"path":"environment.wind.speedApparent",…
+
+Members become columns called by their keys, joined with points; elements of a list by their number. Two kinds of
+message have no keys or no units, and are named by their makers' descriptions: WeatherFlow, "Tempest UDP reference,
+version 171" (obs_st and rapid_wind are arrays of stated units), and Signal K specification 1.7.0, "Keys reference"
+(values are SI; speedTrue and angleTrueWater are relative to the vessel, so no wind over ground).
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from flagdata.errors import LimitError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.layout import cell_kind
+from flagdata.ingest.anemometer.source import TableText, TextFile
+
+WIDEST = 2000
+"""Columns of the widest table that is read."""
+_DEEPEST = 8
+"""Objects within objects that are looked into."""
+_LOOKED_AT = 50
+_LINE = re.compile(r"\s*(?P<before>[^\s{\[][^{]{0,300}?)?[\s,;]*(?P<object>\{.*\})[\s,]*")
+_TEMPEST = {
+    "obs_st": (
+        "time [epoch]", "wind lull [m/s]", "wind avg [m/s]", "wind gust [m/s]", "wind direction [deg]", "interval",
+        "station pressure [hPa]", "air temperature [degC]", "relative humidity [%]",
+    ),
+    "rapid_wind": ("time [epoch]", "rapid wind speed [m/s]", "rapid wind direction [deg]"),
+}  # fmt: skip
+_SIGNAL_K = {
+    "environment.wind.speedApparent": "AWS [m/s]", "environment.wind.angleApparent": "AWA [rad]",
+    "environment.wind.speedTrue": "TWS [m/s]", "environment.wind.angleTrueWater": "TWA [rad]",
+}  # fmt: skip
+
+
+def is_json(lines: Sequence[str]) -> bool:
+    """Whether the first lines of a file are JSON objects, or a list of them; canboat's messages are not meant."""
+    filled = [line for line in lines[:_LOOKED_AT] if line.strip()]
+    if not filled:
+        return False
+    if filled[0].lstrip("\ufeff \t").startswith("["):
+        return bool(re.match(r"\s*\[\s*\{\s*\"", "".join(filled).lstrip("\ufeff")))
+    if filled[0].strip("\ufeff \t\r") == "{":
+        return bool(re.match(r"\s*\"[^\"]*\"\s*:", "".join(filled[1:])))
+    objects = [match for line in filled if (match := _LINE.fullmatch(line)) is not None and _object(match["object"])]
+    messages = sum('"pgn":' in match["object"] for match in objects)
+    return len(objects) > len(filled) / 2 > messages
+
+
+def as_table(source: TextFile) -> TableText | None:
+    """The objects of a file as a table whose first line names the columns; `None` where a list is no list of objects.
+
+    Raises:
+        LimitError: more than `WIDEST` columns.
+    """
+    whole = _whole(source)
+    columns = _columns(whole) if isinstance(whole, dict) else None
+    before: list[tuple[str, str]] = []
+    if isinstance(whole, dict) and columns is not None:
+        before = [(key, _text(value)) for key, value in whole.items() if not isinstance(value, dict | list)]
+    table: list[dict[str, str]] = []
+    names: dict[str, None] = {}
+    broken = 0
+    for row in _rows(source, whole) if columns is None else columns:
+        broken += row is None
+        table.append(row or {})
+        names.update(dict.fromkeys(row or {}))
+        if len(names) > WIDEST:
+            fix = "write the columns needed to a CSV file"
+            raise LimitError(f"JSON with more than {WIDEST} kinds of members", where=str(source.path), fix=fix)
+    if not names:
+        return None
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerows(before)
+    writer.writerow(names)
+    writer.writerows([row.get(name, "") for name in names] for row in table if row)
+    text = f"JSON, read as a table of {len(names)} columns; lines are counted with its heading as the first"
+    found = [Finding(kind="json-table", severity=Severity.NOTE, what=text)]
+    if broken:
+        text = f"{broken} lines are no JSON objects; left out"
+        found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=broken, what=text))
+    lines = tuple(out.getvalue().splitlines())
+    plain = TextFile(path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *found))
+    return TableText(**{**vars(plain), "text": lines})
+
+
+def _whole(source: TextFile) -> Any:
+    """What a file holds that is one list or one object; `None` for objects in lines."""
+    filled = [line for line in source.head(_LOOKED_AT) if line.strip()]
+    first = filled[0].lstrip("\ufeff \t") if filled else ""
+    if not first.startswith("[") and first.strip() != "{" and len(filled) > 1:
+        return None
+    return _parsed("\n".join(line for _, lines in source.blocks() for line in lines).lstrip("\ufeff"))
+
+
+def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
+    """Rows of an object that holds its columns as lists of one length, with their units in a member "…_units"."""
+    for name, member in [("", item), *item.items()]:
+        lists = {k: v for k, v in member.items() if isinstance(v, list)} if isinstance(member, dict) else {}
+        if len(lists) < 2 or len({len(values) for values in lists.values()}) > 1:
+            continue
+        units = item.get(f"{name}_units")
+        units = units if isinstance(units, dict) else {}
+        heads = {key: f"{key} [{units[key]}]" if isinstance(units.get(key), str) else key for key in lists}
+        rows = zip(*lists.values(), strict=True)
+        return [{heads[key]: _text(value) for key, value in zip(lists, row, strict=True)} for row in rows]
+    return None
+
+
+def _rows(source: TextFile, whole: Any) -> Iterator[dict[str, str] | None]:
+    """Each object's cells by name; `None` for a line that is none."""
+    if whole is not None:
+        for item in whole if isinstance(whole, list) else [whole]:
+            yield _flat(item) if isinstance(item, dict) else None
+        return
+    for _, lines in source.blocks():
+        for line in lines:
+            if not line.strip():
+                continue
+            match = _LINE.fullmatch(line)
+            found = _object(match["object"]) if match is not None else None
+            if match is None or found is None:
+                yield None
+                continue
+            yield {**_before(match["before"] or ""), **_flat(found)}
+
+
+def _before(text: str) -> dict[str, str]:
+    """Cells of what stands before an object: a stamp, a topic."""
+    found: dict[str, str] = {}
+    for number, word in enumerate(text.split(), start=1):
+        stamp = cell_kind(word) == "stamp" or re.fullmatch(r"\d{10}(\.\d+)?", word)
+        found["logged time" if stamp else f"topic{number}"] = word
+    return found
+
+
+def _object(text: str) -> dict[str, Any] | None:
+    found = _parsed(text)
+    return found if isinstance(found, dict) else None
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _flat(item: dict[str, Any]) -> dict[str, str]:
+    """Cells of an object by name."""
+    found: dict[str, str] = {}
+    kind = item.get("type")
+    names = _TEMPEST.get(kind) if isinstance(kind, str) else None
+    if names is not None:
+        rows = item.get("obs") if kind == "obs_st" else [item.get("ob")]
+        row = rows[0] if isinstance(rows, list) and rows else None
+        if isinstance(row, list):
+            return {"type": str(kind)} | {name: _text(value) for name, value in zip(names, row, strict=False)}
+    _fill(found, "", item, 0)
+    return found
+
+
+def _fill(found: dict[str, str], name: str, value: Any, depth: int) -> None:
+    if depth > _DEEPEST or len(found) > WIDEST:
+        return
+    if isinstance(value, dict):
+        if set(value) == {"path", "value"} and isinstance(value["path"], str):
+            path = value["path"]
+            _fill(found, _SIGNAL_K.get(path, path), value["value"], depth + 1)
+            return
+        for key, inner in value.items():
+            _fill(found, f"{name}.{key}" if name else str(key), inner, depth + 1)
+    elif isinstance(value, list):
+        for number, inner in enumerate(value, start=1):
+            named = len(value) == 1 or (isinstance(inner, dict) and set(inner) == {"path", "value"})
+            _fill(found, name if named else f"{name}.{number}", inner, depth + 1)
+    elif name:
+        found.setdefault(name, _text(value))
+
+
+def _text(value: object) -> str:
+    """A cell on one line."""
+    if value is None or isinstance(value, bool | list | dict):
+        return ""
+    return repr(value) if isinstance(value, float) else " ".join(str(value).split())

@@ -1,0 +1,87 @@
+"""All that the gate measures of a clip: the picture's statistics, hand-made features, the network's summary, and how
+far the summary moves under changes that leave the physics as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from measure.gate.checks import measured
+from models.estimator import Estimator
+from models.handmade import FEATURES
+from models.handmade import features as handmade
+from models.outliers import Familiarity
+
+MOVES = ("mirrored", "cropped")
+"""Changes that leave wind and cloth as they are: left and right exchanged, the middle nine tenths of the picture."""
+_KEPT = 0.9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Features:
+    """What was measured of one clip.
+
+    Attributes:
+        checks: (len(CHECKS),) of `measure.gate.checks`.
+        handmade: (len(FEATURES),) of `models.handmade`.
+        summary: (d,) of the model's first learner.
+        distance: of the summary to the training clips' (`models.outliers`).
+        moved: (len(MOVES),) whitened distances that the summary moves by.
+    """
+
+    checks: NDArray[np.float64]
+    handmade: NDArray[np.float64]
+    summary: NDArray[np.float64]
+    distance: float
+    moved: NDArray[np.float64]
+
+    @property
+    def frequency(self) -> float:
+        """Dominant frequency of the motion, the mean over pixels by their power [Hz]."""
+        return float(self.handmade[FEATURES.index("local_frequency_mean")])
+
+    def vector(self, model: Estimator) -> NDArray[np.float64]:
+        """(f,) everything in one, the summary as the training clips' covariance whitens it, distances as logarithms."""
+        cloud = _cloud(model)
+        logs = np.log10(np.maximum([self.distance, *self.moved], 1e-3))
+        return np.concatenate([self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs])
+
+
+def features_of(model: Estimator, frames: NDArray[np.uint8]) -> Features:
+    """Measure a clip.
+
+    Args:
+        model: with a cloud of training summaries.
+        frames: (n, height, width) gray, n and their rate the model's.
+
+    Raises:
+        InputError: frames that do not fit the model, a clip without contrast, or a model without a cloud.
+    """
+    cloud = _cloud(model)
+    side = min(frames.shape[1:])
+    cut = round(side * (1 - _KEPT) / 2)
+    top, left = (frames.shape[1] - side) // 2, (frames.shape[2] - side) // 2
+    square = frames[:, top : top + side, left : left + side]
+    middle = square[:, cut : side - cut, cut : side - cut]
+    inputs = [model.inputs(clip[None]) for clip in (square, square[..., ::-1], middle)]
+    embeddings = model.embeddings(torch.cat(inputs))[0].detach().cpu().double().numpy()
+    moved = (embeddings[1:] - embeddings[0]) @ cloud.whitening.T
+    return Features(
+        checks=measured(frames),
+        handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0].double().numpy(),
+        summary=embeddings[0], distance=float(cloud.distance(embeddings[:1])[0]),
+        moved=np.linalg.norm(moved, axis=1),
+    )  # fmt: skip
+
+
+def _cloud(model: Estimator) -> Familiarity:
+    if model.cloud is None:
+        raise InputError(
+            "the model keeps no summaries of its training clips", where=f"model {model.name!r}",
+            fix="ship it by python -m models.shipping, which keeps them",
+        )  # fmt: skip
+    return model.cloud

@@ -1,0 +1,177 @@
+"""The gate: what simulated clips score on every check, and the verdict on a clip beside them.
+
+Every check is a score of which high values are suspicious: the image statistics of `checks`, the distance of the
+network's summary, how far the summary moves under changes that leave the physics as it is, the distance of all features
+together, and a log-likelihood ratio for each distortion of `distortions` (arXiv 2412.15100). Each is expressed on one
+scale by its tail over simulated clips (`tails`); the joint score is the largest of them, and the joint score alone is
+calibrated, on clips that shaped no check. So the stated false-alarm rate is that of all checks together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from measure.gate.checks import CHECKS
+from measure.gate.distortions import DISTORTIONS
+from measure.gate.features import MOVES
+from measure.gate.tails import Tails, joint_p
+from models.handmade import FEATURES
+from models.outliers import shrunk_covariance
+
+Vector = NDArray[np.float64]
+
+_SIDED = tuple(
+    (name, place, sign, kind)
+    for place, (name, check) in enumerate(CHECKS.items())
+    for sign, kind in ((1.0, check.high), (-1.0, check.low))
+    if kind is not None
+)
+"""Name, column, sign and reason of each suspicious direction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """What a score is.
+
+    Attributes:
+        name: of the check, of the distance, or "like-" and the distortion's.
+        reason: kind of `measure.gate.reasons` that a high value speaks for.
+        sign: −1 where the statistic itself is suspicious when low.
+        what: the figure in words.
+    """
+
+    name: str
+    reason: str
+    sign: float
+    what: str
+
+
+SCORES: tuple[Score, ...] = (
+    *(Score(name=name, reason=kind, sign=sign, what=CHECKS[name].what) for name, _, sign, kind in _SIDED),
+    Score(name="summary", reason="unlike-cloth", sign=1.0, what="distance of the network's summary, log10"),
+    *(
+        Score(name=move, reason="unlike-cloth", sign=1.0, what=f"change of the network's summary when {move}, log10")
+        for move in MOVES
+    ),
+    Score(name="all-features", reason="unlike-cloth", sign=1.0, what="distance of all features together"),
+    *(
+        Score(
+            name=f"like-{name}",
+            reason=one.reason,
+            sign=1.0,
+            what=f"log-likelihood ratio of a clip made {name!r} to a plain one",
+        )
+        for name, one in DISTORTIONS.items()
+    ),
+)
+"""All scores in their order."""
+
+_RESOLUTION = np.array(
+    [*(CHECKS[name].resolution for name, *_ in _SIDED), 0.02, *(0.05 for _ in MOVES), 0.2, *(0.5 for _ in DISTORTIONS)]
+)
+_FREQUENCY = len(CHECKS) + FEATURES.index("local_frequency_mean")
+_LEARNING = 0.6
+"""Share of the plain clips of the fit that covariances are learned from; the others tell the tails."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Gate:
+    """What is known of simulated clips.
+
+    Attributes:
+        centre, scale: (f,) median and spread of each feature over plain clips.
+        whitening: (f, f), of the standardised features of plain clips.
+        directions, offsets: (k, f) and (k,): log-likelihood ratio of distortion k = directions · z − offset.
+        tails: of all scores.
+        calibration: (n,) ascending joint scores of the calibration clips.
+        statistics: (n, len(CHECKS)) of the calibration clips.
+        summaries: (n, d) of the calibration clips.
+        frequencies: (n,) dominant frequency of the calibration clips' motion [Hz].
+    """
+
+    centre: Vector
+    scale: Vector
+    whitening: Vector
+    directions: Vector
+    offsets: Vector
+    tails: Tails
+    calibration: Vector
+    statistics: Vector
+    summaries: Vector
+    frequencies: Vector
+
+    @classmethod
+    def of(
+        cls,
+        plain: Vector,
+        distorted: Mapping[str, Vector],
+        calibration: Vector,
+        *,
+        summaries: Vector,
+    ) -> Gate:
+        """Learn it from feature vectors (see `Features.vector`).
+
+        Args:
+            plain: (n, f) of simulated clips, one of a simulation, from the training side.
+            distorted: name of `DISTORTIONS` → (m, f) of clips of other simulations.
+            calibration: (k, f) of simulated clips that are in none of these and that the network was not trained on.
+            summaries: (k, d) of the calibration clips, as the network gives them.
+
+        Raises:
+            InputError: distortions that are missing, or too few clips.
+        """
+        missing = DISTORTIONS.keys() - distorted.keys()
+        if missing:
+            raise InputError(f"no clips of {', '.join(sorted(missing))}", fix="make them by measure.gate.prepare")
+        learned = round(_LEARNING * len(plain))
+        first, rest = plain[:learned], plain[learned:]
+        low, centre, high = np.quantile(first, (0.25, 0.5, 0.75), axis=0)
+        scale = np.maximum((high - low) / 1.349, 0.2 * first.std(axis=0)) + 1e-3
+        z = squashed(first, centre, scale)
+        directions, offsets = [], []
+        own = z - z.mean(axis=0)
+        for name in DISTORTIONS:
+            other = squashed(distorted[name], centre, scale)
+            pooled, _ = shrunk_covariance(np.concatenate([own, other - other.mean(axis=0)]))
+            direction = np.linalg.solve(pooled, other.mean(axis=0) - z.mean(axis=0))
+            directions.append(direction)
+            offsets.append(direction @ (other.mean(axis=0) + z.mean(axis=0)) / 2)
+        values, vectors = np.linalg.eigh(shrunk_covariance(z)[0])
+        whitening = vectors.T / np.sqrt(np.maximum(values, 1e-9))[:, None]
+        blank = Tails(start=np.zeros(len(SCORES)), excess=np.ones(len(SCORES)))
+        gate = cls(
+            centre=centre, scale=scale, whitening=whitening, directions=np.array(directions),
+            offsets=np.array(offsets), tails=blank, calibration=np.zeros(0),
+            statistics=calibration[:, : len(CHECKS)], summaries=summaries, frequencies=calibration[:, _FREQUENCY],
+        )  # fmt: skip
+        return gate._calibrated(rest, calibration)
+
+    def _calibrated(self, rest: Vector, calibration: Vector) -> Gate:
+        gate = replace(self, tails=Tails.of(self.scores(rest), _RESOLUTION))
+        return replace(gate, calibration=np.sort(gate.surprises(calibration).max(axis=1)))
+
+    def scores(self, vectors: Vector) -> Vector:
+        """(n, len(SCORES)) of feature vectors (n, f); high is suspicious."""
+        z = squashed(vectors, self.centre, self.scale)
+        sided = np.stack([sign * vectors[:, place] for _, place, sign, _ in _SIDED], axis=1)
+        distances = vectors[:, -1 - len(MOVES) :]
+        everything = np.log10(np.linalg.norm(z @ self.whitening.T, axis=1, keepdims=True)) * 10
+        return np.concatenate([sided, distances, everything, z @ self.directions.T - self.offsets], axis=1)
+
+    def surprises(self, vectors: Vector) -> Vector:
+        """(n, len(SCORES)) of feature vectors (n, f): scores on the scale of their tails."""
+        return self.tails.surprise(self.scores(vectors))
+
+    def p_value(self, surprise: float) -> float:
+        """Conformal p of a clip whose largest surprise is this."""
+        return joint_p(self.calibration, surprise)
+
+
+def squashed(vectors: Vector, centre: Vector, scale: Vector) -> Vector:
+    """Feature vectors (n, f) standardised, their far tails drawn in as a logarithm does: asinh."""
+    return np.arcsinh((vectors - centre) / scale)

@@ -1,0 +1,196 @@
+"""The verdict on a clip: familiar or refused, with a p and the reasons in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from measure.gate.checks import CHECKS
+from measure.gate.distortions import DISTORTIONS
+from measure.gate.features import features_of
+from measure.gate.gate import SCORES, Gate, Vector
+from measure.gate.reasons import REASONS
+from measure.gate.tails import level
+from models.estimator import Estimator
+
+FALSE_ALARM = 0.05
+"""Share of clips like the simulated ones that may be refused."""
+CONFIDENCE = 0.9
+"""Probability, over which clips the gate was calibrated by, that no larger share of them is."""
+_USUAL = (0.01, 0.99)
+_LIKENESS = 0.5
+"""Weight of the likeness to a distortion beside the surprise, where reasons are put in order: chosen on development
+clips, of the training side, where 1 called still pictures repeated and 0 called dark ones still."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """One reason.
+
+    Attributes:
+        kind: of `measure.gate.reasons`.
+        sentence: what is wrong, with the figure and what is usual.
+        fix: what can be done.
+        check: the score that speaks for it.
+        value: its figure, in the unit that the sentence names; None where none could be measured.
+        p: conformal p of the clip by this score alone, at the scale of all.
+    """
+
+    kind: str
+    sentence: str
+    fix: str
+    check: str
+    value: float | None
+    p: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judgement:
+    """What the gate says of a clip.
+
+    Attributes:
+        familiar: whether intervals may be shown.
+        p: conformal p over all checks together: of so many clips like the simulated ones, one looks at least as odd.
+        level: p at or below which a clip is refused.
+        false_alarm, confidence: what is kept by that level.
+        reasons: why it is refused, the weightiest first; none for a familiar clip.
+        statistics: (len(CHECKS),) the picture's statistics; None for a clip that could not be measured.
+        summary: (d,) the network's; None for a clip that could not be measured.
+        frequency: dominant frequency of the motion [Hz]; None for a clip that could not be measured.
+    """
+
+    familiar: bool
+    p: float
+    level: float
+    false_alarm: float
+    confidence: float
+    reasons: tuple[Told, ...]
+    statistics: Vector | None
+    summary: Vector | None
+    frequency: float | None
+
+    @property
+    def sentence(self) -> str:
+        """The verdict as one sentence."""
+        rate = f"p = {self.p:.2g}, refused from {self.level:.2g}: at most {self.false_alarm:.0%} false alarms"
+        if self.familiar:
+            return f"The clip is like those that the model was trained on ({rate})."
+        return f"The clip is unlike those that the model was trained on ({rate}): {self.reasons[0].sentence}."
+
+    def findings(self) -> tuple[Finding, ...]:
+        """The reasons as findings."""
+        return tuple(
+            Finding(kind=f"gate-{one.kind}", severity=Severity.ERROR, what=one.sentence, value=one.value, fix=one.fix)
+            for one in self.reasons
+        )
+
+    def as_dict(self) -> dict[str, object]:
+        """As JSON."""
+        return {
+            "familiar": self.familiar, "p": self.p, "level": self.level, "false_alarm": self.false_alarm,
+            "confidence": self.confidence, "reasons": [vars(one) for one in self.reasons],
+        }  # fmt: skip
+
+
+def judge(
+    frames: NDArray[np.uint8],
+    model: Estimator,
+    gate: Gate,
+    *,
+    false_alarm: float = FALSE_ALARM,
+    confidence: float = CONFIDENCE,
+) -> Judgement:
+    """Whether a clip is like what a model was trained on.
+
+    Args:
+        frames: (n, height, width) gray at the model's frame rate, as many as the model takes.
+        model: whose training it is compared with.
+        gate: calibrated for this model.
+        false_alarm: share of familiar clips that may be refused, by all checks together.
+        confidence: probability that no larger share of them is, over the draw of the calibration clips.
+
+    Raises:
+        InputError: more frames than the model takes, another shape or type, or a rate that the calibration clips are
+            too few to tell.
+    """
+    at = level(len(gate.calibration), false_alarm, confidence)
+    wanted = model.front_end.frames
+    if frames.ndim != 3 or frames.dtype != np.uint8 or len(frames) > wanted:
+        raise InputError(
+            f"frames of shape {frames.shape} and type {frames.dtype}",
+            fix=f"give uint8 (frame, height, width), {wanted} frames: one window of the film",
+        )
+    least = 1 / (len(gate.calibration) + 1)
+
+    def refused(kind: str, sentence: str, check: str, value: float) -> Judgement:
+        told = Told(kind=kind, sentence=sentence, fix=REASONS[kind].fix, check=check, value=value, p=least)
+        return Judgement(
+            familiar=False, p=least, level=at, false_alarm=false_alarm, confidence=confidence, reasons=(told,),
+            statistics=None, summary=None, frequency=None,
+        )  # fmt: skip
+
+    if len(frames) < wanted:
+        what = f"{REASONS['too-few-frames'].sentence}: {len(frames)} instead of {wanted}"
+        return refused("too-few-frames", what, "frames", float(len(frames)))
+    if float(frames.std()) < 1:
+        what = f"{REASONS['too-dark'].sentence}: all gray levels lie within {frames.std():.2g} of each other"
+        return refused("too-dark", what, "contrast", float(frames.std()))
+    found = features_of(model, frames)
+    vector = found.vector(model)
+    scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
+    p = gate.p_value(float(surprises.max()))
+    reasons = () if p > at else _reasons(gate, scores, surprises, at)
+    return Judgement(
+        familiar=p > at, p=p, level=at, false_alarm=false_alarm, confidence=confidence, reasons=reasons,
+        statistics=found.checks, summary=found.summary, frequency=found.frequency,
+    )  # fmt: skip
+
+
+def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float) -> tuple[Told, ...]:
+    """Each kind once, of those whose scores would refuse the clip alone.
+
+    A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
+    as a share of the clip's largest, and, by `_LIKENESS`, the log-likelihood ratio of the kind's likeliest distortion
+    as a share of the largest. The figure that is told is that of the picture's weightiest statistic, where one refuses.
+    """
+    weightiest: dict[str, int] = {}
+    pictured: dict[str, int] = {}
+    for place in np.argsort(-surprises):
+        if gate.p_value(float(surprises[place])) <= at:
+            weightiest.setdefault(SCORES[place].reason, int(place))
+            if SCORES[place].name in CHECKS:
+                pictured.setdefault(SCORES[place].reason, int(place))
+    ratios = dict.fromkeys(weightiest, 0.0)
+    for place in range(len(SCORES) - len(DISTORTIONS), len(SCORES)):
+        kind = SCORES[place].reason
+        if kind in ratios:
+            ratios[kind] = max(ratios[kind], float(scores[place]))
+    most, likeliest = float(surprises.max()), max(1.0, *(float(one) for one in scores[-len(DISTORTIONS) :]))
+    order = sorted(
+        weightiest, key=lambda kind: -surprises[weightiest[kind]] / most - _LIKENESS * ratios[kind] / likeliest
+    )
+    return tuple(
+        _told(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
+        for place in (pictured.get(kind, weightiest[kind]) for kind in order)
+    )
+
+
+def _told(gate: Gate, place: int, value: float, p: float) -> Told:
+    score, reason = SCORES[place], REASONS[SCORES[place].reason]
+    check = CHECKS.get(score.name)
+    if check is None:
+        shown, limit = value, gate.tails.start[place] + np.log(20) * gate.tails.excess[place]
+        usual = f"of simulated clips, 99 % have at most {limit:.3g}"
+    else:
+        column = gate.statistics[:, list(CHECKS).index(score.name)]
+        shown = check.shown(score.sign * value)
+        low, high = (check.shown(float(end)) for end in np.quantile(column, _USUAL))
+        usual = f"of simulated clips, 98 % have {low:.3g} to {high:.3g}"
+    return Told(
+        kind=score.reason, sentence=f"{reason.sentence} ({score.what}: {shown:.3g}; {usual})", fix=reason.fix,
+        check=score.name, value=shown, p=p,
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""Calibrate the gate of a model on the films of a lake: `python -m measure.gate.prepare --help`.
+
+It is run anew whenever a network is replaced. Training-side films shape the checks, some five minutes of one core;
+validation-side films alone, one of each simulation, decide where the gate refuses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import click
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.console import progress, say
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from measure.gate.distortions import DISTORTIONS, Film
+from measure.gate.features import Features, features_of
+from measure.gate.gate import Gate
+from models.estimator import SHIPPED, Estimator, load
+
+PLAIN, DISTORTED = 360, 30
+"""Training-side films that are taken as they are, and others of which every distortion is made."""
+_LEAST = 60
+Advance = Callable[[int], None]
+
+
+def calibrated(
+    model: Estimator,
+    training: Sequence[Film],
+    validation: Sequence[Film],
+    *,
+    seed: int,
+    advance: Advance,
+    plain: int = PLAIN,
+    distorted: int = DISTORTED,
+) -> Gate:
+    """The gate of a model.
+
+    Args:
+        training: films (frames, height, width) gray at the model's rate, one of each simulation.
+        validation: films of other simulations, which the network was not trained on, one of each.
+        seed: of the distortions.
+        advance: told how many clips were measured.
+        plain, distorted: how many of the training films are taken as they are, and how many are distorted.
+
+    Raises:
+        InputError: too few films, or films that are too short.
+    """
+    if plain < _LEAST or len(training) < plain + distorted:
+        raise InputError(
+            f"{len(training)} training films for {plain} plain and {distorted} distorted clips",
+            fix=f"give as many films, {_LEAST} plain ones or more",
+        )
+    count = model.front_end.frames
+
+    def measured(clip: Film) -> Features:
+        advance(1)
+        return features_of(model, clip)
+
+    with torch.no_grad():
+        references = [measured(film[:count]) for film in validation]
+        plains = [measured(training[index][:count]).vector(model) for index in range(plain)]
+        made: dict[str, NDArray[np.float64]] = {}
+        for name, distortion in DISTORTIONS.items():
+            clips = []
+            for index in range(distorted):
+                other = training[plain + (index + 1) % distorted]
+                rng = stream(seed, "distortion", name, index)
+                clips.append(measured(distortion.apply(training[plain + index], other, rng, count)).vector(model))
+            made[name] = np.array(clips)
+    return Gate.of(
+        np.array(plains), made, np.array([one.vector(model) for one in references]),
+        summaries=np.array([one.summary for one in references]),
+    )  # fmt: skip
+
+
+class FilmsOf(Sequence[Film]):
+    """One film of each simulation of one side of a data set, read when asked for.
+
+    Args:
+        lake_path: of the lake.
+        dataset, side: name of the data set, and "train", "validation" or "test".
+        at: ref of the lake; None for its head.
+    """
+
+    def __init__(self, lake_path: Path, dataset: str, side: str, *, at: str | None = None) -> None:
+        import flagdata
+
+        self._lake = flagdata.open(lake_path).lake
+        rows = self._lake.rows(
+            f"kind = 'recording' and name like '{dataset}-{side}-%'", columns=["name", "seed", "object"], at=at
+        ).to_pylist()
+        if not rows:
+            raise InputError(
+                f"no films {dataset}-{side}-…", where=str(lake_path), fix=f"build them: flagdata build {dataset}"
+            )
+        firsts: dict[int, tuple[str, str]] = {}
+        for row in sorted(rows, key=lambda row: row["name"]):
+            firsts.setdefault(row["seed"], (row["name"], row["object"]))
+        self.names, self._objects = zip(*firsts.values(), strict=True)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __getitem__(self, index: int) -> Film:  # pyright: ignore[reportIncompatibleMethodOverride]
+        from flagdata.record import Record
+
+        record = Record.open(self._lake.object_path(self._objects[index]))
+        return record.frames(0, record.frame_count)
+
+
+@click.command()
+@click.argument("model", type=click.Path(path_type=Path), default=SHIPPED / "wave")
+@click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
+              help="Where the films are that the model was trained on and validated by.")  # fmt: skip
+@click.option("--dataset", default="flagsim-wide", show_default=True, help="Name of the films' data set.")
+@click.option("--at", metavar="REF", help="Version of the lake; by default its head.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Random seed of the distortions.")
+def main(model: Path, lake_path: Path, dataset: str, at: str | None, seed: int) -> None:
+    """Calibrate the gate of the model in the folder MODEL and store it there."""
+    from measure.gate.storage import write
+
+    torch.set_num_threads(1)
+    loaded = load(model)
+    training, validation = (FilmsOf(lake_path, dataset, side, at=at) for side in ("train", "validation"))
+    with progress(len(validation) + PLAIN + DISTORTED * len(DISTORTIONS), label="measure", unit="clip") as advance:
+        gate = calibrated(loaded, training, validation, seed=seed, advance=advance)
+    say(f"{len(gate.calibration)} calibration clips; stored in {write(model, gate, loaded)}")
+
+
+if __name__ == "__main__":
+    main()

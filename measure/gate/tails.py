@@ -1,0 +1,82 @@
+"""How far out in the tail of plain clips a score lies, on one scale for all scores."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from flagdata.errors import InputError
+
+BODY = 0.8
+"""Share of the plain clips below the start of a tail."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tails:
+    """Exponential tails of scores, all of them suspicious when high.
+
+    Attributes:
+        start: (c,) `BODY` quantile of each score over plain clips.
+        excess: (c,) mean excess over it, not less than the score's resolution.
+    """
+
+    start: NDArray[np.float64]
+    excess: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, scores: NDArray[np.float64], resolution: NDArray[np.float64]) -> Tails:
+        """Measure them on scores (n, c) of plain clips.
+
+        Raises:
+            InputError: fewer than 20 clips.
+        """
+        if len(scores) < 20:
+            raise InputError(f"{len(scores)} clips do not tell a tail", fix="give at least 20")
+        start = np.quantile(scores, BODY, axis=0)
+        beyond = np.maximum(scores - start, 0)
+        excess = beyond.sum(axis=0) / np.maximum((beyond > 0).sum(axis=0), 1)
+        return cls(start=start, excess=np.maximum(excess, resolution))
+
+    def surprise(self, scores: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, c) excesses over the start of the tail in mean excesses: each one more is e times rarer."""
+        return (scores - self.start) / self.excess
+
+
+def joint_p(calibration: NDArray[np.float64], score: float) -> float:
+    """Conformal p of a joint score: (1 + calibration clips with at least as much)/(their number + 1).
+
+    Args:
+        calibration: (n,) ascending joint scores of clips that shaped none of the tails.
+    """
+    return float(1 + len(calibration) - np.searchsorted(calibration, score, side="left")) / (len(calibration) + 1)
+
+
+def level(count: int, false_alarm: float, confidence: float) -> float:
+    """The p at or below which a clip is refused, so that the false-alarm rate keeps to what is stated.
+
+    Given the calibration clips, the rate at which familiar clips have p ≤ k/(n + 1) is distributed as Beta(k,
+    n + 1 − k) (Vovk, Asian Conference on Machine Learning 2012, proposition 2a). k is the largest at which this rate
+    is at most `false_alarm` with probability `confidence`.
+
+    Args:
+        count: n, of the calibration clips.
+
+    Raises:
+        InputError: shares that are not between 0 and 1, or a rate that so few clips cannot tell.
+    """
+    if not (0 < false_alarm < 1 and 0 < confidence < 1):
+        raise InputError(
+            f"a false-alarm rate of {false_alarm:g} with confidence {confidence:g}", fix="give shares between 0 and 1"
+        )
+    k = np.arange(1, count + 1)
+    kept = np.flatnonzero(beta.cdf(false_alarm, k, count + 1 - k) >= confidence)
+    if len(kept) == 0:
+        fewest = int(np.ceil(np.log(1 - confidence) / np.log(1 - false_alarm)))
+        raise InputError(
+            f"{count} calibration clips cannot tell a false-alarm rate of {false_alarm:g}",
+            fix=f"give at least {fewest} clips, or a higher rate",
+        )
+    return float(k[kept[-1]]) / (count + 1)

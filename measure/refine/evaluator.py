@@ -1,0 +1,183 @@
+"""Points of the search space → embeddings, kept on disk: what has been simulated once is never simulated again.
+
+All optimisers share one evaluator. An embedding depends on the point, the number of the replicate and the evaluator's
+identity alone, not on who asked, when, or beside what: an interrupted run is resumed by running it again.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError
+from flagdata.provenance import canonical, digest
+from flagdata.rng import child_seed
+from measure.refine.simulator import Request, Simulator
+from models.estimator import Estimator
+
+STAGES = ("simulate", "render", "embed")
+_DECIMALS = 12  # of a point: enough for any optimiser, and none of the last bits of another machine's
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evaluated:
+    """Clips of one point.
+
+    Attributes:
+        embedding: (replicate, dimension) float64; NaN where a simulation failed.
+        frame: (height, width) uint8, the middle frame of the first replicate; None where that failed.
+        seconds: by stage, all replicates together, at the time they were made.
+    """
+
+    embedding: NDArray[np.float64]
+    frame: NDArray[np.uint8] | None
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """Simulates, films and embeds.
+
+    Attributes:
+        simulator: makes the films.
+        estimator: makes the embeddings: those of all its learners side by side, so that the squared distance is the
+            sum of theirs.
+        seed: of the replicates.
+        folder: where embeddings are kept, in a folder of this evaluator's identity; None keeps them in memory alone.
+    """
+
+    simulator: Simulator
+    estimator: Estimator
+    seed: int
+    folder: Path | None = None
+    model: str = ""
+    """A hash of the estimator's weights; see `fingerprint`."""
+    _kept: dict[str, Evaluated] = field(default_factory=dict)
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that shapes an embedding beside the point and the replicate."""
+        return digest(canonical({"simulator": self.simulator.identity, "model": self.model, "seed": self.seed}))
+
+    def evaluate(
+        self, points: NDArray[np.float64], replicates: int, *, advance: Callable[[int], object] | None = None
+    ) -> list[Evaluated]:
+        """Clips of points (n, 17) of [−1, 1]¹⁷, this many of each.
+
+        Args:
+            advance: called with the number of clips that were made or found.
+
+        Raises:
+            CorruptError: a file of the cache that cannot be read.
+        """
+        asked = [[self._request(point, number) for number in range(replicates)] for point in points.tolist()]
+        missing = [request for requests in asked for request in requests if self._found(request) is None]
+        size = self.simulator.batch
+        for first in range(0, len(missing), size):
+            part = missing[first : first + size]
+            for request, made in zip(part, self._made(part), strict=True):
+                self._keep(request, made)
+            if advance is not None:
+                advance(len(part))
+        if advance is not None:
+            advance(sum(len(requests) for requests in asked) - len(missing))
+        return [_together([self._found(request) for request in requests]) for requests in asked]
+
+    def clip(self, point: NDArray[np.float64], replicate: int = 0) -> NDArray[np.uint8] | None:
+        """All frames (frame, height, width) of one clip, simulated again; None where that fails."""
+        return self.simulator.films([self._request(point.tolist(), replicate)])[0].clip
+
+    def _request(self, point: Iterable[float], replicate: int) -> Request:
+        own = tuple(round(float(value), _DECIMALS) + 0.0 for value in point)
+        return Request(point=own, seed=child_seed(self.seed, "replicate", digest(repr(own)), replicate))
+
+    def _made(self, requests: list[Request]) -> list[Evaluated]:
+        films = self.simulator.films(requests)
+        there = [film.clip for film in films if film.clip is not None]
+        begun = time.perf_counter()
+        embedded = self.embed(np.stack(there)) if there else np.zeros((0, 1))
+        share = (time.perf_counter() - begun) / max(1, len(there))
+        rows = iter(embedded)
+        return [
+            Evaluated(
+                embedding=np.full((1, embedded.shape[1]), np.nan) if film.clip is None else next(rows)[None],
+                frame=None if film.clip is None else film.clip[len(film.clip) // 2],
+                seconds={**film.seconds, "embed": 0.0 if film.clip is None else share},
+            )
+            for film in films
+        ]
+
+    @torch.no_grad()
+    def embed(self, clips: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """(n, dimension) of clips (n, frame, height, width) uint8, one by one, so that none depends on the others."""
+        rows = []
+        for clip in clips:
+            found = self.estimator.embeddings(self.estimator.inputs(clip[None]))
+            rows.append(torch.cat(found, dim=1)[0].double().cpu().numpy())
+        return np.stack(rows)
+
+    def _path(self, request: Request) -> Path | None:
+        if self.folder is None:
+            return None
+        return self.folder / self.identity[:32] / f"{digest(repr(request))[:32]}.npz"
+
+    def _found(self, request: Request) -> Evaluated | None:
+        key, path = repr(request), self._path(request)
+        if key not in self._kept and path is not None and path.exists():
+            self._kept[key] = _read(path)
+        return self._kept.get(key)
+
+    def _keep(self, request: Request, made: Evaluated) -> None:
+        self._kept[repr(request)] = made
+        path = self._path(request)
+        if path is not None:
+            _write(path, made)
+
+
+def fingerprint(estimator: Estimator) -> str:
+    """A hash of an estimator's weights and front end."""
+    parts = [canonical({"front_end": asdict(estimator.front_end), "cropping": asdict(estimator.cropping)})]
+    for learner in estimator.learners:
+        for name, value in sorted(learner.state_dict().items()):
+            parts.append(f"{name}:{digest(value.cpu().double().numpy().tobytes().hex())}")
+    return digest("\n".join(parts))
+
+
+def _together(found: list[Evaluated | None]) -> Evaluated:
+    there = [entry for entry in found if entry is not None]
+    width = max(entry.embedding.shape[1] for entry in there)
+    rows = [entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan) for entry in there]
+    seconds = {stage: sum(entry.seconds[stage] for entry in there) for stage in STAGES}
+    return Evaluated(embedding=np.concatenate(rows), frame=there[0].frame, seconds=seconds)
+
+
+def _write(path: Path, made: Evaluated) -> None:
+    """Whole or not at all: written beside it, then renamed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    frame = np.zeros((0, 0), np.uint8) if made.frame is None else made.frame
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    with os.fdopen(handle, "wb") as file:
+        np.savez_compressed(
+            file, embedding=made.embedding, frame=frame, seconds=np.array([made.seconds[stage] for stage in STAGES])
+        )
+    Path(name).replace(path)
+
+
+def _read(path: Path) -> Evaluated:
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
+            embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        raise CorruptError(f"a kept evaluation cannot be read: {error}", where=str(path), fix="delete it") from None
+    return Evaluated(
+        embedding=embedding, frame=frame if frame.size else None, seconds=dict(zip(STAGES, seconds, strict=True))
+    )

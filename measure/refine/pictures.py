@@ -1,0 +1,107 @@
+"""Pictures of a refinement, as in the paper's figures: the trace, and the target beside simulated clips."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from measure.pages.render import data_url
+from measure.refine.evaluator import Evaluator
+from measure.refine.refinement import Refinement
+from measure.refine.space import WIND
+from measure.refine.trace import Trace
+
+STEPS = (0, 10, 20, 40)
+"""Steps that are shown: Runia et al. 2020, figure 8."""
+_SIDE = 200  # px of a frame on the page
+_OWN, _TARGET, _OTHER = "#c4622d", "#2b6f8f", "#7a7a7a"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """A simulated frame.
+
+    Attributes:
+        step: evaluations before it; the nearest of those so far is shown.
+        frame: (height, width) uint8; None where its simulation failed.
+        wind: it was simulated with [m/s].
+        distance: of its clip to the target, squared.
+    """
+
+    step: int
+    frame: NDArray[np.uint8] | None
+    wind: float
+    distance: float
+
+
+def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) -> list[Shown]:
+    """The nearest simulated clip after each of some steps, by its middle frame; steps beyond the trace are left out."""
+    shown = []
+    for step in steps:
+        if step >= len(trace):
+            continue
+        place = trace.incumbent(evaluations=step + 1)
+        point = trace.points[place]
+        made = evaluator.evaluate(point[None], 1)[0]
+        wind = float(evaluator.simulator.space.values(point[None])[0, WIND])
+        shown.append(Shown(step=step, frame=made.frame, wind=wind, distance=float(trace.distances[place])))
+    return shown
+
+
+def trace_picture(refinement: Refinement, clip: int = 0) -> str:
+    """Distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8, intervals, the floor."""
+    trace, target = refinement.traces[clip], refinement.targets[clip]
+    figure = Figure(figsize=(9.5, 3.1), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    number = np.arange(1, len(trace) + 1)
+    left.semilogy(number, trace.distances, ".", color=_OTHER, markersize=4, label="simulated clip")
+    left.semilogy(number, trace.distances[trace.best], color=_OWN, linewidth=1.4, label="nearest so far")
+    left.axhline(refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor")
+    left.set(xlabel="evaluations", ylabel="squared distance to the target")
+    left.legend(fontsize=8)
+    space = refinement.evaluators[clip].simulator.space
+    right.plot(number, space.values(trace.points)[:, WIND], ".", color=_OTHER, markersize=4, label="evaluated")
+    if clip == 0:
+        count = [r.evaluations for r in refinement.rounds]
+        winds = [r.intervals[0] for r in refinement.rounds]
+        right.fill_between(
+            count, [w.low for w in winds], [w.high for w in winds], color=_OWN, alpha=0.25, linewidth=0,
+            label=f"{refinement.level:.0%} interval",
+        )  # fmt: skip
+        right.plot(
+            count, [w.median for w in winds], color=_OWN, linewidth=1.4, marker="o", markersize=3, label="median"
+        )
+    if "wind_speed" in target.truth:
+        right.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
+    right.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))
+    right.legend(fontsize=8)
+    return _png(figure)
+
+
+def still(frame: NDArray[np.uint8]) -> str:
+    """A frame as a JPEG in a data URL."""
+    buffer = io.BytesIO()
+    Image.fromarray(frame).resize((_SIDE, _SIDE), Image.Resampling.LANCZOS).save(buffer, "jpeg", quality=85)
+    return data_url(buffer.getvalue(), "image/jpeg")
+
+
+def moving(clip: NDArray[np.uint8], *, rate: float) -> str:
+    """A clip (frame, height, width) that plays for ever, as a WebP in a data URL."""
+    pictures = [Image.fromarray(frame).resize((_SIDE, _SIDE), Image.Resampling.LANCZOS) for frame in clip]
+    buffer = io.BytesIO()
+    pictures[0].save(
+        buffer, "webp", save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, quality=60
+    )
+    return data_url(buffer.getvalue(), "image/webp")
+
+
+def _png(figure: Figure) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=130)
+    return data_url(buffer.getvalue(), "image/png")

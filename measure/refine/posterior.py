@@ -1,0 +1,102 @@
+"""The posterior of one cloth and of the wind in each of its clips, from a synthetic likelihood and the prior.
+
+    p(cloth, w₁ … w_J | y₁ … y_J) ∝ p(cloth) ∏ p(w_j) p(y_j | cloth, w_j)
+
+with `Metamodel`'s predictive density as p(y_j | cloth, w_j); summaries of clips are taken as independent given cloth
+and wind. The 16 parameters of the cloth are drawn from their prior and weighted, and each wind is integrated over a
+grid, since it is what clips tell most of. Where evaluations were made does not weigh on the result, other than by how
+well the density is known there: they may follow the amortised posterior without counting the data twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from flagdata.rng import stream
+from measure.refine.metamodel import Metamodel
+from measure.refine.space import BENDING, WIND, Space
+from measure.refine.start import TOLD, logits
+
+CLOTHS, WINDS, DRAWS = 2000, 121, 4000
+
+
+def regressors(reported: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the metamodel is linear in, of reported quantities (n, 5):
+    logits, nonlinearity, and the wind's logit squared: (n, 6)."""
+    told = logits(reported[:, : len(TOLD)])
+    return np.concatenate([told, reported[:, len(TOLD) :], np.square(told[:, :1])], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posterior:
+    """Draws.
+
+    Attributes:
+        points: (draw, 17) of [−1, 1]¹⁷, with the first clip's wind.
+        winds: (draw, clip) [m/s].
+        effective: Kish's effective number of the weighted prior draws of the cloth.
+        at_edge: (clip,) share of the probability in the outermost twentieth of the wind's range, both ends.
+    """
+
+    points: NDArray[np.float64]
+    winds: NDArray[np.float64]
+    effective: float
+    at_edge: NDArray[np.float64]
+
+
+def posterior(
+    space: Space, models: Sequence[Metamodel], observed: Sequence[NDArray[np.float64]], *, seed: int,
+    cloths: int = CLOTHS, winds: int = WINDS, draws: int = DRAWS,
+) -> Posterior:  # fmt: skip
+    """Weigh prior draws by what was observed.
+
+    Args:
+        models: of each clip.
+        observed: summaries (k,) of each clip.
+        seed: of the prior draws and of the posterior's.
+        cloths: prior draws of the cloth.
+        winds: points of the wind's grid, in the middle of as many equal parts of its range.
+        draws: of the posterior.
+    """
+    prior = space.prior(stream(seed, "posterior", "prior"), cloths)
+    low, high = space.wind.low, space.wind.high
+    step = (high - low) / winds
+    grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
+    own = space.reported(prior)
+    found = np.stack([_likelihood(model, own, grid, y) for model, y in zip(models, observed, strict=True)])
+    marginal = logsumexp(found, axis=2).sum(axis=0)
+    weight = np.exp(marginal - logsumexp(marginal))
+    rng = stream(seed, "posterior", "draws")
+    chosen = rng.choice(cloths, size=draws, p=weight)
+    out = np.empty((draws, len(models)))
+    for clip, table in enumerate(found):
+        share = np.exp(table[chosen] - logsumexp(table[chosen], axis=1, keepdims=True)).cumsum(axis=1)
+        cell = (rng.random((draws, 1)) > share / share[:, -1:]).sum(axis=1)
+        out[:, clip] = grid[cell] + step * (rng.random(draws) - 0.5)
+    points = prior[chosen]
+    points[:, WIND] = 2 * (out[:, 0] - low) / (high - low) - 1
+    edge = 0.05 * (high - low)
+    return Posterior(
+        points=points, winds=out, effective=float(1 / np.square(weight).sum()),
+        at_edge=((out < low + edge) | (out > high - edge)).mean(axis=0),
+    )  # fmt: skip
+
+
+def _likelihood(
+    model: Metamodel, own: NDArray[np.float64], grid: NDArray[np.floating], observed: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(cloth, wind) logarithm of the density of what was observed."""
+    rows = np.repeat(own, len(grid), axis=0)
+    rows[:, 0] = np.tile(grid, len(own))
+    return model.log_density(regressors(rows), observed).reshape(len(own), len(grid))
+
+
+def bending_table(space: Space, found: Posterior, level: float) -> NDArray[np.float64]:
+    """(15, 3): median and interval of each bending coefficient [N·m]: mostly the prior's."""
+    values = space.values(found.points)[:, :BENDING]
+    return np.quantile(values, [0.5, (1 - level) / 2, (1 + level) / 2], axis=0).T

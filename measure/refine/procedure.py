@@ -1,0 +1,328 @@
+"""The project's own refinement: from the amortised posterior to an interval, in rounds of replicated evaluations.
+
+1. The first θ are draws of the amortised posterior, widened, completed to 17 parameters by the prior.
+2. Each is simulated in replicates and filmed by the target's view; the covariance of the replicates makes the distance,
+   and their distance to each other the noise floor.
+3. A linear model of the network's mean logits over the parameters is the likelihood (`measure.refine.metamodel`); it
+   weighs draws of the prior (`measure.refine.posterior`).
+4. Further θ are draws of that posterior, widened, until the budget is spent, or the nearest θ has reached the floor and
+   the wind's interval has settled.
+
+The network's own posterior holds for any ζ; the refined one for the target's, which is what it gains. It uses no draw
+of the network's posterior as a probability: that would count the clip twice.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.rng import child_seed, stream
+from measure.refine import start
+from measure.refine.distance import ReplicateMetric
+from measure.refine.evaluator import STAGES, Evaluated, Evaluator, fingerprint
+from measure.refine.metamodel import Metamodel, least
+from measure.refine.posterior import Posterior, bending_table, posterior, regressors
+from measure.refine.refinement import Interval, Refinement, Round, intervals_of
+from measure.refine.simulator import Simulator
+from measure.refine.space import DIMENSION, WIND, Space
+from measure.refine.target import Target, knows_view
+from measure.refine.trace import Trace
+from models.estimator import Estimator
+from sim.run.recipe import Recipe
+
+OWN = "refine"
+_REGRESSORS = 7  # with the constant, see `measure.refine.posterior.regressors`
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a refinement goes.
+
+    Attributes:
+        budget: clips to simulate for each target, at most.
+        replicates: of each θ.
+        widening: of the posteriors that θ are drawn from, on the logits: the linear model is better supported from
+            outside of what it is asked about.
+        settled: relative change of the wind's interval below which it counts as settled.
+        level: of all intervals.
+        seed: of all random streams.
+        batch: flags that are simulated together; a round has as many clips.
+        renderer: a name of `sim.render.RENDERERS`.
+        to_floor: whether to stop at the noise floor, before the budget is spent.
+
+    Raises:
+        InputError: a budget that is too small for an interval, or one replicate.
+    """
+
+    budget: int = 50
+    replicates: int = 2
+    widening: float = 1.5
+    settled: float = 0.1
+    level: float = 0.9
+    seed: int = 0
+    batch: int = 8
+    renderer: str = "raster"
+    to_floor: bool = True
+
+    def __post_init__(self) -> None:
+        if self.replicates < 2:
+            raise InputError("one replicate knows no noise floor", where="replicates", fix="give at least 2")
+        if not 0 < self.level < 1:
+            raise InputError(f"a level of {self.level:g}", where="level", fix="give a share between 0 and 1")
+        if self.batch < self.replicates:
+            raise InputError(
+                f"batches of {self.batch} clips hold no {self.replicates} replicates", where="batch",
+                fix=f"give at least {self.replicates}",
+            )  # fmt: skip
+        if self.budget < self.fewest:
+            raise InputError(
+                f"{self.budget} evaluations tell no interval of {_REGRESSORS} regressors",
+                where="budget",
+                fix=f"give at least {self.fewest}",
+            )
+
+    @property
+    def fewest(self) -> int:
+        """Evaluations of the first round: enough for an interval even if replicates were all alike."""
+        return (least(_REGRESSORS, len(start.TOLD)) + 2) * self.replicates
+
+
+def refine(
+    targets: Target | Sequence[Target], estimator: Estimator, recipe: Recipe, *, settings: Settings | None = None,
+    cache: Path | None = None, advance: Callable[[int], object] | None = None,
+) -> Refinement:  # fmt: skip
+    """Measure the cloth and the wind of a clip, or of several clips of one cloth, each in a wind of its own.
+
+    Args:
+        targets: one clip, or several of one flag.
+        estimator: a model of the posterior loss.
+        recipe: of the scene, such as `sim.run.load("flag-wide")`; its ranges are the prior, and should be those of the
+            model's training data.
+        cache: folder in which evaluations are kept: an interrupted refinement goes on from them.
+        advance: called with the number of clips that were simulated.
+
+    Raises:
+        InputError: a model that tells no posterior of wind, density, scale and anisotropy, a clip that does not fit it,
+            a recipe without ranges, or too many simulations that failed.
+    """
+    chosen, several = settings or Settings(), tuple([targets] if isinstance(targets, Target) else targets)
+    start.require(estimator)
+    if not several:
+        raise InputError("no clip to measure", fix="give at least one target")
+    model = fingerprint(estimator)
+    front = estimator.front_end
+    evaluators = tuple(
+        Evaluator(
+            Simulator.of(
+                recipe, target.view, frames=front.frames, rate=front.rate, renderer=chosen.renderer, batch=chosen.batch
+            ),
+            estimator, chosen.seed, cache, model,
+        )
+        for target in several
+    )  # fmt: skip
+    return _Run(several, estimator, chosen, evaluators, advance or (lambda _: None)).whole()
+
+
+@dataclass(frozen=True)
+class _Run:
+    targets: tuple[Target, ...]
+    estimator: Estimator
+    settings: Settings
+    evaluators: tuple[Evaluator, ...]
+    advance: Callable[[int], object]
+
+    @property
+    def space(self) -> Space:
+        return self.evaluators[0].simulator.space
+
+    def whole(self) -> Refinement:
+        begun = time.perf_counter()
+        embedded = [e.embed(t.clip[None])[0] for e, t in zip(self.evaluators, self.targets, strict=True)]
+        observed = [start.summaries(self.estimator, row[None])[0] for row in embedded]
+        told = [
+            start.amortised(self.estimator, target.clip, seed=child_seed(self.settings.seed, "amortised"), draws=400)
+            for target in self.targets
+        ]
+        points: list[NDArray[np.float64]] = []  # (clip, θ, 17) of each round
+        groups: list[list[Evaluated]] = [[] for _ in self.targets]
+        ends: list[float] = []
+        rounds: list[Round] = []
+        found, reached, inferring = None, False, 0.0
+        while True:
+            own = time.perf_counter()
+            asked = self._first(told) if found is None else self._next(found, len(ends), len(rounds))
+            inferring += time.perf_counter() - own
+            for clip, evaluator in enumerate(self.evaluators):
+                groups[clip] += evaluator.evaluate(asked[clip], self.settings.replicates, advance=self.advance)
+            points.append(asked)
+            own = time.perf_counter()
+            metrics = [ReplicateMetric.of([g.embedding for g in group]) for group in groups]
+            everywhere = np.concatenate(points, axis=1)
+            found = self._posterior(everywhere, groups, observed, len(rounds))
+            near, floor = _nearest(metrics, groups, embedded), float(np.mean([m.floor for m in metrics]))
+            inferring += time.perf_counter() - own
+            ends += [time.perf_counter() - begun] * (asked.shape[1] * self.settings.replicates)
+            rounds.append(
+                Round(
+                    evaluations=len(ends), distance=near, floor=floor, seconds=ends[-1],
+                    intervals=self._intervals(found)[:2],
+                )
+            )  # fmt: skip
+            reached = near <= floor
+            if reached and self.settings.to_floor and _settled(rounds, self.settings.settled):
+                stopped = "the nearest parameters fit as well as they fit themselves, and the wind's interval settled"
+                break
+            if len(ends) + self.settings.replicates > self.settings.budget:
+                stopped = "the budget is spent"
+                break
+        seconds = {stage: sum(g.seconds[stage] for group in groups for g in group) for stage in STAGES}
+        return Refinement(
+            targets=self.targets, level=self.settings.level, intervals=self._intervals(found),
+            amortised=intervals_of(told[0], self._prior()[:, :4], self.settings.level, count=4),
+            bending=bending_table(self.space, found, self.settings.level), rounds=tuple(rounds),
+            traces=self._traces(np.concatenate(points, axis=1), groups, metrics, embedded, ends), floor=floor,
+            reached=reached, stopped=stopped, posterior=found, evaluators=self.evaluators,
+            seconds={**seconds, "infer": inferring},
+            findings=self._findings(found, metrics, groups, embedded, reached), seed=self.settings.seed,
+        )  # fmt: skip
+
+    def _first(self, told: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+        """(clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
+        count = self.settings.fewest // self.settings.replicates
+        rng = stream(self.settings.seed, OWN, "first")
+        wide = [start.widened(draws, self.settings.widening) for draws in told]
+        chosen = np.stack([draws[rng.choice(len(draws), count, replace=False)] for draws in wide])
+        turn = np.arange(count) % len(told)
+        shared = chosen[turn, np.arange(count)]
+        base = start.completed(self.space, shared, seed=self.settings.seed)
+        return self._with_winds(base, chosen[:, :, 0])
+
+    def _next(self, found: Posterior, done: int, number: int) -> NDArray[np.float64]:
+        """(clip, θ, 17): draws of the refined posterior, their winds widened."""
+        left = self.settings.budget - done
+        count = max(1, min(self.settings.batch, left) // self.settings.replicates)
+        rng = stream(self.settings.seed, OWN, "next", number)
+        chosen = rng.choice(len(found.points), count, replace=False)
+        middle = found.winds.mean(axis=0)
+        winds = middle + self.settings.widening * (found.winds[chosen] - middle)
+        return self._with_winds(found.points[chosen], winds.T)
+
+    def _with_winds(self, base: NDArray[np.float64], winds: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Cloths (θ, 17) with the winds (clip, θ) [m/s] of each clip."""
+        out = np.broadcast_to(base, (len(winds), len(base), DIMENSION)).copy()
+        entry = self.space.wind
+        out[:, :, WIND] = np.clip(2 * (winds - entry.low) / (entry.high - entry.low) - 1, -1.0, 1.0)
+        return out
+
+    def _posterior(
+        self, points: NDArray[np.float64], groups: Sequence[Sequence[Evaluated]],
+        observed: Sequence[NDArray[np.float64]], number: int,
+    ) -> Posterior:  # fmt: skip
+        models = []
+        for clip, group in enumerate(groups):
+            rows = np.concatenate([g.embedding for g in group])
+            place = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
+            there = np.isfinite(rows).all(axis=1)
+            told = start.summaries(self.estimator, rows[there])
+            known = regressors(self.space.reported(points[clip]))[place[there]]
+            models.append(Metamodel.fit(known, told, place[there]))
+        return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))
+
+    def _prior(self) -> NDArray[np.float64]:
+        return self.space.reported(self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000))
+
+    def _intervals(self, found: Posterior) -> tuple[Interval, ...]:
+        prior, level = self._prior(), self.settings.level
+        own = intervals_of(self.space.reported(found.points), prior, level)
+        for clip in range(1, len(self.targets)):
+            wind = intervals_of(found.winds[:, [clip]], prior[:, :1], level, count=1)[0]
+            own = (*own, replace(wind, name=f"{wind.name}.{clip}"))
+        return own
+
+    def _traces(
+        self, points: NDArray[np.float64], groups: Sequence[Sequence[Evaluated]], metrics: Sequence[ReplicateMetric],
+        embedded: Sequence[NDArray[np.float64]], ends: list[float],
+    ) -> tuple[Trace, ...]:  # fmt: skip
+        return tuple(
+            Trace(
+                method=OWN, points=np.repeat(points[clip], self.settings.replicates, axis=0), seconds=np.array(ends),
+                distances=np.concatenate([metric.squared(g.embedding, target) for g in group]),
+            )
+            for clip, (group, metric, target) in enumerate(zip(groups, metrics, embedded, strict=True))
+        )  # fmt: skip
+
+    def _findings(
+        self, found: Posterior, metrics: Sequence[ReplicateMetric], groups: Sequence[Sequence[Evaluated]],
+        embedded: Sequence[NDArray[np.float64]], reached: bool,
+    ) -> tuple[Finding, ...]:  # fmt: skip
+        out: list[Finding] = []
+        failed = sum(int((~np.isfinite(g.embedding).all(axis=1)).sum()) for group in groups for g in group)
+        if failed:
+            out.append(
+                Finding(
+                    kind="failed-simulations", severity=Severity.WARNING, count=failed,
+                    what=f"{failed} simulations failed and were left out",
+                )
+            )  # fmt: skip
+        if not reached:
+            near = _nearest(metrics, groups, embedded)
+            floor = float(np.mean([m.floor for m in metrics]))
+            out.append(
+                Finding(
+                    kind="above-noise-floor", severity=Severity.WARNING, value=near / floor,
+                    what=f"the nearest parameters are {near / floor:.1f} times as far from the target as replicates "
+                    "are from each other: something of the target is in no simulation",
+                    fix="give the camera and light it was filmed with, or more evaluations",
+                )
+            )  # fmt: skip
+        if found.effective < 100:
+            out.append(
+                Finding(
+                    kind="few-effective-draws", severity=Severity.WARNING, value=found.effective,
+                    what=f"the cloth's posterior rests on {found.effective:.0f} effective draws of the prior",
+                )
+            )  # fmt: skip
+        for target, share in zip(self.targets, found.at_edge.tolist(), strict=True):
+            if share > 0.1:
+                out.append(
+                    Finding(
+                        kind="wind-at-edge", severity=Severity.WARNING, value=share, where=target.name,
+                        what=f"{share:.0%} of the wind's probability lies at the ends of the range that is searched",
+                    )
+                )  # fmt: skip
+        if not all(knows_view(target) for target in self.targets):
+            out.append(
+                Finding(
+                    kind="view-drawn", severity=Severity.NOTE,
+                    what="camera and light of a target are not known: they were drawn anew for each simulated clip",
+                )
+            )  # fmt: skip
+        return tuple(out)
+
+
+def _nearest(
+    metrics: Sequence[ReplicateMetric], groups: Sequence[Sequence[Evaluated]], embedded: Sequence[NDArray[np.float64]]
+) -> float:
+    """Smallest mean squared distance of a θ's replicates, the mean over targets at the same cloth."""
+    each = np.array(
+        [
+            [float(np.mean(metric.squared(g.embedding, target))) for g in group]
+            for metric, group, target in zip(metrics, groups, embedded, strict=True)
+        ]
+    )
+    return float(each.mean(axis=0).min())
+
+
+def _settled(rounds: Sequence[Round], share: float) -> bool:
+    if len(rounds) < 2:
+        return False
+    before, now = (r.intervals[0].high - r.intervals[0].low for r in rounds[-2:])
+    return abs(now - before) <= share * before

@@ -1,0 +1,159 @@
+"""The result of a refinement, in numbers that can be stored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding
+from measure.refine.evaluator import Evaluator
+from measure.refine.posterior import Posterior
+from measure.refine.space import QUANTITIES
+from measure.refine.target import Target
+from measure.refine.trace import Trace
+
+METHOD = (
+    "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in replicates, and "
+    "filmed as the target was. The network's mean logits are regressed on the parameters; the regression's predictive "
+    "Student-t density is the likelihood of the target's (synthetic likelihood, Wood 2010), and weighs draws of the "
+    "prior."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interval:
+    """A central interval.
+
+    Attributes:
+        name: of `QUANTITIES`; of clips after the first, the wind's has the clip's number behind it.
+        unit: SI.
+        median, low, high: of the posterior.
+        prior_share: its width over that of the prior's interval of the same level: near 1 where the clip tells nothing.
+    """
+
+    name: str
+    unit: str
+    median: float
+    low: float
+    high: float
+    prior_share: float
+
+    def as_dict(self) -> dict[str, Any]:
+        return vars(self).copy()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """State after a round of evaluations.
+
+    Attributes:
+        evaluations: clips so far, of each target.
+        distance: smallest mean squared distance of a θ's replicates to the target, in the replicates' covariance, the
+            mean over targets.
+        floor: median squared distance of replicates of one θ to each other, likewise.
+        intervals: of wind and density; empty while there are too few evaluations.
+        seconds: from the start [s].
+    """
+
+    evaluations: int
+    distance: float
+    floor: float
+    intervals: tuple[Interval, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refinement:
+    """What a refinement found.
+
+    Attributes:
+        targets: what was measured.
+        level: of all intervals.
+        intervals: of `QUANTITIES`, then of the other clips' winds.
+        amortised: the same before any evaluation, as far as the network tells it, of the first target.
+        bending: (15, 3) median and interval of each bending coefficient under its prior [N·m].
+        rounds: in their order.
+        traces: of each target, distances in the replicates' covariance.
+        floor: at the end; the mean over targets.
+        reached: whether the nearest θ is as near to the target as its own replicates are to each other.
+        stopped: why it ended, in words.
+        posterior: its draws.
+        evaluators: of each target, for pictures.
+        seconds: by stage: "simulate", "render", "embed", "infer".
+        findings: what is to be kept in mind.
+        seed: of all random streams.
+    """
+
+    targets: tuple[Target, ...]
+    level: float
+    intervals: tuple[Interval, ...]
+    amortised: tuple[Interval, ...]
+    bending: NDArray[np.float64]
+    rounds: tuple[Round, ...]
+    traces: tuple[Trace, ...]
+    floor: float
+    reached: bool
+    stopped: str
+    posterior: Posterior
+    evaluators: tuple[Evaluator, ...]
+    seconds: dict[str, float]
+    findings: tuple[Finding, ...]
+    seed: int
+
+    @property
+    def evaluations(self) -> int:
+        """Clips that were simulated and filmed for each target."""
+        return len(self.traces[0])
+
+    @property
+    def sentence(self) -> str:
+        """Wind and area weight with their intervals, on one line."""
+        digits = {quantity.name: quantity.digits for quantity in QUANTITIES}
+        parts = []
+        for entry, title in zip(self.intervals, ("wind", "area weight"), strict=False):
+            d = digits[entry.name]
+            span = f"[{entry.low:.{d}f}, {entry.high:.{d}f}]"
+            parts.append(f"{title} {entry.median:.{d}f} {entry.unit} {span} {self.level:.0%}")
+        return f"{', '.join(parts)}, n = {self.evaluations} simulated clips"
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON: no arrays of draws, no pictures."""
+        return {
+            "method": METHOD, "targets": [target.name for target in self.targets], "level": self.level,
+            "intervals": [entry.as_dict() for entry in self.intervals],
+            "amortised": [entry.as_dict() for entry in self.amortised],
+            "bending": self.bending.tolist(),
+            "rounds": [{**vars(r), "intervals": [entry.as_dict() for entry in r.intervals]} for r in self.rounds],
+            "distances": [_finite(trace.distances) for trace in self.traces],
+            "floor": self.floor, "reached": self.reached, "stopped": self.stopped,
+            "evaluations": self.evaluations, "effective_draws": self.posterior.effective,
+            "seconds": self.seconds, "seed": self.seed,
+            "findings": [finding.as_dict() for finding in self.findings],
+        }  # fmt: skip
+
+
+def intervals_of(
+    draws: NDArray[np.float64], prior: NDArray[np.float64], level: float, *, count: int = len(QUANTITIES)
+) -> tuple[Interval, ...]:
+    """Central intervals of draws (n, quantity) beside the prior's.
+
+    Args:
+        count: of the first `QUANTITIES` that the columns are.
+    """
+    ends = [(1 - level) / 2, 0.5, (1 + level) / 2]
+    low, middle, high = np.quantile(draws, ends, axis=0)
+    least, _, most = np.quantile(prior, ends, axis=0)
+    return tuple(
+        Interval(
+            name=quantity.name, unit=quantity.unit, median=float(middle[i]), low=float(low[i]), high=float(high[i]),
+            prior_share=float((high[i] - low[i]) / (most[i] - least[i])),
+        )
+        for i, quantity in enumerate(QUANTITIES[:count])
+    )  # fmt: skip
+
+
+def _finite(values: NDArray[np.float64]) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

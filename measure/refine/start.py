@@ -1,0 +1,104 @@
+"""Where a refinement starts: draws of the amortised posterior, completed to 17 parameters by the prior.
+
+The network tells wind, density, scale and anisotropy of bending. The 15 coefficients follow from the prior given these
+two: of many prior draws the one whose scale and anisotropy are nearest is taken (sampling-importance-resampling with
+the narrowest kernel), so that the rest is as the prior has it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from measure.refine.space import DENSITY, DIMENSION, WIND, Space
+from models.estimator import Estimator
+from models.targets import TARGETS
+
+TOLD = ("wind_speed", "density", "bending_scale", "anisotropy")
+"""Targets that a network must tell for a refinement to start from it."""
+_POOL = 20_000
+_MARGIN = 1e-3  # of a logit's range: parameters at the very end of theirs have none
+
+
+def require(estimator: Estimator) -> None:
+    """Make sure that a network tells `TOLD`, each with a distribution.
+
+    Raises:
+        InputError: it does not.
+    """
+    names = tuple(target.name for target in estimator.targets)
+    if any(name not in names for name in TOLD):
+        raise InputError(
+            f"the model tells {', '.join(names) or 'nothing'}, a refinement starts from {', '.join(TOLD)}",
+            where=f"model {estimator.name!r}", fix="take a model of the posterior loss with these targets",
+        )  # fmt: skip
+
+
+@torch.no_grad()
+def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the network tells of embeddings (n, d), all learners' side by side: mean logits of `TOLD`, (n, 4).
+
+    The posterior's mean is the summary that loses least for estimating it (Fearnhead and Prangle, Journal of the Royal
+    Statistical Society B 74, 2012); rows that are not finite stay so.
+    """
+    finite = np.isfinite(embedding).all(axis=1)
+    names = [target.name for target in estimator.targets]
+    columns = [names.index(name) for name in TOLD]
+    out = np.full((len(embedding), len(TOLD)), np.nan)
+    if not finite.any():
+        return out
+    rows = torch.from_numpy(embedding[finite]).to(estimator.device).float()
+    widths = [int(learner.network.dimension) for learner in estimator.learners]  # pyright: ignore[reportArgumentType]
+    told: list[Tensor] = []
+    for learner, part in zip(estimator.learners, rows.split(widths, dim=1), strict=True):
+        told.append(learner.mixture(part).mean() * learner.spread + learner.centre)
+    out[finite] = torch.stack(told).mean(dim=0)[:, columns].double().cpu().numpy()
+    return out
+
+
+def amortised(estimator: Estimator, clip: NDArray[np.uint8], *, seed: int, draws: int) -> NDArray[np.float64]:
+    """Draws of `TOLD` for a clip (frame, height, width): (draw, 4), in the targets' units."""
+    found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws)
+    names = [target.name for target in found.targets]
+    return found.draws[0][:, [names.index(name) for name in TOLD]].astype(np.float64)
+
+
+def logits(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logits of the places of values (…, 4) of `TOLD` in their ranges, as networks learn them."""
+    low = np.array([TARGETS[name].low for name in TOLD])
+    high = np.array([TARGETS[name].high for name in TOLD])
+    share = np.clip((values - low) / (high - low), _MARGIN, 1 - _MARGIN)
+    return np.log(share / (1 - share))
+
+
+def widened(values: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """Draws (n, 4) of `TOLD` with their logits' deviations from the mean enlarged."""
+    low = np.array([TARGETS[name].low for name in TOLD])
+    high = np.array([TARGETS[name].high for name in TOLD])
+    z = logits(values)
+    z = z.mean(axis=0) + factor * (z - z.mean(axis=0))
+    return low + (high - low) / (1 + np.exp(-z))
+
+
+def completed(space: Space, told: NDArray[np.float64], *, seed: int) -> NDArray[np.float64]:
+    """Points (n, 17) of [−1, 1]¹⁷ with the wind and density of `told` (n, 4), and bending of the prior as near to its
+    scale and anisotropy as 20,000 draws come, no draw twice."""
+    pool = space.prior(stream(seed, "refine", "pool"), _POOL)
+    offered, wanted = space.reported(pool)[:, 2:4], told[:, 2:4]
+    spread = offered.std(axis=0)
+    tree = KDTree(offered / spread)
+    taken: set[int] = set()
+    out = np.empty((len(told), DIMENSION))
+    for i, row in enumerate(wanted / spread):
+        _, near = tree.query(row, k=len(told) + 1)
+        place = next(int(n) for n in np.atleast_1d(near) if int(n) not in taken)
+        taken.add(place)
+        out[i] = pool[place]
+    for column, entry, own in ((DENSITY, space.density, told[:, 1]), (WIND, space.wind, told[:, 0])):
+        out[:, column] = np.clip(2 * (own - entry.low) / (entry.high - entry.low) - 1, -1.0, 1.0)
+    return out

@@ -1,0 +1,65 @@
+"""What is measured: a clip as the network takes it, and how it was filmed, as far as that is known."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.lake import Artifact
+from measure.refine.space import BENDING, QUANTITIES, Space
+from measure.refine.view import FixedView, View, of_parameters
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Target:
+    """A clip of a flag of 1.5 m at 25 Hz, or one resampled to look like it (dynamic similarity).
+
+    Attributes:
+        name: for tables and pictures.
+        clip: (frame, height, width) uint8 gray.
+        view: how simulated flags are filmed to be compared with it.
+        truth: name → value of what is known of it, SI; for the trace's dashed line and for scores.
+    """
+
+    name: str
+    clip: NDArray[np.uint8]
+    view: View
+    truth: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.clip.ndim != 3 or self.clip.dtype != np.uint8:
+            raise InputError(
+                f"a clip of shape {self.clip.shape} and type {self.clip.dtype}", where=f"target {self.name!r}",
+                fix="give uint8 of shape (frame, height, width)",
+            )  # fmt: skip
+
+
+def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: View, space: Space) -> Target:
+    """A target of a recording in the lake: ζ and truth are what its row states, if it is simulated.
+
+    Args:
+        clip: (frame, height, width) of it.
+        otherwise: the view of a recording that states no ζ.
+    """
+    content = json.loads(recording.parameters) if recording.parameters else {}
+    stated = of_parameters(content, where=f"recording {recording.name!r}") if content else None
+    return Target(name=recording.name, clip=clip, view=stated or otherwise, truth=_truth(content, space))
+
+
+def knows_view(target: Target) -> bool:
+    """Whether ζ and the camera are given, and not drawn."""
+    return isinstance(target.view, FixedView)
+
+
+def _truth(content: Mapping[str, float], space: Space) -> dict[str, float]:
+    names = [*(f"bending.{index}" for index in range(BENDING)), "density", "wind_speed"]
+    if any(name not in content for name in names):
+        return {name: float(content[name]) for name in ("density", "wind_speed") if name in content}
+    point = space.unit(np.array([[float(content[name]) for name in names]]))
+    found = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0].tolist(), strict=True))
+    return {**found, "density": float(content["density"]), "wind_speed": float(content["wind_speed"])}

@@ -1,0 +1,43 @@
+"""What an optimiser did: every evaluation with its point, distance and time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """Evaluations in their order; one is one simulated and filmed clip.
+
+    Attributes:
+        method: a name of `measure.refine.peers.registry.PEERS`, or of the project's own procedure.
+        points: (n, d) of [−1, 1]ᵈ.
+        distances: (n,) squared distances to the target; infinite where a simulation failed.
+        seconds: (n,) from the start to the end of each evaluation, with the optimiser's own time [s].
+    """
+
+    method: str
+    points: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    seconds: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def best(self) -> NDArray[np.int64]:
+        """(n,) number of the nearest evaluation so far."""
+        order = np.arange(len(self))
+        new = self.distances <= np.minimum.accumulate(self.distances)
+        new &= np.concatenate([[True], self.distances[1:] < np.minimum.accumulate(self.distances)[:-1]])
+        return np.maximum.accumulate(np.where(new, order, 0))
+
+    def incumbent(self, *, evaluations: int | None = None, seconds: float | None = None) -> int:
+        """Number of the nearest evaluation within so many evaluations, and so many seconds; the first at least."""
+        count = len(self) if evaluations is None else min(evaluations, len(self))
+        if seconds is not None:
+            count = min(count, int(np.searchsorted(self.seconds, seconds, side="right")))
+        return int(self.best[max(count, 1) - 1])

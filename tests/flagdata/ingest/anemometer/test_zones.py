@@ -1,0 +1,79 @@
+"""Zones that a file states above its rows, and zones that the user gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import TimeError
+from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.zones import stated
+from flagdata.signals import WindLog
+
+Read = Callable[..., WindLog]
+
+_NRG = (
+    "SymphoniePRO Desktop Application\tVersion 3\nTime Zone: UTC-05:00\nChannel: 1\nDescription: cup\n\n"
+    "Timestamp\tCh1_Anem_30.00m_S_Avg_m/s\n"
+    + "".join(f"2026-03-14 08:{minute:02d}:00\t{4 + minute / 10}\n" for minute in range(0, 60, 5))
+)
+_TABLE = "Time,Wind (m/s)\n2026-07-14 12:00:00,4.1\n2026-07-14 12:00:01,5.2\n"
+
+
+def kinds(log: WindLog) -> list[str]:
+    return [finding.kind for finding in log.findings]
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("Time Zone: UTC+01:00", "UTC+01:00"),
+        ("UTC Offset,+2", "+02:00"),
+        ("Timezone=UTC", "UTC"),
+        ("GMT Offset:,+01:00", "+01:00"),
+        ("#DEBUG: Time Zone     -> America/New_York", "America/New_York"),
+        ("utc_offset_seconds,3600", "+01:00"),
+        ("GMT Offset=+0530", "+05:30"),
+        ("TimeZone=Etc/GMT-1", "Etc/GMT-1"),
+        ("latitude,utc_offset_seconds,timezone\n52.1,-18000,America/New_York", "-05:00"),
+    ],
+)
+def test_a_zone_that_lines_above_the_rows_state_is_found(text: str, name: str) -> None:
+    statement = stated(text.split("\n"))
+    assert statement is not None
+    assert statement.name == name
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["Time zone: local", "UTC Offset,99", "zone 5 of the site", "Time Zone: UTC\nGMT Offset: -5", "Timestamp,UTC"],
+)
+def test_what_names_no_zone_or_two_states_none(text: str) -> None:
+    assert stated(text.split("\n")) is None
+
+
+def test_a_zone_off_the_preambles_is_told_whatever_reader_is_chosen(read: Read) -> None:
+    for name in ("nrg", "delimited"):
+        log = read(_NRG, format=name, zone="+01:00")
+        found = [finding for finding in log.findings if finding.kind == "zone-contradicts"]
+        assert [finding.value for finding in found] == [6.0]
+        assert "zone-contradicts" not in kinds(read(_NRG, format=name, zone="-05:00"))
+
+
+def test_a_place_is_no_contradiction_where_its_clocks_agree(read: Read) -> None:
+    assert "zone-contradicts" not in kinds(read(f"UTC Offset,+2\n{_TABLE}", zone="Europe/Amsterdam"))
+    assert "zone-contradicts" in kinds(read(f"UTC Offset,+1\n{_TABLE}", zone="Europe/Amsterdam"))
+
+
+def test_a_zone_in_the_heading_is_taken_and_another_one_given_is_told(read: Read) -> None:
+    text = _TABLE.replace("Time,", "Time (Europe/Berlin),")
+    assert read(text).series.time[0] == 1_784_023_200_000_000_000  # 10:00 UTC
+    assert "zone-contradicts" in kinds(read(text, zone="UTC"))
+
+
+def test_a_missing_zone_is_asked_for_with_what_the_file_says(log_file: Callable[[str], Path]) -> None:
+    path = log_file(f"Timezone=UTC\n{_TABLE}")
+    with pytest.raises(TimeError, match="line 1 says 'Timezone=UTC': if that is the zone of the stamps, --zone UTC"):
+        read_log(path, WindOptions())

@@ -1,0 +1,61 @@
+"""Small made films of a waving patch before a still background, and a small network that was never trained."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from measure.gate.checks import CHECKS
+from measure.gate.seen import Seen
+from models.crops import Cropping
+from models.estimator import Estimator
+from models.frontend import FrontEnd
+from models.learner import Learner, Loss
+from models.outliers import Familiarity
+from models.registry import NETWORKS
+
+SIZE, FRAMES = 112, 30
+
+
+def background(seed: int = 0) -> NDArray[np.float64]:
+    """(SIZE, SIZE) gray levels with structure of all lengths, 60 to 190."""
+    from scipy import ndimage
+
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=(SIZE, SIZE))
+    picture = np.sum([ndimage.gaussian_filter(noise, s, mode="wrap") * s for s in (1.5, 4, 12)], axis=0)
+    return 60 + 130 * (picture - picture.min()) / np.ptp(picture)
+
+
+def film(
+    *, seed: int = 0, at: tuple[float, float] = (0.5, 0.5), frames: int = FRAMES, noise: float = 0.7
+) -> NDArray[np.uint8]:
+    """(frames, SIZE, SIZE): a patch with travelling waves, its middle at (x, y) in sides of the picture."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(frames)[:, None, None] / 25
+    y, x = np.mgrid[:SIZE, :SIZE]
+    inside = (np.abs(x - at[0] * SIZE) < 22) & (np.abs(y - at[1] * SIZE) < 15)
+    wind = rng.uniform(1, 4)
+    waves = 120 + 70 * np.cos(0.35 * x - 2 * np.pi * wind * t + rng.uniform(0, 6)) * np.cos(0.2 * y + wind * t)
+    gray = np.where(inside, waves, background(seed)) + rng.normal(0, noise, (frames, SIZE, SIZE))
+    return np.clip(np.rint(gray), 0, 255).astype(np.uint8)
+
+
+def value(name: str, frames: NDArray[np.uint8]) -> float:
+    """One statistic of a clip."""
+    return CHECKS[name].measure(Seen.of(frames))
+
+
+def small_model(seed: int = 0) -> Estimator:
+    """A network with random weights on 12 frames of 32 px, with a cloud of made films."""
+    torch.manual_seed(seed)
+    front_end = FrontEnd(maps="wave-maps", size=32, frames=12)
+    network = NETWORKS["wave"](dimension=4, widths=(6, 6, 6))
+    learner = Learner(network, loss=Loss.POSTERIOR, targets=("wind_speed",), components=2).eval()
+    rng = np.random.default_rng(seed)
+    cloud = Familiarity.of(rng.normal(size=(40, 4)), rng.normal(size=(19, 4)))
+    return Estimator(
+        name="small", learners=(learner,), front_end=front_end,
+        cropping=Cropping(frames=12, size=32), widening=torch.ones(1), cloud=cloud, card={"name": "small"},
+    )  # fmt: skip

@@ -1,0 +1,143 @@
+"""From frames to a verdict in words, with a small network that was never trained."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError, InputError, NotFoundError
+from measure.gate.checks import CHECKS
+from measure.gate.distortions import DISTORTIONS
+from measure.gate.features import features_of
+from measure.gate.gate import Gate
+from measure.gate.judgement import judge
+from measure.gate.nearest import nearest
+from measure.gate.prepare import calibrated
+from measure.gate.storage import read, write
+from models.estimator import Estimator
+from models.outliers import Familiarity
+from tests.measure.gate.made import film, small_model
+
+PLAIN, DISTORTED, VALIDATION = 60, 4, 50
+
+
+def clip(seed: int, frames: int = 16) -> NDArray[np.uint8]:
+    """A film like those that the small gate is calibrated by: one patch near the middle."""
+    x, y = np.random.default_rng(seed).uniform(0.45, 0.55, 2)
+    return film(seed=seed, at=(float(x), float(y)), frames=frames)
+
+
+@pytest.fixture(scope="module")
+def model() -> Estimator:
+    return small_model()
+
+
+@pytest.fixture(scope="module")
+def gate(model: Estimator) -> Gate:
+    training = [clip(seed) for seed in range(PLAIN + DISTORTED)]
+    validation = [clip(1000 + seed) for seed in range(VALIDATION)]
+    return calibrated(
+        model, training, validation, seed=1, advance=lambda _: None, plain=PLAIN, distorted=DISTORTED
+    )  # fmt: skip
+
+
+def test_most_films_like_the_calibration_clips_are_familiar(model: Estimator, gate: Gate) -> None:
+    """At a level that lets 5 % be refused at most, with 90 %, of 20 films four refusals have p = 0.02."""
+    judged = [judge(clip(5000 + seed)[:12], model, gate) for seed in range(20)]
+    assert sum(not one.familiar for one in judged) <= 3
+    assert all(one.familiar == (one.p > one.level) and one.familiar == (not one.reasons) for one in judged)
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind"),
+    [("still", "no-motion"), ("held", "low-frame-rate"), ("dark", "too-dark"), ("pair", "several-flags")],
+)
+def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, kind: str) -> None:
+    plain = clip(42)
+    rng = np.random.default_rng(5)
+    frames = {
+        "still": np.repeat(plain[:1], 12, axis=0),
+        "held": plain[(np.floor(np.arange(12) / 2.5) * 2.5).astype(int)],
+        "dark": np.clip(plain[:12] * 0.08 + rng.normal(0, 2, plain[:12].shape), 0, 255).astype(np.uint8),
+        "pair": np.concatenate(
+            [film(seed=42, at=(0.25, 0.5))[:12, :, :56], film(seed=43, at=(0.75, 0.5))[:12, :, 56:]], axis=2
+        ),
+    }[fault]
+    judged = judge(frames, model, gate)
+    assert not judged.familiar
+    assert kind in {one.kind for one in judged.reasons}
+    assert judged.reasons[0].sentence in judged.sentence
+    assert len({one.kind for one in judged.reasons}) == len(judged.reasons)
+    assert all(one.p <= judged.level for one in judged.reasons)
+    assert not next(one for one in judged.reasons if one.kind == kind).check.startswith("like-")
+    assert all(finding.fix and finding.kind.startswith("gate-") for finding in judged.findings())
+
+
+def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(model: Estimator, gate: Gate) -> None:
+    short = judge(clip(1)[:10], model, gate)
+    assert [one.kind for one in short.reasons] == ["too-few-frames"]
+    assert "10 instead of 12" in short.sentence
+    black = judge(np.zeros((12, 64, 64), dtype=np.uint8), model, gate)
+    assert [one.kind for one in black.reasons] == ["too-dark"]
+    assert black.p == pytest.approx(1 / (VALIDATION + 1))
+
+
+def test_frames_that_are_no_window_are_an_error(model: Estimator, gate: Gate) -> None:
+    with pytest.raises(InputError, match="one window of the film"):
+        judge(clip(1, frames=20), model, gate)
+    with pytest.raises(InputError, match="calibration clips cannot tell"):
+        judge(clip(1)[:12], model, gate, false_alarm=0.01)
+
+
+def test_a_gate_is_the_same_after_storing_and_fits_its_own_network_alone(
+    model: Estimator, gate: Gate, tmp_path: Path
+) -> None:
+    with pytest.raises(NotFoundError):
+        read(tmp_path, model)
+    write(tmp_path, gate, model)
+    again = read(tmp_path, model)
+    for seed in range(3):
+        one, other = (judge(clip(seed)[:12], model, which) for which in (gate, again))
+        assert (one.p, one.reasons) == (other.p, other.reasons)
+    with pytest.raises(CorruptError, match="another network"):
+        read(tmp_path, small_model(seed=1))
+
+
+def test_a_clip_is_nearest_to_itself_and_differs_in_nothing(model: Estimator, gate: Gate) -> None:
+    own = features_of(model, clip(1007)[:12])
+    assert model.cloud is not None
+    found = nearest(
+        own.summary, gate.summaries, model.cloud, statistics=own.checks, known=gate.statistics,
+        frequency=own.frequency, frequencies=gate.frequencies,
+    )  # fmt: skip
+    assert (found[0].index, found[0].differences) == (7, ())
+    assert found[0].distance == pytest.approx(0, abs=1e-5)
+    assert found[0].distance <= found[1].distance <= found[2].distance
+
+
+def test_what_a_clip_differs_in_is_told_the_largest_first() -> None:
+    """Half the area is 0.3 in log10, two of its steps; 60 gray levels are four, 1 Hz is one."""
+    names = list(CHECKS)
+    known, own = np.zeros((1, len(names))), np.zeros(len(names))
+    own[names.index("area")] = -np.log10(2)
+    own[names.index("level")] = -60
+    cloud = Familiarity(centre=np.zeros(2), whitening=np.eye(2), reference=np.ones(1))
+    (only,) = nearest(
+        np.array([3.0, 4.0]), np.zeros((1, 2)), cloud, statistics=own, known=known, frequency=4.0,
+        frequencies=np.array([2.5]),
+    )  # fmt: skip
+    assert only.distance == pytest.approx(5)
+    assert [words.partition(":")[0] for words in only.differences] == ["exposure", "scale", "dominant frequency"]
+    assert "takes less of the picture (2 times)" in only.differences[1]
+
+
+@pytest.mark.parametrize("name", DISTORTIONS)
+def test_a_distortion_is_the_same_from_the_same_seed_and_of_the_length_wanted(name: str) -> None:
+    make = DISTORTIONS[name].apply
+    one, other, again = (make(clip(1), clip(2), np.random.default_rng(seed), 12) for seed in (3, 4, 3))
+    np.testing.assert_array_equal(one, again)
+    assert (len(one), one.dtype, one.ndim) == (12, np.uint8, 3)
+    assert one.shape != other.shape or (one != other).any()

@@ -1,0 +1,78 @@
+"""A small world: a coarse flag, pictures of 48 px, a network of random weights."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from flagdata.rng import torch_draws
+from measure.refine.evaluator import Evaluator, fingerprint
+from measure.refine.simulator import Simulator
+from measure.refine.view import Camera, FixedView
+from models.crops import Cropping
+from models.estimator import Estimator
+from models.frontend import FrontEnd
+from models.learner import Learner, Loss
+from models.wave import WaveNetwork
+from sim.render import RenderParameters
+from sim.run import reading
+from sim.run.recipe import Recipe
+
+FRAMES, RATE, SIZE = 8, 25.0, 48
+SCENE = """
+seed = 1
+[scene]
+columns = 3
+[material]
+name = "camel-ponte-roma"
+density = { low = 0.10, high = 0.17 }
+bending-factors = { low = 0.1, high = 10.0 }
+[wind]
+speed = { low = 0.0, high = 10.0 }
+[time]
+settle = 0.4
+frames = 8
+rate = 25.0
+"""
+
+
+@pytest.fixture(scope="session")
+def recipe() -> Recipe:
+    return reading.parse(SCENE, name="coarse", folder=Path(), where="test")
+
+
+@pytest.fixture(scope="session")
+def view() -> FixedView:
+    zeta = RenderParameters(texture="flag/france", background="sky/1", width=SIZE, height=SIZE, raster_samples=2)
+    return FixedView(zeta=zeta, camera=Camera())
+
+
+@pytest.fixture(scope="session")
+def estimator() -> Estimator:
+    with torch_draws(3, "network"):
+        learner = Learner(
+            WaveNetwork(dimension=6, widths=(4, 6, 8)), loss=Loss.POSTERIOR, components=2,
+            targets=("wind_speed", "density", "bending_scale", "anisotropy"),
+        )  # fmt: skip
+    return Estimator(
+        name="random", learners=(learner.eval(),), front_end=FrontEnd(maps="wave-maps", size=32, frames=FRAMES),
+        cropping=Cropping(frames=FRAMES, size=32), widening=torch.ones(4), cloud=None, card={},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def simulator(recipe: Recipe, view: FixedView) -> Simulator:
+    return Simulator.of(recipe, view, frames=FRAMES, rate=RATE, batch=4)
+
+
+@pytest.fixture
+def evaluator(simulator: Simulator, estimator: Estimator, tmp_path: Path) -> Evaluator:
+    return Evaluator(simulator, estimator, 5, tmp_path / "cache", fingerprint(estimator))
+
+
+@pytest.fixture
+def points() -> np.ndarray:
+    return np.random.default_rng(2).uniform(-1, 1, (3, 17))

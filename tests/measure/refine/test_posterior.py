@@ -1,0 +1,94 @@
+"""The posterior against cases whose posterior is known."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import binom, norm
+
+from measure.refine.metamodel import Metamodel
+from measure.refine.posterior import CLOTHS, posterior, regressors
+from measure.refine.space import Space
+from sim.run.recipe import Recipe
+
+SLOPES = np.array(
+    [[1.2, 0.3, 0.0], [0.2, 0.8, 0.1], [0.0, 0.1, 0.4], [0.1, 0.0, 0.2], [0.0, 0.3, 0.0], [0.05, 0.0, 0.0]]
+)
+NOISE = 0.4
+
+
+def _rows(space: Space, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the prior and summaries of one clip of each."""
+    points = space.prior(rng, count)
+    return points, regressors(space.reported(points)) @ SLOPES + rng.normal(0, NOISE, (count, 3))
+
+
+def test_with_many_evaluations_it_is_the_exact_posterior(recipe: Recipe) -> None:
+    """Exact by brute force: 50,000 prior draws weighted by the true Gaussian likelihood."""
+    space, rng = Space.of(recipe), np.random.default_rng(0)
+    points, summaries = _rows(space, rng, 4000)
+    _, observed = _rows(space, rng, 1)
+    model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(4000))
+    found = posterior(space, [model], [observed[0]], seed=1)
+    drawn = space.reported(space.prior(rng, 50_000))
+    weight = norm.logpdf(observed[0], regressors(drawn) @ SLOPES, NOISE).sum(axis=1)
+    weight = np.exp(weight - weight.max())
+    middle = weight @ drawn / weight.sum()
+    spread = np.sqrt(weight @ np.square(drawn - middle) / weight.sum())
+    told = space.reported(found.points)
+    # 4,000 draws know a mean to 0.016 standard deviations, and the model's slopes are known to a few percent
+    assert (np.abs(told.mean(axis=0) - middle) < 0.12 * spread).all()
+    np.testing.assert_allclose(told.std(axis=0), spread, rtol=0.08)
+
+
+def test_intervals_cover_as_often_as_they_say_after_few_evaluations(recipe: Recipe) -> None:
+    """90 % intervals from 14 points with two replicates each, over 200 truths drawn from the prior."""
+    space, rng = Space.of(recipe), np.random.default_rng(5)
+    trials, inside = 200, np.zeros(5)
+    for trial in range(trials):
+        truth, observed = _rows(space, rng, 1)
+        points = np.repeat(space.prior(rng, 14), 2, axis=0)
+        known = regressors(space.reported(points))
+        summaries = known @ SLOPES + rng.normal(0, NOISE, (28, 3))
+        model = Metamodel.fit(known, summaries, np.repeat(np.arange(14), 2))
+        found = posterior(space, [model], [observed[0]], seed=trial, cloths=300, winds=41, draws=1000)
+        low, high = np.quantile(space.reported(found.points), [0.05, 0.95], axis=0)
+        inside += (low <= space.reported(truth)[0]) & (space.reported(truth)[0] <= high)
+    least, most = binom(trials, 0.9).ppf([0.0005, 0.9995])
+    assert (inside >= least).all()
+    assert (inside <= most).all()
+
+
+def test_two_clips_of_one_cloth_tell_more_of_it_than_one(recipe: Recipe) -> None:
+    space, rng = Space.of(recipe), np.random.default_rng(6)
+    points, summaries = _rows(space, rng, 2000)
+    model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(2000))
+    truth = space.prior(rng, 1)
+    several = np.repeat(truth, 8, axis=0)
+    several[:, 16] = np.linspace(-0.7, 0.7, 8)
+    observed = regressors(space.reported(several)) @ SLOPES + rng.normal(0, NOISE, (8, 3))
+    one = posterior(space, [model], [observed[0]], seed=2, cloths=1000, winds=61)
+    all_ = posterior(space, [model] * 8, list(observed), seed=2, cloths=1000, winds=61)
+    spread = [space.reported(found.points)[:, 1].std() for found in (one, all_)]
+    assert spread[1] < 0.8 * spread[0]
+    # each wind is its own: the medians rise with the true winds
+    assert (np.diff(np.median(all_.winds, axis=0)) > 0).mean() > 0.8
+
+
+def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
+    space, rng = Space.of(recipe), np.random.default_rng(7)
+    points, _ = _rows(space, rng, 2000)
+    model = Metamodel.fit(regressors(space.reported(points)), rng.normal(size=(2000, 2)), np.arange(2000))
+    found = posterior(space, [model], [np.zeros(2)], seed=3)
+    told = space.reported(found.points)
+    prior = space.reported(space.prior(rng, 4000))
+    np.testing.assert_allclose(told.std(axis=0), prior.std(axis=0), rtol=0.1)
+    assert found.effective > 0.75 * CLOTHS
+
+
+def test_the_same_seed_gives_the_same_draws(recipe: Recipe) -> None:
+    space, rng = Space.of(recipe), np.random.default_rng(8)
+    points, summaries = _rows(space, rng, 100)
+    model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(100))
+    a, b, c = (posterior(space, [model], [summaries[0]], seed=seed, cloths=200, winds=21) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(a.points, b.points)
+    assert not np.array_equal(a.points, c.points)

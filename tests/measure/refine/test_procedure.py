@@ -1,0 +1,121 @@
+"""The procedure end to end, on a coarse flag and a network of random weights: what it tells means nothing, how it goes
+does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError
+from flagdata.rng import child_seed
+from measure.refine.evaluator import Evaluator
+from measure.refine.procedure import Settings, refine
+from measure.refine.section import section
+from measure.refine.simulator import Request, Simulator
+from measure.refine.space import QUANTITIES
+from measure.refine.target import Target
+from measure.refine.view import FixedView
+from models.estimator import Estimator
+from sim.run.recipe import Recipe
+
+SETTINGS = Settings(budget=36, batch=8, seed=4)
+
+
+@pytest.fixture(scope="module")
+def target(recipe: Recipe, view: FixedView) -> Target:
+    simulator = Simulator.of(recipe, view, frames=8, rate=25.0, batch=1)
+    clip = simulator.films([Request(point=(0.0,) * 16 + (0.2,), seed=child_seed(9, "target"))])[0].clip
+    assert clip is not None
+    return Target(name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "density": 0.135})
+
+
+def test_killed_and_resumed_it_gives_the_same_result(
+    recipe: Recipe, estimator: Estimator, target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = replace(SETTINGS, to_floor=False)
+    whole = refine(target, estimator, recipe, settings=settings, cache=tmp_path / "a")
+    made: list[int] = []
+    films = Simulator.films
+
+    def dying(self: Simulator, requests: list[Request]) -> list[object]:
+        if sum(made) >= 24:
+            raise KeyboardInterrupt
+        made.append(len(requests))
+        return films(self, requests)  # pyright: ignore[reportReturnType]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulator, "films", dying)
+        with pytest.raises(KeyboardInterrupt):
+            refine(target, estimator, recipe, settings=settings, cache=tmp_path / "b")
+    again: list[int] = []
+    monkeypatch.setattr(Simulator, "films", lambda self, r: again.append(len(r)) or films(self, r))
+    resumed = refine(target, estimator, recipe, settings=settings, cache=tmp_path / "b")
+    assert sum(made) + sum(again) == whole.evaluations == 36
+    np.testing.assert_array_equal(resumed.traces[0].points, whole.traces[0].points)
+    np.testing.assert_array_equal(resumed.traces[0].distances, whole.traces[0].distances)
+    assert resumed.intervals == whole.intervals
+
+
+def test_it_stops_at_the_noise_floor_and_says_so(recipe: Recipe, estimator: Estimator, target: Target) -> None:
+    found = refine(target, estimator, recipe, settings=replace(SETTINGS, budget=200, settled=10.0))
+    assert found.reached
+    assert found.rounds[-1].distance <= found.floor
+    assert found.evaluations < 200
+    assert "as well as they fit themselves" in found.stopped
+
+
+def test_what_no_simulation_looks_like_is_never_at_the_floor(
+    recipe: Recipe, estimator: Estimator, target: Target
+) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, target.clip.shape, dtype=np.uint8)
+    found = refine(replace(target, clip=noise), estimator, recipe, settings=SETTINGS)
+    assert not found.reached
+    assert found.stopped == "the budget is spent"
+    assert "above-noise-floor" in {finding.kind for finding in found.findings}
+
+
+def test_two_clips_share_a_cloth_and_have_a_wind_each(recipe: Recipe, estimator: Estimator, target: Target) -> None:
+    found = refine([target, replace(target, name="again")], estimator, recipe, settings=replace(SETTINGS, budget=28))
+    a, b = (trace.points for trace in found.traces)
+    np.testing.assert_array_equal(a[:, :16], b[:, :16])
+    assert not np.array_equal(a[:, 16], b[:, 16])
+    assert [entry.name for entry in found.intervals] == [*(q.name for q in QUANTITIES), "wind_speed.1"]
+
+
+def test_the_section_shows_the_answer_the_steps_and_both_in_motion(
+    recipe: Recipe, estimator: Estimator, target: Target
+) -> None:
+    found = refine(target, estimator, recipe, settings=SETTINGS)
+    page = section(found)
+    assert found.sentence in page
+    assert page.count("image/webp") == 2
+    assert [f"step {step}:" in page for step in (0, 10, 20, 40)] == [True, True, True, False]
+    assert page.count("<tr>") == 1 + len(QUANTITIES) + 1 + 15
+    for entry in found.as_dict()["intervals"]:
+        assert entry["low"] <= entry["median"] <= entry["high"]
+
+
+def test_a_budget_too_small_for_an_interval_is_refused() -> None:
+    with pytest.raises(InputError, match="no interval"):
+        Settings(budget=27)
+    with pytest.raises(InputError, match="noise floor"):
+        Settings(replicates=1)
+
+
+def test_a_model_without_the_targets_is_refused(recipe: Recipe, estimator: Estimator, target: Target) -> None:
+    class Blind(Estimator):
+        targets = ()
+
+    blind = Blind(**{name: getattr(estimator, name) for name in estimator.__dataclass_fields__})
+    with pytest.raises(InputError, match="starts from wind_speed"):
+        refine(target, blind, recipe, settings=SETTINGS)
+
+
+def test_evaluators_keep_frames_for_the_pictures(evaluator: Evaluator, points: np.ndarray) -> None:
+    kept = evaluator.evaluate(points[:1], 1)[0].frame
+    clip = evaluator.clip(points[0])
+    assert clip is not None
+    np.testing.assert_array_equal(kept, clip[4])

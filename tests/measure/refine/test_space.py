@@ -1,0 +1,65 @@
+"""The search space is the paper's, and its coordinates lose nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError
+from measure.refine.space import QUANTITIES, Space
+from sim.material import named
+from sim.run import load
+from sim.run.recipe import Recipe
+
+
+def test_the_centre_is_the_material_at_mid_density_and_mid_wind(recipe: Recipe) -> None:
+    values = Space.of(recipe).values(np.zeros((1, 17)))[0]
+    np.testing.assert_allclose(values[:15], named("camel-ponte-roma").bending.ravel())
+    np.testing.assert_allclose(values[15:], [0.135, 5.0])  # middle of table 1's ranges
+
+
+def test_corners_are_a_tenth_and_ten_times_the_material(recipe: Recipe) -> None:
+    space, bending = Space.of(recipe), named("camel-ponte-roma").bending.ravel()
+    low, high = space.values(np.array([[-1.0] * 17, [1.0] * 17]))
+    np.testing.assert_allclose(low, [*(bending * 0.1), 0.10, 0.0])
+    np.testing.assert_allclose(high, [*(bending * 10), 0.17, 10.0])
+
+
+def test_normalising_undoes_what_denormalising_did(recipe: Recipe, points: np.ndarray) -> None:
+    space = Space.of(recipe)
+    np.testing.assert_allclose(space.unit(space.values(points)), points, atol=1e-12)
+
+
+def test_the_prior_is_uniform_in_the_factor_where_the_recipe_is(recipe: Recipe) -> None:
+    space = Space.of(recipe)
+    drawn = (
+        space.values(space.prior(np.random.default_rng(0), 20_000))[:, :15] / named("camel-ponte-roma").bending.ravel()
+    )
+    # a uniform variable on [0.1, 10] has mean 5.05 and standard deviation 9.9/√12; 4 standard errors of 300,000 draws
+    assert abs(drawn.mean() - 5.05) < 4 * 9.9 / np.sqrt(12 * drawn.size)
+    assert abs(drawn.std() - 9.9 / np.sqrt(12)) < 0.02
+
+
+def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> None:
+    space = Space.of(recipe)
+    table = np.full((3, 5), 1e-5)
+    table[0] *= 4  # along the warp
+    table[:, 3:] *= 3  # at the two largest curvatures
+    point = space.unit(np.array([[*table.ravel(), 0.12, 3.0]]))
+    told = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0], strict=True))
+    inside = space.values(point)[0, :15].reshape(3, 5)
+    np.testing.assert_allclose(inside, table)  # within the box, so that nothing was moved to its edge
+    assert told["anisotropy"] == pytest.approx(np.log10(4))
+    assert told["nonlinearity"] == pytest.approx(np.log10(3))
+    assert told["bending_scale"] == pytest.approx(-5 + np.log10(4) / 3 + np.log10(3) * 2 / 5)
+    assert (told["wind_speed"], told["density"]) == (pytest.approx(3.0), pytest.approx(0.12))
+
+
+def test_points_outside_of_the_box_are_refused(recipe: Recipe) -> None:
+    with pytest.raises(InputError, match="outside"):
+        Space.of(recipe).values(np.full((1, 17), 1.2))
+
+
+def test_a_recipe_without_ranges_is_refused() -> None:
+    with pytest.raises(InputError, match="ranges"):
+        Space.of(load("hanging-cloth"))

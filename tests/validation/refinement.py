@@ -1,0 +1,236 @@
+"""Refinement against its peers on held-out simulated clips, at equal evaluations and at equal seconds.
+
+Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, FLAGDATA_REFINE_AT the version ("v1"),
+FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how many evaluations each method has (50),
+FLAGDATA_REFINE_PEERS which optimisers (all, separated by commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped
+one), FLAGDATA_REFINE_CACHE a folder for evaluations, so that an interrupted run goes on. Without a lake it is left out.
+Writes `refinement.md` beside the JSON.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.dataset import Source
+from flagdata.rng import child_seed, stream
+from measure.refine import start
+from measure.refine.command import RENDERS, SCENE
+from measure.refine.distance import squared
+from measure.refine.evaluator import STAGES, Evaluator
+from measure.refine.peers.registry import PEERS, minimise
+from measure.refine.procedure import Settings, refine
+from measure.refine.refinement import Refinement
+from measure.refine.space import DENSITY, DIMENSION, WIND, Space
+from measure.refine.target import Target, of_recording
+from measure.refine.trace import Trace
+from measure.refine.view import DrawnView
+from models import estimator as models
+from models.estimator import Estimator
+from sim.assets import Assets
+from sim.render.prior import named
+from sim.run import load
+
+LEVEL = 0.9
+_DENSITY_RANGE = 0.07  # kg/m², of the search space
+_RESAMPLES = 2000
+_OWN, _REGRESSION = "refine", "regression alone"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """One method on one target.
+
+    Attributes:
+        method: its name; with " at equal seconds" where it had as long as the project's own.
+        wind_error, density_error: absolute [m/s, kg/m²].
+        wind_inside, density_inside: whether the interval holds the truth; None for methods without intervals.
+        evaluations: clips that were simulated.
+        seconds: from start to end, with the optimiser's own.
+    """
+
+    method: str
+    wind_error: float
+    density_error: float
+    wind_inside: bool | None
+    density_inside: bool | None
+    evaluations: int
+    seconds: float
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """All methods on all targets; the sheet."""
+    lake = os.environ.get("FLAGDATA_REFINE_LAKE")
+    if lake is None:
+        return {"left_out": "FLAGDATA_REFINE_LAKE names no lake with a simulated data set, such as flagsim-wide"}
+    torch.set_num_threads(1)
+    chosen = os.environ.get("FLAGDATA_REFINE_PEERS")
+    peers = list(PEERS) if chosen is None else [name for name in chosen.split(",") if name]
+    count = int(os.environ.get("FLAGDATA_REFINE_TARGETS", "2"))
+    budget = int(os.environ.get("FLAGDATA_REFINE_EVALUATIONS", "50"))
+    folder = os.environ.get("FLAGDATA_REFINE_CACHE")
+    cache = out / "refinement-cache" if folder is None else Path(folder)
+    own_model = os.environ.get("FLAGDATA_REFINE_MODEL")
+    estimator = models.shipped() if own_model is None else models.load(Path(own_model))
+    at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
+    scores: list[Score] = []
+    stages: dict[str, list[float]] = {}
+    own: list[Refinement] = []
+    for number, target in enumerate(_targets(Path(lake), at=at, count=count, seed=seed)):
+        found = refine(
+            target, estimator, load(SCENE), cache=cache,
+            settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
+        )  # fmt: skip
+        own.append(found)
+        scores += [_regression(target, estimator, seed), _of_own(target, found)]
+        for stage, spent in found.seconds.items():
+            stages.setdefault(stage, []).append(spent / found.evaluations)
+        for peer in peers:
+            trace = _peer(peer, found.evaluators[0], target, budget=budget, seed=child_seed(seed, peer, number))
+            scores += [
+                _of_trace(target, trace, found, peer, evaluations=budget),
+                _of_trace(target, trace, found, f"{peer} at equal seconds", seconds=_seconds(found)),
+            ]
+    rows = _rows(scores, seed=seed)
+    result = {
+        "lake": Path(lake).name, "at": at, "targets": [found.targets[0].name for found in own], "model": estimator.name,
+        "budget": budget, "level": LEVEL, "methods": rows, "scores": [vars(score).copy() for score in scores],
+        "seconds_per_evaluation": {stage: float(np.median(values)) for stage, values in stages.items()},
+        "floor_reached": [found.reached for found in own],
+    }  # fmt: skip
+    (out / "refinement.md").write_text(_sheet(result), encoding="utf-8")
+    return result
+
+
+def _targets(lake: Path, *, at: str, count: int, seed: int) -> list[Target]:
+    """Clips of the test side, each of another simulation."""
+    source = Source.open(lake)
+    pairs = source.pairs("name like '%-test-%'", at=at)
+    space = Space.of(load(SCENE))
+    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    order = stream(seed, "refinement", "targets").permutation(len(pairs)).tolist()
+    taken: set[int] = set()
+    found: list[Target] = []
+    for index in order:
+        flag = int(pairs.table.seed[index])
+        if len(found) == count or flag in taken:
+            continue
+        taken.add(flag)
+        recording = source.lake.artifact(str(pairs.table.recording[index]), at=at)
+        found.append(of_recording(recording, pairs[index].clip[0].numpy(), otherwise=otherwise, space=space))
+    return found
+
+
+def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, seed: int) -> Trace:
+    """An optimiser of the paper's objective: the squared distance of embeddings, one clip an evaluation."""
+    wanted = evaluator.embed(target.clip[None])[0]
+
+    def evaluate(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        made = evaluator.evaluate(points, 1)
+        seconds = np.array([sum(entry.seconds[stage] for stage in STAGES) for entry in made])
+        return np.array([float(squared(entry.embedding, wanted)[0]) for entry in made]), seconds
+
+    return minimise(method, evaluate, dimension=DIMENSION, budget=budget, seed=seed)
+
+
+def _regression(target: Target, estimator: Estimator, seed: int) -> Score:
+    begun = time.perf_counter()
+    draws = start.amortised(estimator, target.clip, seed=seed, draws=models.DRAWS)
+    seconds = time.perf_counter() - begun
+    low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
+    wind, density = target.truth["wind_speed"], target.truth["density"]
+    return Score(
+        method=_REGRESSION, wind_error=abs(middle[0] - wind), density_error=abs(middle[1] - density),
+        wind_inside=bool(low[0] <= wind <= high[0]), density_inside=bool(low[1] <= density <= high[1]),
+        evaluations=0, seconds=seconds,
+    )  # fmt: skip
+
+
+def _seconds(found: Refinement) -> float:
+    return sum(found.seconds.values())
+
+
+def _of_own(target: Target, found: Refinement) -> Score:
+    wind, density = found.intervals[:2]
+    truth = target.truth["wind_speed"], target.truth["density"]
+    return Score(
+        method=_OWN, wind_error=abs(wind.median - truth[0]), density_error=abs(density.median - truth[1]),
+        wind_inside=wind.low <= truth[0] <= wind.high, density_inside=density.low <= truth[1] <= density.high,
+        evaluations=found.evaluations, seconds=_seconds(found),
+    )  # fmt: skip
+
+
+def _of_trace(
+    target: Target, trace: Trace, found: Refinement, method: str, *, evaluations: int | None = None,
+    seconds: float | None = None,
+) -> Score:  # fmt: skip
+    """The nearest point within a budget: what the paper reports."""
+    place = trace.incumbent(evaluations=evaluations, seconds=seconds)
+    value = found.evaluators[0].simulator.space.values(trace.points[[place]])[0]
+    count = len(trace) if seconds is None else max(1, int((trace.seconds <= seconds).sum()))
+    return Score(
+        method=method, wind_error=abs(value[WIND] - target.truth["wind_speed"]),
+        density_error=abs(value[DENSITY] - target.truth["density"]), wind_inside=None, density_inside=None,
+        evaluations=count, seconds=float(trace.seconds[count - 1]),
+    )  # fmt: skip
+
+
+def _rows(scores: Sequence[Score], *, seed: int) -> list[dict[str, Any]]:
+    """A row a method, medians with 90 % bootstrap intervals over targets."""
+    rows = []
+    for method in dict.fromkeys(score.method for score in scores):
+        own = [score for score in scores if score.method == method]
+        row: dict[str, Any] = {"method": method, "targets": len(own)}
+        for name in ("wind_error", "density_error"):
+            row[name] = _resampled(np.array([getattr(s, name) for s in own]), np.median, seed, method, name)
+        for name in ("wind_inside", "density_inside"):
+            values = [getattr(s, name) for s in own]
+            row[name] = None if None in values else _resampled(np.array(values, float), np.mean, seed, method, name)
+        row["evaluations"] = float(np.median([s.evaluations for s in own]))
+        row["seconds"] = float(np.median([s.seconds for s in own]))
+        rows.append(row)
+    return rows
+
+
+def _resampled(values: NDArray[np.float64], of: Callable[..., Any], seed: int, *names: str) -> list[float]:
+    """Statistic, low and high (percentile bootstrap; Efron and Tibshirani 1993)."""
+    rng = stream(seed, "refinement", "bootstrap", *names)
+    drawn = of(values[rng.integers(len(values), size=(_RESAMPLES, len(values)))], axis=1)
+    return [float(of(values)), *np.quantile(drawn, [0.05, 0.95]).tolist()]
+
+
+def _sheet(result: dict[str, Any]) -> str:
+    about = (
+        f"{len(result['targets'])} clips of the test side of `{result['lake']}` ({result['at']}), model "
+        f"`{result['model']}`, {result['budget']} simulated clips for each method; medians with 90 % bootstrap "
+        f"intervals over targets, coverage of {result['level']:.0%} intervals. Peers report their nearest evaluation "
+        "and have no interval."
+    )
+    header = (
+        "| method | wind error [m/s] | area-weight error [% of range] | wind inside | area weight inside | "
+        "evaluations | seconds |"
+    )
+    lines = ["# Refinement and its peers", "", about, "", header, "|---|---|---|---|---|---|---|"]
+    for row in result["methods"]:
+        share = [100 * value / _DENSITY_RANGE for value in row["density_error"]]
+        lines.append(
+            f"| {row['method']} | {_span(row['wind_error'], 2)} | {_span(share, 0)} | {_span(row['wind_inside'], 2)} | "
+            f"{_span(row['density_inside'], 2)} | {row['evaluations']:.0f} | {row['seconds']:.1f} |"
+        )
+    stages = ", ".join(f"{stage} {spent:.2f} s" for stage, spent in result["seconds_per_evaluation"].items())
+    lines += ["", f"Time of an evaluation of `{_OWN}`: {stages}.", ""]
+    return "\n".join(lines)
+
+
+def _span(values: list[float] | None, digits: int) -> str:
+    if values is None:
+        return "—"
+    return f"{values[0]:.{digits}f} [{values[1]:.{digits}f}, {values[2]:.{digits}f}]"

@@ -1,0 +1,187 @@
+"""What the shipped model's estimates are worth on clips that differ from those it was trained on, one change at a time.
+
+Each change is filmed anew from flags that no model has seen: another mesh, another integrator, another renderer, other
+textures, a noisier camera; and runs of the reference simulator (../shared/data/arcsim), which share no code with ours,
+filmed by our rasteriser. What the model's own doubt says of them is told beside the errors.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.lake.meshes import MeshSequence
+from flagdata.record import Record
+from flagdata.rng import child_seed
+from flagdata.tables import Range
+from models import estimator
+from sim.assets import Assets
+from sim.datasets import jobs, picture
+from sim.datasets.cast import casts
+from sim.datasets.films import Film, Sequences
+from sim.datasets.reading import load
+from sim.datasets.recipe import DatasetRecipe, Side
+from sim.render import Meshes
+from sim.render.raster import Raster
+from sim.run.recipe import IntegratorSpec
+
+FLAGS = int(os.environ.get("FLAGDATA_TRANSFER_FLAGS", "60"))
+"""Flags of each change; Cycles, which takes half a minute a film, has a quarter of them."""
+VIEWS = 10  # cameras on each run of the reference simulator
+LEVEL, FALSE_ALARM = 0.9, 0.05
+DRAWS = 1000
+DENSITY = 0.284  # kg/m², of the reference simulator's runs
+_BASE = "flagsim-wide"
+_FIXED = ("flag_w4_dt05", "flag_w4_dt5", "flag_w8_dt5")
+_JITTERED = {"null_w3": 3.0, "null_w5": 5.0, "null_w7": 7.0}
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Errors of wind and area weight, coverage and doubt, for each change."""
+    del out
+    torch.set_num_threads(1)
+    model = estimator.shipped()
+    result: dict[str, Any] = {"model": model.name, "level": LEVEL, "false_alarm": FALSE_ALARM, "of": {}}
+    for name, change in CHANGES.items():
+        recipe = change(_smaller(load(_BASE), FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))
+        result["of"][name] = _scores(model, list(_filmed(recipe)), seed)
+    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
+    runs = Path(data) / "arcsim"
+    if runs.is_dir():
+        result["of"]["simulated by ArcSim"] = _scores(model, list(_reference(runs, seed, model.front_end.frames)), seed)
+    else:
+        result["left_out"] = "ArcSim's runs: no reference data; set FLAGDATA_REFERENCE to their folder"
+    return result
+
+
+Clip = tuple[NDArray[np.uint8], float, float]
+"""Frames (n, height, width) gray, the true wind speed [m/s] and area weight [kg/m²]."""
+
+
+def _smaller(recipe: DatasetRecipe, flags: int, seed: int) -> DatasetRecipe:
+    """One side of so many flags, one film each, of seeds that no data set has."""
+    side = Side(name="test", sequences=flags, renders=flags)
+    return replace(recipe, name="transfer", seed=child_seed(seed, "transfer"), sides=(side,))
+
+
+def _mesh(recipe: DatasetRecipe) -> DatasetRecipe:
+    simulation = recipe.simulation
+    return replace(recipe, simulation=replace(simulation, scene=replace(simulation.scene, columns=36)))
+
+
+def _implicit(recipe: DatasetRecipe) -> DatasetRecipe:
+    spec = IntegratorSpec(name="implicit", step=0.0025)
+    return replace(recipe, simulation=replace(recipe.simulation, integrator=spec))
+
+
+def _noisy(recipe: DatasetRecipe) -> DatasetRecipe:
+    camera = recipe.camera
+    worse = replace(
+        camera, rate_factor=Range(low=28.0, high=32.0), read_noise=Range(low=3.0, high=5.0),
+        shot_noise=Range(low=4.0, high=7.0),
+    )  # fmt: skip
+    return replace(recipe, camera=worse)
+
+
+CHANGES: dict[str, Callable[[DatasetRecipe], DatasetRecipe]] = {
+    "as trained, other seeds": lambda recipe: recipe,
+    "mesh of 925 vertices": _mesh,
+    "backward Euler at 2.5 ms": _implicit,
+    "stripes, checks and prints instead of national flags": lambda recipe: replace(
+        recipe, prior=replace(recipe.prior, textures=("stripes", "checks", "print"))
+    ),
+    "noise beyond the training's, coarser H.264": _noisy,
+    "rendered by Cycles": lambda recipe: replace(recipe, renderer="cycles"),
+}
+
+
+def _filmed(recipe: DatasetRecipe) -> Iterator[Clip]:
+    (cast,) = casts(recipe)
+    indices = range(cast.simulation.count)
+    sequences: dict[int, MeshSequence] = {}
+    for first in range(0, len(indices), cast.simulation.batch):
+        part = indices[first : first + cast.simulation.batch]
+        for outcome in jobs.simulate(cast.simulation, 0, part, "cpu").outcomes:
+            if outcome.sequence is not None:
+                sequences[outcome.member.index] = outcome.sequence
+    members = tuple((cast, index, f"{index:032x}") for index in sequences)
+    few = replace(recipe, sides=(replace(recipe.sides[0], renders=len(members)),))
+    for film in Sequences(recipe=few, side="test", members=members).films():
+        yield _clip(few, film, sequences[film.index])
+
+
+def _clip(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> Clip:
+    done = jobs.film(recipe, film, sequence, "cpu")
+    truth = json.loads(done.parameters)
+    with tempfile.NamedTemporaryFile(suffix=".mcap") as kept:
+        kept.write(done.data)
+        kept.flush()
+        frames = Record.open(Path(kept.name)).frames(0, len(sequence))
+    return frames, truth["wind_speed"], truth["density"]
+
+
+def _reference(folder: Path, seed: int, frames: int) -> Iterator[Clip]:
+    """Runs of the reference simulator, each seen by several cameras; its flags are heavier than any in training."""
+    recipe = load(_BASE)
+    assets = Assets()
+    raster = Raster(assets=assets)
+    for name, wind, sequence in _sequences(folder, frames):
+        for view in range(VIEWS):
+            zeta = recipe.prior.draw(child_seed(seed, "view", name, view), assets)
+            with torch.no_grad():
+                seen = raster.render(Meshes.flag(sequence, heading=0.0), zeta).numpy()
+            drawn = picture.settings(recipe.camera, seed=child_seed(seed, "camera", name, view))
+            gray = np.stack(list(picture.noisy(seen, drawn, seed=child_seed(seed, "noise", name, view))))
+            yield gray, wind, DENSITY
+
+
+def _sequences(folder: Path, frames: int) -> Iterator[tuple[str, float, MeshSequence]]:
+    """(name, wind speed [m/s], the last `frames` frames) of each run."""
+    for name in _FIXED:
+        with np.load(folder / f"{name}.npz") as stored:
+            yield name, float(name[6]), _sequence(stored["positions"][-frames:], stored["faces"], stored["rest"])
+    for name, wind in _JITTERED.items():
+        with np.load(folder / "jittered" / f"{name}.npz") as stored:
+            positions = stored["q"][-frames:].astype(np.float32) * 1e-4
+            yield name, wind, _sequence(positions, stored["faces"], stored["rest"])
+
+
+def _sequence(positions: NDArray[Any], faces: NDArray[Any], rest: NDArray[Any]) -> MeshSequence:
+    times = np.arange(len(positions), dtype=np.int64) * 40_000_000
+    return MeshSequence(
+        time=times, positions=positions.astype(np.float32), faces=faces.astype(np.int32),
+        rest=rest.astype(np.float32), attributes={},
+    )  # fmt: skip
+
+
+def _scores(model: estimator.Estimator, clips: list[Clip], seed: int) -> dict[str, Any]:
+    count = model.front_end.frames
+    inputs = torch.cat([model.inputs(frames[None, :count]) for frames, _, _ in clips])
+    found = model.estimate(inputs, seed=seed)
+    names = [target.name for target in found.targets]
+    low, high = found.interval(LEVEL)
+    scores: dict[str, Any] = {"clips": len(clips)}
+    for place, name in enumerate(("wind_speed", "density"), start=1):
+        column = names.index(name)
+        true = np.array([clip[place] for clip in clips])
+        error = found.mean[:, column] - true
+        generator = np.random.default_rng(child_seed(seed, "bootstrap", name))
+        again = error[generator.integers(len(error), size=(DRAWS, len(error)))]
+        scores[name] = {
+            "rmse": float(np.sqrt(np.mean(error**2))),
+            "rmse_interval": np.quantile(np.sqrt(np.mean(again**2, axis=1)), [0.05, 0.95]).tolist(),
+            "bias": float(error.mean()), "median_error": float(np.median(np.abs(error))),
+            "covered": float(np.mean((low[:, column] <= true) & (true <= high[:, column]))),
+        }  # fmt: skip
+    if found.unlike is not None:
+        scores["told_to_be_unlike"] = float(np.mean(found.unlike <= FALSE_ALARM))
+    return scores
