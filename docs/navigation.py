@@ -7,8 +7,7 @@ from typing import Any
 
 
 def on_config(config: Any) -> None:
-    """Append the pages of docs/decisions."""
+    """Append the pages of docs/decisions, the index first."""
     folder = Path(config.docs_dir)
-    pages = [str(path.relative_to(folder)) for path in sorted(folder.glob("decisions/*.md"))]
-    if pages:
-        config.nav.append({"Decisions": pages})
+    pages = [str(path.relative_to(folder)) for path in sorted(folder.glob("decisions/[0-9]*.md"))]
+    config.nav.append({"Decisions": ["decisions/index.md", *pages]})

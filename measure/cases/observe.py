@@ -15,9 +15,9 @@ from flagdata.errors import NotFoundError
 from flagdata.provenance import file_hash
 from flagdata.rng import stream
 from measure.cases import edge
+from measure.cases.cached import cached
 from measure.cases.edge import EdgeTrack, Seen, scatter, track_edge
 from measure.cases.evidence import Condition, Kind
-from measure.cases.kept import kept
 from measure.cases.recipe import Case, ClipSpec, Group
 from measure.cases.stretch import Stretch, stretch
 from measure.cases.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
@@ -170,7 +170,7 @@ def _tracked(path: Path, case: Case, keep: Path | None) -> EdgeTrack:
         track = track_edge(path, true_rate=case.true_rate)
         return {"time": track.time, "height": track.height, "width": track.width, "seen": track.seen}
 
-    arrays = kept(keep, {"clip": file_hash(path), "true_rate": case.true_rate}, (edge,), make)
+    arrays = cached(keep, {"clip": file_hash(path), "true_rate": case.true_rate}, (edge,), make)
     return EdgeTrack(time=arrays["time"], height=arrays["height"], width=arrays["width"], seen=arrays["seen"])
 
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from measure.cases import limit_cycle
 from measure.cases import waves as waves_module
+from measure.cases.cached import cached
 from measure.cases.candidates import Load, effects
 from measure.cases.evidence import Condition, Kind, LinearTable
-from measure.cases.kept import kept
 from measure.cases.limit_cycle import StripMotion, as_columns, simulate
 from measure.cases.recipe import Case
 from measure.cases.waves import waves
@@ -98,7 +98,7 @@ def _batch(
         "loads": [asdict(load) for load in loads], "speeds": list(speeds), "sheet": asdict(case.sheet),
         "density": case.density, "run": asdict(case.run),
     }  # fmt: skip
-    arrays = kept(keep, inputs, (limit_cycle, waves_module, sys.modules[__name__]), make)
+    arrays = cached(keep, inputs, (limit_cycle, waves_module, sys.modules[__name__]), make)
     advance(len(loads))
     return [
         Flutter(

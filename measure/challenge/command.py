@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from measure.challenge.filing import Filing
 
 _FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-_ONLY = click.option("--only", multiple=True, metavar="SET", help="Only this set; may be given again.")
+_ONLY = click.option("--only", multiple=True, metavar="SET", help="Take this set only; may be repeated.")
 
 
 @click.group()
@@ -33,10 +33,14 @@ def challenge() -> None:
 
 @challenge.command()
 @_FOLDER
-@click.option("--recipe", default="standard", show_default=True, help="Of the catalog by name, or a .toml file.")
-@click.option("--seed", type=click.IntRange(min=0), required=True, help="Of all that is drawn; keep it to yourself.")
-@click.option("--sets", "count", type=click.IntRange(min=1), default=60, show_default=True, help="How many.")
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes that simulate.")
+@click.option("--recipe", default="standard", show_default=True, help="Recipe: a name of the catalog, or a .toml file.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), required=True, help="Seed of everything that is drawn; keep it secret."
+)
+@click.option("--sets", "count", type=click.IntRange(min=1), default=60, show_default=True, help="Number of sets.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
+)
 @json_option
 def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
     """Draw keys, simulate, and write sealed data sets into a new folder."""
@@ -54,10 +58,23 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 
 @challenge.command()
 @_FOLDER
-@click.option("--recipe", default="standard", show_default=True, help="Of the catalog by name, or a .toml file.")
-@click.option("--seed", type=click.IntRange(min=0), required=True, help="Of all that is drawn; not the challenge's.")
-@click.option("--kinds", type=click.IntRange(min=4), default=112, show_default=True, help="Of meshes and methods.")
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes that simulate.")
+@click.option("--recipe", default="standard", show_default=True, help="Recipe: a name of the catalog, or a .toml file.")
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    required=True,
+    help="Seed of everything that is drawn; it must differ from that of the challenge.",
+)
+@click.option(
+    "--kinds",
+    type=click.IntRange(min=4),
+    default=112,
+    show_default=True,
+    help="Number of kinds of numerics (meshes and methods).",
+)
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
+)
 @json_option
 def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json: bool) -> None:
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
@@ -79,8 +96,14 @@ def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json
 @challenge.command()
 @_FOLDER
 @_ONLY
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the fitter.")
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Sets at a time.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the fitter.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Number of sets that are judged at a time.",
+)
 @click.option("--bank", type=click.Path(path_type=Path), help="Folder of simulated nulls that the sets share.")
 @json_option
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
@@ -113,7 +136,9 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @challenge.command()
 @_FOLDER
 @_ONLY
-@click.option("--out", type=click.Path(path_type=Path), help="Also write the sheet here: .json, .md and .png.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Path to which the sheet is also written, as .json, .md and .png."
+)
 @click.option(
     "--against", type=click.Choice(["oracle", "floor"]), default="oracle", show_default=True,
     help="What E_red is measured against: the true model's error, which is computed anew, or the verdict's floor.",

@@ -63,9 +63,12 @@ def report(measured: Measurement) -> Mapping[str, Any]:
 
 def keep(
     lake: Lake, measured: Measurement, subject: Subject, network: Network, reading: Reading, series: Beside, *,
-    branch: str,
+    branch: str, refinement: Mapping[str, Any] | None = None,
 ) -> tuple[str, bool]:  # fmt: skip
     """Commit a measurement; the same one again adds nothing. Returns its id and whether it was there already.
+
+    Args:
+        refinement: what a refinement found, as JSON values.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
@@ -75,12 +78,12 @@ def keep(
         if transaction.find(wanted.id) is not None:
             return wanted.id, True
         staged = transaction.staging(".zarr")
-        write(staged, measured, series)
+        write(staged, measured, series, refinement)
         transaction.add(artifact(measured, subject, network, reading, stored=transaction.put(staged)))
     return wanted.id, False
 
 
-def write(path: Path, measured: Measurement, series: Beside) -> None:
+def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:
     """A new Zarr folder: `draws` (draw, target) and the columns of the wind series, each over `time`.
 
     Dimensions are named, so that xarray opens it as a data set.
@@ -91,7 +94,7 @@ def write(path: Path, measured: Measurement, series: Beside) -> None:
     group = zarr.open_group(path, mode="w-", zarr_format=3)
     group.update_attributes({
         _HEAD: {"format": _FORMAT}, "targets": list(measured.names), "answer": dict(measured.as_dict(anyway=True)),
-        "series": series.as_dict(),
+        "series": series.as_dict(), "refinement": None if refinement is None else dict(refinement),
     })  # fmt: skip
     arrays = {"draws": (measured.draws.astype(np.float32), ("draw", "target"))}
     arrays |= {name: (values.astype(np.float32), ("time",)) for name, values in series.columns().items()}

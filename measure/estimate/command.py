@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from measure.estimate.measuring import Measurement, Options
     from measure.estimate.series import Beside
     from measure.estimate.source import Network, Reading, Subject
+    from measure.refine.refinement import Refinement
 
 
 @click.command()
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
               help="Of the intervals.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of all draws.")
 @click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default the shipped one.")
+@click.option("--refine", type=click.IntRange(min=28), metavar="N",
+              help="Refine the first window by N simulated clips, 28 or more; 50 take minutes.")  # fmt: skip
+@click.option("--cache", type=click.Path(path_type=Path), metavar="FOLDER",
+              help="Where simulated clips are kept, so that an interrupted refinement goes on.")  # fmt: skip
 @click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
               show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
 @click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses.")
@@ -68,6 +73,8 @@ def measure(
     level: float,
     seed: int,
     model: str | None,
+    refine: int | None,
+    cache: Path | None,
     false_alarm: float,
     anyway: bool,
     report: Path | None,
@@ -92,6 +99,13 @@ def measure(
     """
     if as_json and as_csv:
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
+    if cache is not None and refine is None:
+        raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
+    if refine is not None and flag_size is None:
+        raise UsageError(
+            "a refinement simulates the flag, whose size is not known",
+            fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
+        )
     for path in (report, zarr_path):
         if path is not None and not path.absolute().parent.is_dir():
             raise UsageError("no such folder", where=str(path.parent), fix="create it first")
@@ -109,18 +123,20 @@ def measure(
     reading = Reading(crop=box, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
         size=None if flag_size is None else parse_size(flag_size), step=step, first=first, last=last, level=level,
-        false_alarm=false_alarm, seed=seed,
+        false_alarm=false_alarm, seed=seed, refine=refine,
     )  # fmt: skip
     lake = None if lake_path is None else Lake.open(lake_path)
     seen = at if at is not None else branch
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(
         options=options, reading=reading, network=network(model, lake=lake, at=seen), lake=lake, at=seen, branch=branch,
-        commit=not read_only, anyway=anyway, report=report, zarr=zarr_path,
+        commit=not read_only, anyway=anyway, report=report, zarr=zarr_path, cache=cache,
     )  # fmt: skip
     if query is not None:
-        if report is not None or zarr_path is not None or as_csv:
-            raise UsageError("a page, a Zarr or a CSV is of one film", fix="measure one clip by its id, or use --json")
+        if report is not None or zarr_path is not None or as_csv or refine is not None:
+            raise UsageError(
+                "a page, a Zarr, a CSV or a refinement is of one film", fix="measure one clip by its id, or use --json"
+            )
         _several(job, found, as_json=as_json)
         return
     done = job.do(found[0])
@@ -139,6 +155,7 @@ class _Done:
     series: Beside
     artifact: str | None
     subject: Subject
+    refinement: Refinement | None
 
     def as_dict(self, *, anyway: bool) -> dict[str, Any]:
         shown = anyway or not self.measured.verdict.refused
@@ -146,6 +163,7 @@ class _Done:
         return {
             **self.measured.as_dict(anyway=anyway), "series": self.series.as_dict() if shown else None,
             "source": None if self.subject.artifact is None else self.subject.artifact.id, "artifact": self.artifact,
+            "refinement": None if self.refinement is None else self.refinement.as_dict(),
             "simulated_with": {name: known[name] for name in self.measured.names if name in known} or None,
         }  # fmt: skip
 
@@ -164,12 +182,14 @@ class _Job:
     anyway: bool
     report: Path | None
     zarr: Path | None
+    cache: Path | None
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
         from measure.estimate.artifact import keep, write
         from measure.estimate.dependence import of_model
         from measure.estimate.measuring import measure as measured_of
+        from measure.estimate.refined import refined
         from measure.estimate.series import beside
         from measure.estimate.source import gate_beside
 
@@ -186,17 +206,24 @@ class _Job:
             if finding.severity != "note":
                 say(f"{finding.severity.value}: {finding.what}")
         shown = self.anyway or not measured.verdict.refused
+        refinement = None
+        if self.options.refine is not None and shown:
+            refinement = refined(
+                measured, subject, estimator, budget=self.options.refine, cropped=self.reading.crop is not None,
+                cache=self.cache,
+            )  # fmt: skip
+        told = None if refinement is None else refinement.as_dict()
         artifact = None
         if self.lake is not None and self.commit and shown:
             artifact, existing = keep(
-                self.lake, measured, subject, self.network, self.reading, series, branch=self.branch
+                self.lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=told
             )
             say(f"{artifact[:12]}  measurement, {'there already' if existing else 'committed'}")
         if self.zarr is not None and shown:
-            write(self.zarr, measured, series)
+            write(self.zarr, measured, series, told)
         if self.report is not None:
-            self._write_page(self.report, measured, series, subject, artifact)
-        return _Done(measured=measured, series=series, artifact=artifact, subject=subject)
+            self._write_page(self.report, measured, series, subject, artifact, refinement)
+        return _Done(measured=measured, series=series, artifact=artifact, subject=subject, refinement=refinement)
 
     def refuse(self, done: _Done) -> None:
         """Raises:
@@ -211,11 +238,13 @@ class _Job:
             )  # fmt: skip
 
     def _write_page(
-        self, path: Path, measured: Measurement, series: Beside, subject: Subject, artifact: str | None
-    ) -> None:
+        self, path: Path, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
+        refinement: Refinement | None,
+    ) -> None:  # fmt: skip
         from flagdata.lake.durable import disk_errors
         from measure.estimate.nearest import nearest
-        from measure.estimate.page import Context, page
+        from measure.estimate.page import Context, Section, page
+        from measure.refine.section import section
 
         model = self.network.estimator
         neighbours, compared = (), 0
@@ -234,7 +263,10 @@ class _Job:
             provenance=self._provenance(subject, artifact), known=subject.known or {}, neighbours=neighbours,
             compared=compared, rate=model.front_end.rate,
         )  # fmt: skip
-        text = page(measured, series, context, anyway=self.anyway)
+        sections = ()
+        if refinement is not None:
+            sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
+        text = page(measured, series, context, anyway=self.anyway, sections=sections)
         with disk_errors("writing the report", path):
             path.write_text(text, encoding="utf-8")
         say(f"report: {path}")
@@ -278,6 +310,8 @@ def _tell(done: _Done, *, series: bool) -> None:
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     click.echo(mark + measured.sentence)
     say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.windows)} windows")
+    if done.refinement is not None:
+        click.echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:
         return
     wind = [window.quantity("wind_speed") for window in measured.windows]

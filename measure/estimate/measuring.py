@@ -39,6 +39,7 @@ class Options:
         level: of the intervals.
         false_alarm: rate of the gate.
         seed: of all draws.
+        refine: simulated clips of a refinement; None for none.
     """
 
     size: FlagSize | None = None
@@ -48,12 +49,14 @@ class Options:
     level: float = 0.9
     false_alarm: float = 0.05
     seed: int = 0
+    refine: int | None = None
 
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
         return {
             "flag_size": None if self.size is None else [self.size.length, self.size.height], "step": self.step,
             "first": self.first, "last": self.last, "level": self.level, "false_alarm": self.false_alarm,
+            "refine": self.refine,
         }  # fmt: skip
 
 

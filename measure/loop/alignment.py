@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import InputError
-from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory, WindTrack
+from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory
 
 _CALM = 0.3
 """Wind below which the flag, not the log, says where the wind goes [m/s]."""
@@ -29,7 +29,7 @@ def aligned(experiment: Experiment) -> Experiment:
     recordings = tuple(
         replace(
             recording, positions=(recording.positions - base) @ turn.T,
-            wind=WindTrack(times=recording.wind.times, velocity=recording.wind.velocity @ turn.T),
+            wind=replace(recording.wind, velocity=recording.wind.velocity @ turn.T),
         )
         for recording, turn in zip(experiment.recordings, turns, strict=True)
     )  # fmt: skip

@@ -12,73 +12,35 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
-from measure.loop.again import Rerun
 from measure.loop.bank import columns, names
 from measure.loop.columns import THETA, EffectColumn
 from measure.loop.comparison import total_error
 from measure.loop.course import Variation
+from measure.loop.criteria import CRITERIA
 from measure.loop.fluctuation import fluctuation, fluctuation_gains
+from measure.loop.heterogeneity import heterogeneity
 from measure.loop.inference import Evidence, Fit, gains
 from measure.loop.lines import Line
 from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
-from measure.loop.steadiness import steady
+from measure.loop.refit import Refit
 from measure.loop.verdict import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
 from sim.effects.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
-LEVEL = 0.9
-_REACH = float(norm.ppf(0.5 + LEVEL / 2))
-"""Standard errors to either side of an interval."""
 GUST_COLUMN = -1
 """Stands for gusts, which are no column: only their size can be found, not their course."""
 _FIRST = len(THETA)
-_FAR = 2.0
-"""Standard errors of the paired difference by which the named effect must lead."""
-_TIED = 1.0
-"""Standard errors within which held-out gains say nothing."""
-_APART = 3.0
-"""A rival whose squared z is lower by more than the square of this fits worse, whatever its held-out gain's error."""
-_SEEN = ("tilted-pole",)
-"""Never named beside another effect: it shows at the attachments, whose observed places are the model's."""
-_RUN_AGAIN = 2
-"""Of each of two orders."""
-_BEYOND = 3.0
-"""A strength so many times what is expected of it, beyond its error, is not physical."""
-_BETTER = 1.5
-"""A corrective field whose statistic is larger by this factor says that the library has no answer."""
 
-_ENOUGH = 0.015
-"""Level at which a larger model is rejected, if the base model's is not lower: nulls say what numerics do to the base
-model, and somewhat less than what they do to one with an effect. In three challenges effects that were named rightly
-left p = 0.021 or more, one of two 0.012 or less."""
-
-_UNSTEADY = 0.02
-"""Level at which a strength is found to be another in every recording."""
-
-_ENOUGH_GUSTS = 0.005
-"""The same where a pressure that is free in every segment stands for gusts, whose other parts are left: of eight true
-ones it had p = 0.009 to 0.84. What passes for gusts otherwise is told by the wind's course."""
-
-_USUAL = 0.25
-"""Share of nulls in which some column is as far: an effect that is no farther itself is not what the model lacks,
-however it predicts. Of 26 effects that were named rightly in two challenges 0.19 at most, of a null's and two of what
-is not in the library 0.39 to 0.8."""
-
-RESPONSE = 0.25
-"""Relative standard error of a strength by what the fit's mesh does to an effect, which nulls do not show: strengths of
-22 effects that were named rightly in two challenges scattered about the true ones by so much beyond their errors."""
-
-NO_HELP = "run again on unseen recordings, it does not help more than the wrong-effect control"
-NOT_APART = "fitted beyond the linear, its strength cannot be told from none"
+NO_HELP = "refitted and run on unseen recordings, it does not help more than the wrong-effect control"
+NOT_APART = "refitted beyond the linear model, its strength cannot be told from zero"
 """Why an effect named is withdrawn."""
-USUAL = "no effect of the library stands out by itself: nulls often have one that does as much"
-FLUCTUATING = "with it too, the wind's course swings most of all, and not as that of turbulence does"
-SWINGING = "with it too, the errors swing most of all, at a frequency that goes with the wind"
+USUAL = "no effect of the library stands out by itself: in nulls one often stands out as much by chance"
+FLUCTUATING = "even with it the errors tell of a wind that fluctuates, and not as turbulence does"
+SWINGING = "even with it the errors oscillate at a frequency that is proportional to the wind speed"
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
 """Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
@@ -130,30 +92,30 @@ class Judgement:
 
 
 def judge(
-    evidence: Evidence, reference: Reference, *, level: float, again: Mapping[int, Rerun] | None = None
+    evidence: Evidence, reference: Reference, *, level: float, refits: Mapping[int, Refit] | None = None
 ) -> Judgement:
     """Weigh the library against the evidence of all recordings.
 
     Args:
         level: of the global test.
-        again: of columns whose models were run again, which counts in place of the linear evidence.
+        refits: of columns whose models were refitted, which count in place of the linear evidence.
     """
     statistics = reference.statistics(evidence, names())
     statistic, line = reference.farthest(evidence, names()), reference.line(evidence)
-    p_value = reference.rarity.p(statistic)
+    p_value = reference.tail.p(statistic)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     corrective = [i + _FIRST for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
     held_out = gains(evidence, [[i] for i, _ in effects])
     weighed = [
-        _weigh(evidence, reference, column, effect, own, statistics, (again or {}).get(column))
+        _weigh(evidence, reference, column, effect, own, statistics, (refits or {}).get(column))
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
     # An effect that changes how a flag flutters, as lift does, leaves a line too, of which it then takes much away.
-    rerun = (again or {}).get(ranking[0].column)
-    left = line if rerun is None else rerun.line
-    swings = left is not None and reference.rarity.p(left.far) <= level
-    blown = _blown(evidence, reference, statistic, level, left=evidence if rerun is None else rerun.evidence)
+    refitted = (refits or {}).get(ranking[0].column)
+    left = line if refitted is None else refitted.line
+    swings = left is not None and reference.tail.p(left.far) <= level
+    blown = _blown(evidence, reference, statistic, level, left=evidence if refitted is None else refitted.evidence)
 
     def judgement(conclusion: Conclusion, named: Sequence[Weighed], reasons: dict[int, str]) -> Judgement:
         taken = {w.column for w in named}
@@ -179,21 +141,21 @@ def judge(
     if blown is not None:
         reasons[best.column] = FLUCTUATING
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    if best.candidate.p_family > _USUAL:
+    if best.candidate.p_family > CRITERIA.usual:
         reasons[best.column] = USUAL
         return judgement(Conclusion.OUTSIDE, (), reasons)
-    if _field_leads(evidence, best, corrective, statistics, beyond_linear=rerun is not None):
+    if _field_leads(evidence, best, corrective, statistics, beyond_linear=refitted is not None):
         reasons[best.column] = "a corrective field explains more than any effect of the library"
         return judgement(Conclusion.OUTSIDE, (), reasons)
     near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
-    enough = min(level, _ENOUGH_GUSTS if best.column == GUST_COLUMN else _ENOUGH)
-    if best.candidate.leftover > enough and not unsteady(best.candidate):
+    enough = min(level, CRITERIA.enough_gusts if best.column == GUST_COLUMN else CRITERIA.enough)
+    if best.candidate.leftover > enough and not heterogeneous(best.candidate):
         return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
-    useless = {column for column, run in (again or {}).items() if run.gains.sum() <= 0}
+    useless = {column for column, run in (refits or {}).items() if run.gains.sum() <= 0}
     others = [w for w in ranking[1:] if w.column not in useless]
     second = _second(
-        evidence if rerun is None else rerun.evidence, reference, best, others, enough,
-        swinging=rerun is None or rerun.line is not None,
+        evidence if refitted is None else refitted.evidence, reference, best, others, enough,
+        swinging=refitted is None or refitted.line is not None,
     )  # fmt: skip
     if second is not None:
         return judgement(Conclusion.EFFECT, (best, second), reasons)
@@ -213,12 +175,12 @@ def _blown(
     if swing is None or variation is None or variation.turbulent:
         return None
     farthest = reference.swing(evidence) == statistic
-    return variation if farthest and reference.rarity.p(swing) <= level else None
+    return variation if farthest and reference.tail.p(swing) <= level else None
 
 
-def unsteady(candidate: Candidate) -> bool:
+def heterogeneous(candidate: Candidate) -> bool:
     """Whether its strength is another in every recording: another law in the wind would be a better one."""
-    return candidate.steady is not None and candidate.steady <= _UNSTEADY
+    return candidate.heterogeneity is not None and candidate.heterogeneity <= CRITERIA.heterogeneous
 
 
 def _field_leads(
@@ -227,19 +189,19 @@ def _field_leads(
     """Whether a corrective field says that the library has no answer.
 
     A pressure that fluctuates pushes steady fields by chance, and a strong effect is far from linear: against gusts,
-    and against a model that was run again, the field must also predict better.
+    and against a model that was refitted, the field must also predict better.
     """
     field = max(corrective, key=lambda column: float(statistics[column]))
-    larger = best.candidate.z**2 * _BETTER < float(statistics[field])
+    larger = best.candidate.z**2 * CRITERIA.field < float(statistics[field])
     unlike = beyond_linear or best.column == GUST_COLUMN
     return larger and (not unlike or gains(evidence, [[field]]).sum() > best.gains.sum())
 
 
 def finalists(judgement: Judgement) -> tuple[int, ...]:
-    """Columns that are run again: the first by held-out gains, and the largest statistics."""
+    """Columns that are refitted: the first by held-out gains, and the largest statistics."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
-    return tuple(dict.fromkeys(w.column for w in (*able[:_RUN_AGAIN], *strongest[:_RUN_AGAIN])))
+    return tuple(dict.fromkeys(w.column for w in (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])))
 
 
 def withdrawn(judgement: Judgement, reason: str) -> Judgement:
@@ -281,8 +243,8 @@ def _second(
     strength is not nothing, both as strong in every recording. Beside gusts, the pressure is free in every segment.
 
     Args:
-        evidence: of what the best leaves, if it was run again.
-        others: candidates beside the best, but for those whose models, run again, predict nothing.
+        evidence: of what the best leaves, if it was refitted.
+        others: candidates beside the best, but for those whose refitted models predict nothing.
         swinging: whether lines of the errors' spectra count.
     """
     pressure = names().index(GUSTS)
@@ -290,7 +252,7 @@ def _second(
     if best.column == GUST_COLUMN:
         evidence, reference, known = evidence.freed(pressure), reference.beside(), []
     skipped = {GUST_COLUMN, *([] if known else [pressure])}
-    others = [w for w in others if w.column not in skipped and w.candidate.effect not in _SEEN]
+    others = [w for w in others if w.column not in skipped and w.candidate.effect not in CRITERIA.never_second]
     fits = [evidence.fit([*known, w.column]) for w in others]
     able = [
         place
@@ -303,17 +265,21 @@ def _second(
     leader = int(np.argmax(pairs[1:].sum(axis=1)))
     chosen, gained = others[able[leader]], pairs[1 + leader] - pairs[0]
     value, error = _beside(evidence, fits[able[leader]], chosen)
-    lasting = gained.sum() > _FAR * total_error(gained, evidence.recording) and abs(value) > _REACH * error
+    lasting = (
+        gained.sum() > CRITERIA.lead * total_error(gained, evidence.recording) and abs(value) > CRITERIA.reach * error
+    )
     both = [*known, chosen.column]
     left = reference.p_left_by(evidence, names(), both, swinging=swinging)
-    constant = all(_steady_beside(evidence, both, w) for w in (best, chosen) if w.column in both)
+    constant = all(_homogeneous_beside(evidence, both, w) for w in (best, chosen) if w.column in both)
     return chosen if lasting and constant and left > level else None
 
 
-def _steady_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed) -> bool:
+def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed) -> bool:
     """Whether a strength is the same in all recordings, where some columns are fitted to each."""
-    found = steady(_each(evidence, chosen, weighed.column, about=0.0, larger=_larger(evidence, weighed), unit="1"))
-    return found is None or found > _UNSTEADY
+    found = heterogeneity(
+        _each(evidence, chosen, weighed.column, about=0.0, larger=_larger(evidence, weighed), unit="1")
+    )
+    return found is None or found > CRITERIA.heterogeneous
 
 
 def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
@@ -348,11 +314,11 @@ def _described(weighed: Weighed) -> Parameter:
 
 
 def _plausible(described: Parameter, coefficient: float, error: float) -> bool:
-    """Whether a strength is admissible, and no more than `_BEYOND` times what is expected in its direction."""
+    """Whether a strength is admissible, and no more than `Criteria.plausible` times what is expected there."""
     least, most = described.admissible
     expected = described.prior[1 if coefficient > 0 else 0] - described.null
-    reach = _BEYOND * max(math.copysign(1.0, coefficient) * expected, 0.0)
-    return least <= described.null + coefficient <= most and abs(coefficient) - _FAR * error <= reach
+    reach = CRITERIA.plausible * max(math.copysign(1.0, coefficient) * expected, 0.0)
+    return least <= described.null + coefficient <= most and abs(coefficient) - CRITERIA.lead * error <= reach
 
 
 def _weigh(
@@ -362,7 +328,7 @@ def _weigh(
     effect: EffectColumn,
     linear: Floats,
     statistics: Floats,
-    again: Rerun | None,
+    refitted: Refit | None,
 ) -> Weighed:
     fit = evidence.fit([column])
     value, _ = fit.of(column)
@@ -370,11 +336,11 @@ def _weigh(
     statistic = float(statistics[column])
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
     z = value / error if error > 0 else 0.0
-    gained, leftover = linear, again.leftover if again else reference.p_left_by(evidence, names(), [column])
+    gained, leftover = linear, refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column])
     left, null = evidence, effect.described.null
-    if again is not None:
-        gained, value, left = again.gains, again.coefficient, again.evidence
-    about = null + (value if again else 0.0)
+    if refitted is not None:
+        gained, value, left = refitted.gains, refitted.coefficient, refitted.evidence
+    about = null + (value if refitted else 0.0)
     by_recording = _each(left, [column], column, about=about, larger=error / fit.of(column)[1], unit=effect.unit)
     return Weighed(
         column=column, error=error, gains=gained, recording=evidence.recording,
@@ -385,7 +351,7 @@ def _weigh(
             z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
-            by_recording=by_recording, steady=steady(by_recording),
+            by_recording=by_recording, heterogeneity=heterogeneity(by_recording),
         ),
     )  # fmt: skip
 
@@ -403,7 +369,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
         by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
     return Weighed(
         column=GUST_COLUMN, gains=gained, recording=evidence.recording, error=found.error / 2,
-        admissible=bool(found.deviation > _REACH * found.error) and not unlike, unlike=unlike,
+        admissible=bool(found.deviation > CRITERIA.reach * found.error) and not unlike, unlike=unlike,
         candidate=Candidate(
             effect="gusts", parameter="intensity", null=described.null,
             strength=strength(described.null, found.deviation / 2, found.error / 2, described.unit),
@@ -417,20 +383,21 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
 
 def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
     """Of an effect, of its coefficient beyond null and the standard error by what nulls leave."""
-    return estimate(null + coefficient, math.hypot(error, RESPONSE * coefficient), unit)
+    return estimate(null + coefficient, math.hypot(error, CRITERIA.response * coefficient), unit)
 
 
 def estimate(value: float, error: float, unit: str) -> Estimate:
-    """A normal interval at `LEVEL`."""
+    """A normal interval at the level of all intervals."""
     return Estimate(
-        value=value, low=value - _REACH * error, high=value + _REACH * error, unit=unit, level=LEVEL
+        value=value, low=value - CRITERIA.reach * error, high=value + CRITERIA.reach * error, unit=unit,
+        level=CRITERIA.interval,
     )  # fmt: skip
 
 
 def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
     """By held-out gain; of those that it cannot tell from the first, the one that fits best leads."""
     ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
-    tied = [w for w in ordered if w.admissible and w.gains.sum() > 0 and _behind(ordered[0], w) < _TIED]
+    tied = [w for w in ordered if w.admissible and w.gains.sum() > 0 and _behind(ordered[0], w) < CRITERIA.tied]
     best = max(tied, key=lambda w: abs(w.candidate.z), default=ordered[0])
     ordered = [best, *(w for w in ordered if w is not best)]
     return [replace(w, candidate=replace(w.candidate, behind=_behind(best, w))) for w in ordered]
@@ -439,7 +406,9 @@ def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
 def _rivals(best: Weighed, other: Weighed) -> bool:
     """Whether another effect cannot be told from the best: neither by held-out gains nor by how well it fits at all."""
     return (
-        other.gains.sum() > 0 and _behind(best, other) < _FAR and other.candidate.z**2 > best.candidate.z**2 - _APART**2
+        other.gains.sum() > 0
+        and _behind(best, other) < CRITERIA.lead
+        and other.candidate.z**2 > best.candidate.z**2 - CRITERIA.rival**2
     )
 
 
@@ -456,11 +425,11 @@ def _reason(best: Weighed, other: Weighed) -> str:
     if not other.admissible and other.unlike:
         return other.unlike
     if not other.admissible and other.column == GUST_COLUMN:
-        return "their intensity cannot be told from none"
+        return "their intensity cannot be told from zero"
     if not other.admissible:
         strength = other.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"
-        return f"its strength would be {number(strength.value)}{unit}: not physical"
+        return f"its strength would be {number(strength.value)}{unit}, which is not physical"
     if other.gains.sum() <= 0:
         return "it predicts unseen recordings no better than the base model"
     return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"

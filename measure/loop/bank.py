@@ -35,7 +35,7 @@ BATCH = 8
 WINDS = 4
 """Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
 by the cloth, so that few cloths of many numerics say more than many of few."""
-_KEPT = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"}
+_ADDED = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"}
 """What batches of older versions lack, some of it or all."""
 _SEGMENTS = (
     "recording", "r", "response", "error", "marker_error", "lines", "speeds", "offsets", "noise", "period", "cloth",
@@ -148,14 +148,14 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
     with ProcessPoolExecutor(
         max_workers=workers, mp_context=context, initializer=torch.set_num_threads, initargs=(1,)
     ) as pool:
-        running = [pool.submit(_keep, folder, batches[index], index) for index in missing]
+        running = [pool.submit(_cache, folder, batches[index], index) for index in missing]
         for done in as_completed(running):
             done.result()
             if progress is not None:
                 progress(1)
 
 
-def _keep(folder: Path, batch: NullBatch, index: int) -> None:
+def _cache(folder: Path, batch: NullBatch, index: int) -> None:
     nulls, duration = evaluate(batch, index, columns())
     own = nulls.statistics
     buffer = BytesIO()
@@ -199,7 +199,7 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
         raise
     except Exception as error:  # noqa: BLE001  zip, zlib and numpy each raise errors of their own kinds
         raise CorruptError(f"not a batch of nulls: {error}", where=str(path), fix=rebuild) from None
-    if not set(content) >= {*_KEPT, *_SEGMENTS, "columns", "duration"}:
+    if not set(content) >= {*_ADDED, *_SEGMENTS, "columns", "duration"}:
         raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
     if tuple(content["columns"].ravel().tolist()) != names():
         raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")

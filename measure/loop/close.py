@@ -1,13 +1,14 @@
 """Closing the loop on trajectories: from recordings to a verdict about what the base model lacks.
 
 The steps are those of the method: align, predict one horizon ahead, compare with nulls of other numerics, weigh the
-library's effects, judge, and run the chosen model again on what it was not fitted to.
+library's effects, judge, and run the refitted model on what it was not fitted to.
 """
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +22,6 @@ from flagdata.errors import UsageError
 from flagdata.provenance import code_version
 from measure.loop import bank as banks
 from measure.loop import supply
-from measure.loop.again import Fits, run_again
 from measure.loop.attribution import (
     EQUIVALENT,
     GUST_COLUMN,
@@ -40,24 +40,25 @@ from measure.loop.attribution import (
 from measure.loop.columns import DAMPING_UNIT, THETA, Calibration
 from measure.loop.comparison import LeftOut, Predictions, Trial, compare, folds, predict
 from measure.loop.course import ALONG
+from measure.loop.criteria import CRITERIA
 from measure.loop.field import corrective_field
 from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
 from measure.loop.reference import NullBank, Reference
 from measure.loop.refine import Refined
+from measure.loop.refit import Fits, refit
 from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
-from measure.loop.statistics import projected
+from measure.loop.statistics import Projection, Statistics, projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
-from measure.loop.words import assumptions, blowing, proposal, sentence, separating, shedding
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
+from measure.loop.wind_log import lags
+from measure.loop.words import assumptions, blowing, clocks, proposal, ratios, sentence, separating, shedding
 from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
-_INTERVAL = 0.9
-_KINDS = 20
-FEWEST_NULLS = _KINDS * banks.BATCH
+FEWEST_NULLS = CRITERIA.simulated_kinds * banks.BATCH
 """So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
 
 
@@ -71,14 +72,14 @@ class Options:
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
-        workers: processes for the nulls, then threads for the models that are run again.
+        workers: processes for the nulls, then threads for the models that are refitted.
 
     Raises:
         UsageError: a level or counts that make no sense.
     """
 
     seed: int = 0
-    level: float = 0.03
+    level: float = CRITERIA.level
     nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1
@@ -108,27 +109,31 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     tell = stage or (lambda what, done, total: None)
     setting = Setting.of(experiment)
     tell("sensitivities", 0, 1)
-    found, projection = projected(
-        setting.forecaster, setting.segments, [setting.nominal] * len(setting.segments), banks.columns()
-    )
+    found, projection = _looked_at(setting)
+    late = (0.0,) * len(setting.speeds) if found.course is None else lags(found.course, setting.segments)
+    if any(late):
+        setting = setting.moved(late)
+        found, projection = _looked_at(setting)
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
     speeds = setting.speeds[setting.recording]
     reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
-    yardstick = Yardstick(found=found, projection=projection, null=bank.model(setting.design), speeds=speeds)
-    evidence = yardstick.evidence(found)
-    fits = Fits(forecaster=setting.forecaster, segments=setting.segments, yardstick=yardstick)
+    whitened = WhitenedMisfit(
+        found=found, projection=projection, null=bank.model(setting.design).under(setting.prior), speeds=speeds
+    )
+    evidence = whitened.evidence(found)
+    fits = Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
     judgement = judge(evidence, reference, level=options.level)
     if judgement.conclusion is not Conclusion.SUFFICIENT:
         tell("before and after", 0, 1)
-        again = run_again(fits, reference, finalists(judgement), workers=options.workers)
-        judgement = judge(evidence, reference, level=options.level, again=again)
+        refits = refit(fits, reference, finalists(judgement), workers=options.workers)
+        judgement = judge(evidence, reference, level=options.level, refits=refits)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     if solved.doubtful and solved.doubtful == judgement.named[1:]:
         solved = replace(solved, judgement=alone(judgement, NOT_APART))
     judgement, trial = _settled(solved, options, tell)
     tell("before and after", 1, 1)
-    return _verdict(solved, judgement, bank, trial, options, began)
+    return _verdict(solved, judgement, bank, trial, options, began, late)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,7 +152,7 @@ class Solved:
     @cached_property
     def evidence(self) -> Evidence:
         """Of the nominal model."""
-        return self.fits.yardstick.evidence(self.fits.yardstick.found)
+        return self.fits.whitened.evidence(self.fits.whitened.found)
 
     @property
     def base(self) -> Refined:
@@ -196,6 +201,12 @@ class Solved:
         return None
 
 
+def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
+    """Errors of the nominal model along all columns, and the directions."""
+    starts = [setting.nominal] * len(setting.segments)
+    return projected(setting.forecaster, setting.segments, starts, banks.columns())
+
+
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
     if options.bank is not None:
         return supply.given(options.bank, setting)
@@ -203,7 +214,7 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
 
 
 def _settled(solved: Solved, options: Options, tell: Stage) -> tuple[Judgement, Trial]:
-    """The judgement after the models were run again, with what they did."""
+    """The judgement after the models were refitted, with what they did."""
     judgement = solved.judgement
     if solved.doubtful:
         return withdrawn(judgement, NOT_APART), Trial()
@@ -263,31 +274,38 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
 
 
 def _verdict(
-    solved: Solved, judgement: Judgement, bank: NullBank, trial: Trial, options: Options, began: float
+    solved: Solved,
+    judgement: Judgement,
+    bank: NullBank,
+    trial: Trial,
+    options: Options,
+    began: float,
+    late: Sequence[float],
 ) -> Verdict:
     setting, larger = solved.setting, solved.larger if judgement.named else None
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
-    rarity = solved.reference.rarity
-    low, high = rarity.interval(judgement.statistic, level=_INTERVAL)
+    tail = solved.reference.tail
+    low, high = tail.interval(judgement.statistic, level=CRITERIA.interval)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
-            statistic=judgement.statistic, null=[float(v) for v in rarity.null],
-            p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=_INTERVAL),
-            level=options.level, critical=rarity.critical(options.level), nulls=bank.words,
+            statistic=judgement.statistic, null=[float(v) for v in tail.null],
+            p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+            level=options.level, critical=tail.critical(options.level), nulls=bank.words,
         ),
         parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
         comparisons=trial.comparisons, apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
-        assumptions=assumptions(setting.experiment),
+        assumptions=(*assumptions(setting.experiment), *clocks(setting.experiment, late)),
         provenance={
             "seed": options.seed, "code": code_version(),
+            "criteria": replace(CRITERIA, level=options.level).as_dict(),
             "parents": [r.source for r in setting.experiment.recordings if r.source],
         },
     )  # fmt: skip
     return replace(
-        verdict, words=sentence(verdict), separating=separating(verdict),
+        verdict, words=" ".join([sentence(verdict), *ratios(setting.experiment)]), separating=separating(verdict),
         proposal=_proposal(solved, judgement), seconds=time.perf_counter() - began,
     )  # fmt: skip
 
@@ -299,7 +317,7 @@ def _proposal(solved: Solved, judgement: Judgement) -> str:
     larger = solved.larger if judgement.named else None
     left = None if larger is None else solved.fits.errors(larger)
     modes = corrective_field(
-        solved.setting, solved.fits.yardstick, left=left, beside=() if larger is None else larger.chosen
+        solved.setting, solved.fits.whitened, left=left, beside=() if larger is None else larger.chosen
     )
     field = proposal(modes, whole=larger is None)
     told = [] if judgement.line is None else [shedding(judgement.line)]

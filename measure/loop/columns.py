@@ -75,6 +75,9 @@ PRIOR = np.array([0.3, 1.0, 1.0])
 """Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
 30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011), damping within 5 ms."""
 
+PRIOR_WITHOUT_MASS = np.array([1.0, 1.0, 1.0])
+"""The same of a cloth that was not weighed and whose material is a guess: its density within a factor of e."""
+
 
 class Column(ABC):
     """One direction.

@@ -36,32 +36,68 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 @click.command("close-loop")
 @click.argument("sources", metavar="SOURCE...", nargs=-1)
 @click.option("--recipe", "recipe_path", type=click.Path(path_type=Path), metavar="FILE.toml",
-              help="Cloth, pins, wind, test; may name the recordings too.")  # fmt: skip
-@click.option("--wind", "winds", multiple=True, metavar="M/S|LOG|ID", help="One for all recordings, or one for each.")
-@click.option("--axis", default="1,0,0", show_default=True, metavar="X,Y,Z", help="Where the air of a speed goes.")
-@click.option("--north", type=float, metavar="DEG", help="From +x towards +y; with a log that has directions.")
-@click.option("--offset", type=float, help="From a log's first sample to frame 1 [s].")
-@click.option("--sensor", metavar="NAME|FILE.toml", help="Recipe of a log that does not say what it is.")
-@click.option("--zone", help="Of a log's stamps: +02:00, or an IANA name.")
-@click.option("--material", help="Nominal cloth, of the catalog; by default the source's own.")
-@click.option("--size", metavar="WxH", help="Of the flat cloth [m]; by default the markers' outline.")
-@click.option("--pins", help="hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default the source's own.")
-@click.option("--rate", type=click.FloatRange(min=0, min_open=True), help="Frames a second, if the source is silent.")
-@click.option("--unit", default="m", show_default=True, help="Of positions.")
-@click.option("--up", default="z", show_default=True, help="Axis that points up: z, y, x, -z, -y or -x.")
-@click.option("--noise", type=click.FloatRange(min=0), help="Of a marker's coordinate [m]; estimated by default.")
-@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 160 (the default) or more.")
-@click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
+              help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.")  # fmt: skip
+@click.option(
+    "--wind",
+    "winds",
+    multiple=True,
+    metavar="M/S|LOG|ID",
+    help="Wind beside the recordings: one for all of them, or one for each.",
+)
+@click.option(
+    "--axis",
+    default="1,0,0",
+    show_default=True,
+    metavar="X,Y,Z",
+    help="Direction towards which a wind given as a speed blows.",
+)
+@click.option(
+    "--north",
+    type=float,
+    metavar="DEG",
+    help="Where north lies, as an angle from +x towards +y, for a log that has directions.",
+)
+@click.option("--offset", type=float, help="Time from the first sample of the log to the first frame [s].")
+@click.option(
+    "--sensor", metavar="NAME|FILE.toml", help="Recipe that says how to read a log that does not say so itself."
+)
+@click.option("--zone", help="Time zone of the stamps of a log: +02:00, or an IANA name.")
+@click.option("--material", help="Nominal material, a name of the catalog; by default the one that the source states.")
+@click.option("--size", metavar="WxH", help="Size of the flat cloth [m]; by default the outline of the markers.")
+@click.option(
+    "--pins",
+    help="Where it is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
+)
+@click.option(
+    "--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second, if the source does not state them."
+)
+@click.option("--unit", default="m", show_default=True, help="Unit of the positions.")
+@click.option(
+    "--up", default="z", show_default=True, help="Axis of the recordings that points up: z, y, x, -z, -y or -x."
+)
+@click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
+)
+@click.option(
+    "--nulls", type=click.IntRange(min=1), help="Number of null recordings to simulate: 160 (the default) or more."
+)
+@click.option(
+    "--bank",
+    type=click.Path(path_type=Path, exists=True),
+    help="Folder of null recordings that were simulated before for such recordings.",
+)
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              help="Of the global test; 0.03 by default.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes; by default one for each core.")
+              help="Significance level of the global test; 0.03 by default.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls.")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
-              help="Where artifacts are, and where verdict and models go; also FLAGDATA_LAKE.")  # fmt: skip
-@click.option("--branch", default="main", show_default=True, help="Of the lake, to commit on.")
-@click.option("--name", help="Of the measurement and its models; by default the first source's.")
+              help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
+@click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
-              help="Folder for report.html, verdict.json and the models.")  # fmt: skip
+              help="Folder that report.html, verdict.json and the models are written to.")  # fmt: skip
 @json_option
 @click.pass_context
 def close_loop(
@@ -282,7 +318,9 @@ def refuse(findings: Iterable[Finding]) -> None:
 def doubted(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
     """The verdict with the remarks on its data; with those in its words that may themselves be what was found."""
     doubts = [told(finding) for finding in findings if finding.kind in _DOUBTFUL]
-    beware = f" Beware, this may be an error of the data: {'; '.join(doubts)}." if doubts else ""
+    beware = (
+        f" The data themselves may be wrong, which would look like an effect: {'; '.join(doubts)}." if doubts else ""
+    )
     return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, told(f)) for f in findings))
 
 

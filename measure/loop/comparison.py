@@ -1,4 +1,4 @@
-"""The model with and without an effect, run again on recordings and times that neither was fitted to."""
+"""The model with and without an effect, refitted and run on recordings and times that neither was fitted to."""
 
 from __future__ import annotations
 
@@ -11,18 +11,16 @@ import torch
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from measure.loop.criteria import CRITERIA
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model, errors_of
 from measure.loop.refine import Refined, finished
 from measure.loop.verdict import Comparison, Estimate
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 
 Floats = NDArray[np.float64]
-_LEVEL = 0.9
 _ENOUGH = 3
 """Segments of a recording beyond which two may be left out."""
-_FAR = 2.0
-"""Standard errors by which an effect must be better than the control."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,11 +33,11 @@ class Fold:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trial:
-    """Models run again on what they were not fitted to.
+    """Refitted models run on what they were not fitted to.
 
     Attributes:
         comparisons: one a fold.
-        helped: (segment,) half misfit before less after (see `measure.loop.yardstick`), each segment of the recordings
+        helped: (segment,) half misfit before less after (see `whitened_misfit`), each segment of the recordings
             left out in turn (of a single recording: of its last part).
         apart: (segment,) control less after; None without a control.
         recording: (segment,) what was left out together with each.
@@ -68,7 +66,7 @@ class Trial:
 
 
 def _above(values: Floats, recording: NDArray[np.int64]) -> bool:
-    return bool(values.sum() > _FAR * total_error(values, recording))
+    return bool(values.sum() > CRITERIA.lead * total_error(values, recording))
 
 
 def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
@@ -145,20 +143,20 @@ def left_out(
     forecaster: Forecaster,
     segments: Segments,
     fitted: Refined,
-    yardstick: Yardstick,
+    whitened: WhitenedMisfit,
     outsides: Sequence[NDArray[np.bool_]],
 ) -> list[LeftOut]:
     """Of a model, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
-    models = finished(forecaster, segments, yardstick, begun, fitted.chosen, [~outside for outside in outsides])
-    return measured(forecaster, segments, models, yardstick, outsides, fitted.chosen)
+    models = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
+    return measured(forecaster, segments, models, whitened, outsides, fitted.chosen)
 
 
 def measured(
     forecaster: Forecaster,
     segments: Segments,
     models: Sequence[Model],
-    yardstick: Yardstick,
+    whitened: WhitenedMisfit,
     outsides: Sequence[NDArray[np.bool_]],
     chosen: Sequence[int] = (),
 ) -> list[LeftOut]:
@@ -166,7 +164,10 @@ def measured(
     segments."""
     every = errors_of(models, forecaster, segments)
     return [
-        LeftOut(squared=_squared(_array(errors)[..., outside]), misfit=yardstick.of(errors).left_out(outside, chosen))
+        LeftOut(
+            squared=_squared(_array(errors))[outside] / segments.tracked[outside],
+            misfit=whitened.of(errors).left_out(outside, chosen),
+        )
         for errors, outside in zip(every, outsides, strict=True)
     ]
 
@@ -200,7 +201,7 @@ def compare(
     room = float(old.mean()) - low
     return Comparison(
         what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
-        floor=root(floor), oracle=None, share=gained / room if room > 0.02 * float(old.mean()) else None,
+        floor=root(floor), oracle=None, share=gained / room if room > CRITERIA.room * float(old.mean()) else None,
         control=None if control is None else root(control.squared), control_name=control_name,
         apart=None if control is None else a_segment(control.misfit - after.misfit, recording),
     )  # fmt: skip
@@ -211,9 +212,9 @@ def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:
     value, reach = float(values.mean()), math.inf
     if len(values) > 1:
         free = len(values) - len(_strata(values, recording))
-        quantile = float(student.ppf(0.5 + _LEVEL / 2, free))
+        quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, free))
         reach = quantile * total_error(values, recording) / len(values)
-    return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=_LEVEL)
+    return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=CRITERIA.interval)
 
 
 def root(squared: Floats) -> Estimate:
@@ -222,7 +223,7 @@ def root(squared: Floats) -> Estimate:
     reach = _reach(squared)
     return Estimate(
         value=math.sqrt(mean), low=math.sqrt(max(mean - reach, 0.0)), high=math.sqrt(mean + reach), unit="m",
-        level=_LEVEL,
+        level=CRITERIA.interval,
     )  # fmt: skip
 
 
@@ -230,11 +231,11 @@ def paired(before: Floats, after: Floats) -> Estimate:
     """Of roots of means, paired by segment: linear in the squares, whose difference Student's interval is of."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
-    return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=_LEVEL)
+    return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)
 
 
 def _reach(values: Floats) -> float:
     if len(values) < 2:
         return math.inf
-    quantile = float(student.ppf(0.5 + _LEVEL / 2, len(values) - 1))
+    quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, len(values) - 1))
     return quantile * float(values.std(ddof=1)) / math.sqrt(len(values))

@@ -24,14 +24,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.loop.criteria import CRITERIA
+
 Floats = NDArray[np.float64]
 
 ALONG, LEFT = 0, 1
 _WINDOW = 0.2
 """s: most of what a whipping edge does is slower, most of what noise does faster."""
-_LEAST_TURNED = 0.3
-_MOST_WITHIN = 2.0
-"""Beyond these, a course is not turbulence's: see above."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,21 +40,27 @@ class Course:
     Attributes:
         score: (segment, window, part) g, of errors over their scale; parts are along the wind, to its left, upward.
         curvature: (segment, window, part, part) H = Σ w s·s', h on its diagonal.
+        log: (segment, window, part, nuisance) how g moves with what the wind's log may be off by; None where the wind
+            is known.
     """
 
     score: Floats
     curvature: Floats
+    log: Floats | None = None
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Course:
         """Of some segments."""
-        return Course(score=self.score[chosen], curvature=self.curvature[chosen])
+        log = None if self.log is None else self.log[chosen]
+        return Course(score=self.score[chosen], curvature=self.curvature[chosen], log=log)
 
     @classmethod
     def joined(cls, parts: Sequence[Course]) -> Course:
         """One after another."""
+        logs = [p.log for p in parts if p.log is not None]
         return cls(
-            score=np.concatenate([p.score for p in parts]), curvature=np.concatenate([p.curvature for p in parts])
-        )
+            score=np.concatenate([p.score for p in parts]), curvature=np.concatenate([p.curvature for p in parts]),
+            log=np.concatenate(logs) if logs else None,
+        )  # fmt: skip
 
     def swing(self, recording: NDArray[np.int64]) -> Floats:
         """(part,) Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment.
@@ -92,11 +97,24 @@ class Course:
         return (self._own * value).sum(axis=1, keepdims=True) / self._own.sum(axis=1, keepdims=True)
 
     def _about(self, recording: NDArray[np.int64]) -> Floats:
-        """(segment, window, part) c less its recording's mean."""
-        value = self.score / self._own
+        """(segment, window, part) c less its recording's mean, and less what its log may be off by."""
+        value = self._centred(self.score, recording)
+        if self.log is None:
+            return value
+        off = np.stack([self._centred(self.log[..., k], recording) for k in range(self.log.shape[-1])], axis=-1)
         for index in np.unique(recording):
             own = recording == index
-            value[own] -= self.score[own].sum(axis=(0, 1)) / self._own[own].sum(axis=(0, 1))
+            weighed = self._own[own][..., None] * off[own]
+            curvature = np.einsum("swpj,swpk->jk", weighed, off[own]) + np.eye(off.shape[-1])
+            value[own] -= off[own] @ np.linalg.solve(curvature, np.einsum("swpk,swp->k", weighed, value[own]))
+        return value
+
+    def _centred(self, score: Floats, recording: NDArray[np.int64]) -> Floats:
+        """(segment, window, part) of scores over h, less their recording's mean."""
+        value = score / self._own
+        for index in np.unique(recording):
+            own = recording == index
+            value[own] -= score[own].sum(axis=(0, 1)) / self._own[own].sum(axis=(0, 1))
         return value
 
 
@@ -118,19 +136,21 @@ class Variation:
         slow = self.whole[ALONG] - self.fast[ALONG]
         return bool(
             self.whole[ALONG] > 0
-            and self.whole[LEFT] >= _LEAST_TURNED**2 * self.whole[ALONG]
-            and self.fast[ALONG] <= _MOST_WITHIN * slow
+            and self.whole[LEFT] >= CRITERIA.least_turned**2 * self.whole[ALONG]
+            and self.fast[ALONG] <= CRITERIA.most_within * slow
         )
 
     @property
     def words(self) -> str:
         """How it differs from turbulence's."""
         if self.whole[ALONG] <= 0:
-            return "the wind along itself does not vary as it does in turbulence"
+            return "the wind does not vary along its mean as it does in turbulence"
         turned = math.sqrt(max(self.whole[LEFT], 0.0) / self.whole[ALONG])
-        if turned < _LEAST_TURNED:
-            return f"the wind turns by {turned:.2g} of what it varies along itself, in turbulence by 0.6 to 1"
-        return "the wind varies faster than turbulence does, within two seconds more than from one two to another"
+        if turned < CRITERIA.least_turned:
+            return f"the wind varies across its mean by {turned:.2g} of what it does along it, in turbulence 0.6 to 1"
+        return (
+            "the wind varies faster than turbulence does: more within two seconds than between stretches of two seconds"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from torch import Tensor
 from measure.loop.columns import THETA, FieldColumn, fields
 from measure.loop.inference import Evidence
 from measure.loop.setting import Setting
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Mode:
 
 
 def corrective_field(
-    setting: Setting, yardstick: Yardstick, *, left: Tensor | None = None, beside: Sequence[int] = ()
+    setting: Setting, whitened: WhitenedMisfit, *, left: Tensor | None = None, beside: Sequence[int] = ()
 ) -> tuple[Mode, ...]:
     """Its modes, fitted together.
 
@@ -44,9 +44,9 @@ def corrective_field(
     nominal = [setting.nominal] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     changes = forecaster.sensitivities(modes, segments, nominal, base)[len(THETA) :]
-    found = yardstick.found if left is None else replace(yardstick.found, r=yardstick.projection.of(left))
-    response = yardstick.projection.response(changes)
-    evidence = Evidence.of(found, yardstick.speeds, yardstick.null, beside=response)
+    found = whitened.found if left is None else replace(whitened.found, r=whitened.projection.of(left))
+    response = whitened.projection.response(changes)
+    evidence = Evidence.of(found, whitened.speeds, whitened.null, beside=response)
     first = found.r.shape[1]
     fit = evidence.fit([*beside, *range(first, first + len(modes))])
     fitted = (fit.of(first + place) for place in range(len(modes)))

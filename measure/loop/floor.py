@@ -35,7 +35,8 @@ def numerical_floor(
     first = setting.experiment.recordings[0]
     simulated = np.tile(recordings, copies)
     batch = NullBatch(
-        specimen=setting.experiment.specimen, markers=first.markers, rate=first.rate, duration=_DURATION,
+        specimen=setting.experiment.specimen, markers=first.markers, rate=1 / setting.segments.period,
+        duration=_DURATION,
         noise=first.noise, calibrations=(model.calibration,) * len(simulated),
         speeds=tuple(float(u) for u in setting.speeds[simulated]),
         seed=child_seed(seed, "floor"), effects=model.acting,

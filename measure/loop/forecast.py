@@ -7,7 +7,8 @@ gets right costs no error, what it lacks returns in every e. The prediction-erro
 (Ljung, System Identification, 1999, chapter 7) then works on e and its sensitivities.
 
 Recordings are cut into segments that run side by side as members of a batch; a segment starts some frames early, so
-that its state has forgotten how it was started.
+that its state has forgotten how it was started. Where a marker was not tracked there is no error e: nothing is
+corrected by it, and nothing is compared with it.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from measure.loop.columns import (
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.handles import Handles
-from sim.integrate.abreast import Abreast
+from sim.integrate.joint_batch import JointBatch
 from sim.integrate.split import SplitEuler
 from sim.scene import Scene, assemble
 from sim.state import State
@@ -106,6 +107,7 @@ class Segment:
         wind: of the recording.
         noise: of a coordinate [m].
         anchors: (held, 3) where its cloth is tied [m]; None where the specimen says it.
+        seen: (frame, marker) whether each position was tracked; None where all were.
     """
 
     recording: int
@@ -114,6 +116,7 @@ class Segment:
     wind: WindTrack
     noise: float
     anchors: Floats | None = None
+    seen: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -152,9 +155,10 @@ class Segments:
             if np.isnan(recording.positions).any():
                 raise InputError(
                     "a marker was lost in some frames", where=f"recording {recording.name!r}",
-                    fix="fill short gaps (measure.observe.fill), or drop the marker",
+                    fix="fill its gaps (measure.observe.fill)",
                 )  # fmt: skip
             frames = recording.positions[:: cut.stride]
+            seen = None if recording.seen is None else recording.seen[:: cut.stride]
             if not cut.enough:
                 needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
@@ -167,6 +171,7 @@ class Segments:
                     Segment(
                         recording=index, start=begin * period, wind=recording.wind, noise=recording.noise,
                         positions=frames[begin : begin + span],
+                        seen=None if seen is None else seen[begin : begin + span],
                     )
                 )  # fmt: skip
         return cls(items=tuple(items), markers=first.markers, cut=cut)
@@ -193,6 +198,24 @@ class Segments:
     def positions(self) -> Floats:
         """(frame, marker, 3, segment), warm-up included [m]."""
         return np.stack([item.positions for item in self.items], axis=-1)
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_] | None:
+        """(frame, marker, segment) whether each position was tracked, warm-up included; None where all were."""
+        if all(item.seen is None for item in self.items):
+            return None
+        whole = np.ones(self.items[0].positions.shape[:2], dtype=bool)
+        return np.stack([whole if item.seen is None else item.seen for item in self.items], axis=-1)
+
+    @property
+    def counted(self) -> NDArray[np.bool_] | None:
+        """The same of the frames that count."""
+        return None if self.seen is None else self.seen[self.first :]
+
+    @cached_property
+    def tracked(self) -> Floats:
+        """(segment,) share of the positions that were tracked, in the frames that count."""
+        return np.ones(len(self)) if self.counted is None else self.counted.mean(axis=(0, 1))
 
     @property
     def period(self) -> float:
@@ -296,7 +319,8 @@ class Forecaster:
         return replace(system, wind=wind), state
 
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
-        """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted."""
+        """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker
+        was not tracked."""
         return self.run(system, state, segments)[0]
 
     def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
@@ -307,6 +331,7 @@ class Forecaster:
         """The same of what advances a state by a period."""
         period = segments.period
         seen = self._real(segments.positions)
+        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64))
         x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
         v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
@@ -316,6 +341,8 @@ class Forecaster:
                 state = advance(state)
                 predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
                 error = seen[k] - predicted
+                if mask is not None:
+                    error = error * mask[k][:, None]
                 if k >= segments.first:
                     errors.append(error)
                     predictions.append(predicted)
@@ -331,7 +358,10 @@ class Forecaster:
         """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
         if isinstance(column, WrittenColumn):
             seen, rest = self._real(segments.positions), self.specimen.mesh.rest
-            return column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
+            moved = column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
+            if segments.counted is None:
+                return moved
+            return moved * self._real(segments.counted.astype(np.float64))[:, :, None]
         if not isinstance(column, StepColumn):
             raise UsageError(f"{column.name} has no sensitivity", where="columns", fix="give a StepColumn")
         system, state = column.system(*self.system(segments, calibrations))
@@ -342,14 +372,14 @@ class Forecaster:
     ) -> list[Tensor]:
         """The same of each parameter of `THETA`, then of each column.
 
-        All that are steps run abreast.
+        All that are steps run in one joint batch.
         """
         nominal = self.system(segments, calibrations)
         steps = [
             (size, self.system(segments, _moved(calibrations, place, size))) for place, (_, _, size) in enumerate(THETA)
         ]
         steps += [(column.step, column.system(*nominal)) for column in columns if isinstance(column, StepColumn)]
-        errors = self.errors_abreast([moved for _, moved in steps], segments)
+        errors = self.errors_jointly([moved for _, moved in steps], segments)
         changes = [(base - own) / size for own, (size, _) in zip(errors, steps, strict=True)]
         found = iter(changes[len(THETA) :])
         return [
@@ -362,18 +392,18 @@ class Forecaster:
             ),
         ]
 
-    def errors_abreast(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
+    def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
         """`errors` of each of some batches of the same segments.
 
-        They run abreast: small batches cost nearly as much as larger ones.
+        They run in one joint batch: small batches cost nearly as much as larger ones.
         """
         together = math.ceil(len(batches) * len(segments) / WIDEST)
         found: list[Tensor] = []
         for chosen in np.array_split(np.arange(len(batches)), together):
             copies = segments.select(list(range(len(segments))) * len(chosen))
-            abreast, start = Abreast.of([batches[place] for place in chosen])
+            joint, start = JointBatch.of([batches[place] for place in chosen])
             errors, _ = self._run(
-                partial(self.integrator.advance_abreast, abreast, duration=segments.period), start, copies
+                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, copies
             )
             found += errors.split(len(segments), dim=-1)
         return found

@@ -10,7 +10,7 @@ experiment: nuisance columns, learnt from the nulls as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ from flagdata.errors import UsageError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.course import Course
 from measure.loop.statistics import Statistics
+from measure.loop.wind_log import by_recording
 
 Floats = NDArray[np.float64]
 Chosen = Sequence[int]
@@ -53,12 +54,14 @@ class NullModel:
         shifts: (shift, column) how μ moves from one experiment to another: principal directions, each as long as its
             standard deviation. Where no null is of the design's cloth, how it moves from cloth to cloth is among them.
         turning: the same of moments about the pole; None where they are not looked at.
+        prior: (theta,) standard deviations of the calibrated parameters about the nominal ones, in units of `THETA`.
     """
 
     coefficients: Floats
     covariance: Floats
     shifts: Floats
     turning: NullModel | None = None
+    prior: Floats = field(default_factory=PRIOR.copy)
 
     @classmethod
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
@@ -83,6 +86,10 @@ class NullModel:
             coefficients=coefficients[:_POWERS], covariance=covariance, shifts=_principal(means, covariance),
             turning=None if turning is None else cls.fit(replace(nulls, statistics=turning), design),
         )  # fmt: skip
+
+    def under(self, prior: Floats) -> NullModel:
+        """With another prior of the calibrated parameters."""
+        return replace(self, prior=prior, turning=None if self.turning is None else self.turning.under(prior))
 
     def mean(self, speeds: Floats) -> Floats:
         """(segment, column)."""
@@ -222,17 +229,19 @@ def _shrunk(covariance: Floats, count: int) -> Floats:
 class Evidence:
     """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
 
-    Its columns are the statistics', then the null model's shifts.
+    Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
+    by.
 
     Attributes:
         recording: (segment,) index of each one's recording.
         curvature: (segment, column, column) H = Rᵀ Σ⁻¹ R.
         score: (segment, column) g = Rᵀ Σ⁻¹ (r − μ).
         energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
-        columns: how many are the statistics' and those given beside; the null model's shifts follow.
+        columns: how many are the statistics' and those given beside; the nuisances follow.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of moments about the pole; None where they are not looked at.
         course: of the wind, as the errors tell it; None where not looked at.
+        prior: of the calibrated parameters, see `NullModel`.
     """
 
     recording: NDArray[np.int64]
@@ -243,6 +252,7 @@ class Evidence:
     lines: Floats | None = None
     turning: Evidence | None = None
     course: Course | None = None
+    prior: Floats = field(default_factory=PRIOR.copy)
 
     @classmethod
     def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
@@ -279,18 +289,21 @@ class Evidence:
         left = r - null.mean(speeds)
         shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
         response = np.concatenate([statistics.response, shifts], axis=2)
+        if statistics.log is not None:
+            response = np.concatenate([response, by_recording(statistics.log, statistics.recording)], axis=2)
         precision = np.linalg.inv(null.covariance)
         weighted = np.einsum("sia,ij->saj", response, precision)
         return cls(
             recording=statistics.recording, curvature=weighted @ response,
             score=np.einsum("saj,sj->sa", weighted, left),
             energy=np.einsum("si,ij,sj->s", left, precision, left), columns=statistics.response.shape[2],
-            lines=statistics.lines, course=statistics.course,
+            lines=statistics.lines, course=statistics.course, prior=null.prior,
         )  # fmt: skip
 
     @property
     def nuisance(self) -> list[int]:
-        """Columns that are always fitted: the calibrated parameters and the shifts of the numerics."""
+        """Columns that are always fitted: the calibrated parameters, the shifts of the numerics, and what the logs of
+        the wind may be off by."""
         return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Evidence:
@@ -299,7 +312,7 @@ class Evidence:
             recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
             energy=self.energy[chosen], columns=self.columns, lines=None if self.lines is None else self.lines[chosen],
             turning=None if self.turning is None else self.turning.select(chosen),
-            course=None if self.course is None else self.course.select(chosen),
+            course=None if self.course is None else self.course.select(chosen), prior=self.prior,
         )  # fmt: skip
 
     @property
@@ -310,7 +323,7 @@ class Evidence:
     def _total(self) -> tuple[Floats, Floats, float]:
         """Sums over the segments, with the priors of the nuisance columns."""
         curvature = self.curvature.sum(axis=0)
-        prior = np.concatenate([PRIOR**-2, np.ones(self.score.shape[1] - self.columns)])
+        prior = np.concatenate([self.prior**-2, np.ones(self.score.shape[1] - self.columns)])
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
@@ -322,7 +335,7 @@ class Evidence:
         """
         active = [*self.nuisance, *chosen]
         curvature, score, energy = self._total()
-        pull = PRIOR**-2 * np.asarray(centre)
+        pull = self.prior**-2 * np.asarray(centre)
         score[: len(THETA)] += pull
         energy += float(pull @ np.asarray(centre))
         covariance = np.asarray(np.linalg.inv(curvature[np.ix_(active, active)]), dtype=np.float64)
@@ -344,7 +357,7 @@ class Evidence:
         curvature[:, column, column] = 1.0
         return Evidence(
             recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
-            columns=self.columns, lines=self.lines,
+            columns=self.columns, lines=self.lines, prior=self.prior,
         )  # fmt: skip
 
     def drops(self, beside: Chosen = ()) -> Floats:

@@ -31,8 +31,8 @@ class Model:
 
     @property
     def acting(self) -> tuple[Effect, ...]:
-        """The effects, their strengths kept to what is admissible."""
-        return tuple(column.at(_kept(column, coefficient)) for column, coefficient in self.effects)
+        """The effects, their strengths clipped to what is admissible."""
+        return tuple(column.at(_admissible(column, coefficient)) for column, coefficient in self.effects)
 
     def system(self, forecaster: Forecaster, segments: Segments) -> tuple[System, State]:
         """The batch of segments by this model."""
@@ -42,7 +42,7 @@ class Model:
         """After steps along the calibrated parameters, then along each effect's strength."""
         own = len(steps) - len(self.effects)
         effects = tuple(
-            (column, _kept(column, value + step))
+            (column, _admissible(column, value + step))
             for (column, value), step in zip(self.effects, steps[own:], strict=True)
         )
         return replace(self, calibration=self.calibration.moved(steps[:own]), effects=effects)
@@ -80,6 +80,6 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
     return found
 
 
-def _kept(column: EffectColumn, coefficient: float) -> float:
+def _admissible(column: EffectColumn, coefficient: float) -> float:
     null, (least, most) = column.described.null, column.described.admissible
     return float(np.clip(null + coefficient, least, most)) - null

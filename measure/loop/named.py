@@ -85,12 +85,12 @@ def _model(
     if effects:
         strengths: dict[str, dict[str, float]] = {}
         for candidate in effects:
-            strengths.setdefault(candidate.effect, {})[candidate.parameter.replace("_", "-")] = _kept(candidate)
+            strengths.setdefault(candidate.effect, {})[candidate.parameter.replace("_", "-")] = _admissible(candidate)
         content["effects"] = strengths
     return NamedModel(name=name, content=content)
 
 
-def _kept(candidate: Candidate) -> float:
+def _admissible(candidate: Candidate) -> float:
     least, most = EFFECTS[candidate.effect].parameters()[candidate.parameter].admissible
     return float(np.clip(candidate.strength.value, least, most))
 

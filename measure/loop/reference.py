@@ -12,16 +12,14 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
+from measure.loop.criteria import CRITERIA
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
 from measure.loop.lines import Line, Lines, strongest
-from measure.loop.rarity import Rarity, share_as_large
+from measure.loop.tail_probability import TailProbability, share_as_large
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
-_LEAST = 24
-_KINDS = 4
-"""Null recordings below which no test at 2 % can be held, and of how many kinds of numerics."""
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
 
@@ -96,10 +94,10 @@ class NullBank:
 
     def __post_init__(self) -> None:
         count, kinds = len(np.unique(self.nulls.statistics.recording)), len(np.unique(self.nulls.numerics))
-        if count < _LEAST or kinds < _KINDS:
+        if count < CRITERIA.fewest_nulls or kinds < CRITERIA.fewest_kinds:
             raise InputError(
                 f"{count} null recordings of {kinds} numerics", where="null bank",
-                fix=f"simulate at least {_LEAST} of {_KINDS}, better 200 of 12",
+                fix=f"simulate at least {CRITERIA.fewest_nulls} of {CRITERIA.fewest_kinds}, better 200 of 12",
             )  # fmt: skip
 
     def model(self, design: Design) -> NullModel:
@@ -255,8 +253,8 @@ class Reference:
             InputError: no nulls of such noise.
         """
         found, noises, kinds = _Found.of(groups), np.array(groups.noises), np.array(groups.kinds)
-        alike = np.abs(noises - noise) <= _ALIKE
-        if alike.sum() < _LEAST:
+        alike = np.abs(noises - noise) <= CRITERIA.alike_noise
+        if alike.sum() < CRITERIA.fewest_nulls:
             raise InputError(
                 f"no nulls with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
                 fix="build one with such noise, or leave it out",
@@ -265,8 +263,8 @@ class Reference:
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
         for kind in np.unique(kinds):
             own = kinds == kind
-            near = np.abs(noises - noises[own][0]) <= _ALIKE
-            if (near & ~own).sum() >= _LEAST:  # else no other kind has such noise
+            near = np.abs(noises - noises[own][0]) <= CRITERIA.alike_noise
+            if (near & ~own).sum() >= CRITERIA.fewest_nulls:  # else no other kind has such noise
                 near &= ~own
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
@@ -286,9 +284,9 @@ class Reference:
         return self.beside_gusts
 
     @cached_property
-    def rarity(self) -> Rarity:
+    def tail(self) -> TailProbability:
         """Of how far the farthest is, of all columns, what is left and the line: the global test's."""
-        return Rarity(null=self.far.max(axis=1), kinds=self.kinds)
+        return TailProbability(null=self.far.max(axis=1), kinds=self.kinds)
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
         """(column,) of data, as `scaled` has them, where some columns are fitted already."""
@@ -297,7 +295,7 @@ class Reference:
 
     def p_family(self, statistic: float, column: int) -> float:
         """Chance that in nulls any is as far as this column."""
-        return self.rarity.p(float(self._far(statistic * self.spread[column], column)))
+        return self.tail.p(float(self._far(statistic * self.spread[column], column)))
 
     def p_alone(self, statistic: float, column: int) -> float:
         """The same for the column alone."""
@@ -311,7 +309,7 @@ class Reference:
         Args:
             swinging: whether lines of the errors' spectra count.
         """
-        return self.rarity.p(self.farthest(evidence, columns, chosen, swinging=swinging))
+        return self.tail.p(self.farthest(evidence, columns, chosen, swinging=swinging))
 
     def farthest(
         self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = (), *, swinging: bool = True
@@ -357,8 +355,6 @@ class Reference:
 
 _NOTHING = 1e-6
 """Mean share below which a column is never seen: that of the columns that are always fitted."""
-_ALIKE = 1.5e-3
-"""m; noise that differs by less moves statistics little beside the 20 mm that meshes do."""
 
 
 def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:

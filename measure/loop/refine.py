@@ -14,7 +14,7 @@ from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model, errors_of
 from measure.loop.statistics import Statistics, reduced
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class Refined:
 def refine(
     forecaster: Forecaster,
     segments: Segments,
-    yardstick: Yardstick,
+    whitened: WhitenedMisfit,
     chosen: Sequence[int],
     *,
     weighed: Sequence[Column],
@@ -82,31 +82,31 @@ def refine(
     Raises:
         DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.
     """
-    fit = yardstick.evidence(yardstick.found).fit(chosen)
+    fit = whitened.evidence(whitened.found).fit(chosen)
     own = [weighed[c - len(THETA)] for c in chosen]
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=Calibration(), effects=effects).moved(cut(np.array(values, dtype=np.float64)))
-    part = _part(yardstick.null, [*range(len(THETA)), *chosen])
-    reached = _round(forecaster, segments, model, part, yardstick.speeds, tuple(chosen))
+    part = _part(whitened.null, [*range(len(THETA)), *chosen])
+    reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen))
     for _ in range(ROUNDS - 1):
         if reached.stays:
             break
-        reached = _round(forecaster, segments, reached.model, part, yardstick.speeds, tuple(chosen))
+        reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen))
     every = np.ones(len(segments), dtype=bool)
-    (model,) = finished(forecaster, segments, yardstick, [reached.model], chosen, [every])
+    (model,) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
     return replace(reached, model=model)
 
 
 def finished(
     forecaster: Forecaster,
     segments: Segments,
-    yardstick: Yardstick,
+    whitened: WhitenedMisfit,
     models: Sequence[Model],
     chosen: Sequence[int],
     insides: Sequence[NDArray[np.bool_]],
 ) -> list[Model]:
-    """Models of the same columns after one linear step by the yardstick's directions, which are all, each fitted to
+    """Models of the same columns after one linear step by all directions of the whitened misfit, each fitted to
     some segments.
 
     By its own few directions a fit follows effects far from where they are linear, but cannot tell some of them from
@@ -115,7 +115,7 @@ def finished(
     every = errors_of(models, forecaster, segments)
     made: list[Model] = []
     for model, errors, inside in zip(models, every, insides, strict=True):
-        fit = yardstick.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
+        fit = whitened.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
         step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
         made.append(model.moved(cut(step)) if np.isfinite(step).all() else model)
     return made
@@ -155,7 +155,7 @@ def cut(step: Floats) -> tuple[float, ...]:
 def _part(null: NullModel, places: list[int]) -> NullModel:
     return NullModel(
         coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
-        shifts=null.shifts[:_FEW, places],
+        shifts=null.shifts[:_FEW, places], prior=null.prior,
     )  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
     steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
     changes = [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
-    return reduced(base, changes, segments.recording, segments.noise)
+    return reduced(base, changes, segments.recording, segments.noise, segments.counted)
 
 
 def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:

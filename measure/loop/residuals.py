@@ -29,6 +29,9 @@ def residuals(
     for index, own in enumerate(experiment.recordings):
         places = np.flatnonzero(recording == index)
         first, second = _joined(before.errors, places), None if after is None else _joined(after.errors, places)
+        counted = np.ones(first.shape[:2], dtype=bool)
+        if segments.counted is not None:
+            counted = np.concatenate([segments.counted[..., place] for place in places])
         starts = [segments.items[p].start + segments.first * segments.period for p in places]
         length = before.errors.shape[0]
         times = np.concatenate([start + np.arange(length) * segments.period for start in starts])
@@ -38,12 +41,15 @@ def residuals(
         made.append(
             Residual(
                 recording=own.name, speed=own.wind.speed, held_out=held_out, times=_list(times),
-                in_time=_list(_over(first, (1,))), in_time_after=[] if second is None else _list(_over(second, (1,))),
-                markers=segments.markers.tolist(), in_space=_list(_over(first, (0,))),
-                in_space_after=[] if second is None else _list(_over(second, (0,))), mean=first.mean(axis=0).tolist(),
+                in_time=_list(_over(first, counted, 1)),
+                in_time_after=[] if second is None else _list(_over(second, counted, 1)),
+                markers=segments.markers.tolist(), in_space=_list(_over(first, counted, 0)),
+                in_space_after=[] if second is None else _list(_over(second, counted, 0)),
+                mean=(first.sum(axis=0) / np.maximum(counted.sum(axis=0), 1)[:, None]).tolist(),
                 frequencies=_list(frequencies), spectrum=_list(spectrum),
                 spectrum_after=[] if second is None else _list(_spectrum(second, segments.period)[1]),
-                observed=(predicted + first[shown]).tolist(), before=predicted.tolist(),
+                observed=np.where(counted[shown, :, None], predicted + first[shown], np.nan).tolist(),
+                before=predicted.tolist(),
                 after=[] if after is None else _joined(after.predicted, places)[shown].tolist(),
             )
         )  # fmt: skip
@@ -55,9 +61,11 @@ def _joined(values: Floats, places: NDArray[np.int64]) -> Floats:
     return np.concatenate([values[..., place] for place in places])
 
 
-def _over(errors: Floats, axes: tuple[int, ...]) -> Floats:
-    """Root mean square distance over frames (0) or markers (1) [m]."""
-    return np.sqrt((errors**2).sum(axis=2).mean(axis=axes))
+def _over(errors: Floats, counted: NDArray[np.bool_], axis: int) -> Floats:
+    """Root mean square distance over frames (0) or markers (1) [m], of what was tracked; NaN where nothing was."""
+    count = counted.sum(axis=axis)
+    total = (errors**2).sum(axis=2).sum(axis=axis)
+    return np.sqrt(np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0))
 
 
 def _spectrum(errors: Floats, period: float) -> tuple[Floats, Floats]:

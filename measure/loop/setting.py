@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from measure.loop.alignment import aligned
-from measure.loop.columns import Calibration
+from measure.loop.columns import PRIOR, PRIOR_WITHOUT_MASS, Calibration
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Design
 from measure.observe.trajectory import Experiment
@@ -49,6 +49,23 @@ class Setting:
             noise=float(self.segments.noise.max()), period=self.segments.period,
             cloth=self.experiment.specimen.material.fingerprint,
         )  # fmt: skip
+
+    def moved(self, lags: Sequence[float]) -> Setting:
+        """With each recording's log moved by what it lags [s]."""
+        recordings = tuple(
+            replace(recording, wind=recording.wind.later(lag))
+            for recording, lag in zip(self.experiment.recordings, lags, strict=True)
+        )
+        items = tuple(replace(item, wind=recordings[item.recording].wind) for item in self.segments.items)
+        return replace(
+            self, experiment=replace(self.experiment, recordings=recordings),
+            segments=replace(self.segments, items=items),
+        )  # fmt: skip
+
+    @property
+    def prior(self) -> Floats:
+        """(theta,) standard deviations of the calibrated parameters."""
+        return PRIOR if self.experiment.specimen.mass_known else PRIOR_WITHOUT_MASS
 
     @property
     def recording(self) -> NDArray[np.int64]:

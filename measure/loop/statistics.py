@@ -5,8 +5,9 @@ With e the errors, s_i the sensitivity of the predictions to column i and w weig
     r_i = Σ w e·s_i / √(Σ w s_i²),   R_ij = Σ w s_i·s_j / √(Σ w s_i²),
 
 sums over frames and markers, w the inverse mean square of a marker's errors in the recording beyond what its noise
-explains: the errors' size along the direction of each column, and how coefficients δ move it,
-E r = μ + R δ, with μ what the model's own numerics leave.
+explains: the errors' size along the direction of each column, and how coefficients δ move it, E r = μ + R δ, with μ
+what the model's own numerics leave. The mean square is taken over all frames, so that the errors and sensitivities of a
+marker that was tracked in a share q of them are divided by √q, and r is that of a complete recording.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column, winds
 from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.lever import Lever
 from measure.loop.lines import Spectrum
+from measure.loop.moment import PoleMoment
+from measure.loop.wind_log import sensitivities
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -35,6 +37,9 @@ _CHUNK = 64
 _CLIP = 4.0
 """Errors beyond so many times a marker's root mean square count as that much (Huber): folds snap in ways no effect
 explains."""
+
+_NEVER = 1e-4
+"""Least mean square of a marker's errors over the largest: one that was hardly ever tracked says nothing."""
 
 _NOISE = 6.0
 """Variance of e by markers of variance 1: each frame's weighs 1, the one before 2, the one before that 1, in amplitude,
@@ -52,9 +57,11 @@ class Statistics:
         error: (segment,) mean squared prediction error [m²].
         marker_error: (segment, marker) the same of each marker.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
-        turning: the same of the errors' moment about the pole, see `lever`, its `error` in m⁸/s⁴; None where not
+        turning: the same of the errors' moment about the pole, see `pole_moment`, its `error` in m⁸/s⁴; None where not
             looked at.
         course: of the wind, as the errors tell it; None where not looked at.
+        log: (segment, column, nuisance) how r moves with a prior standard deviation of what the wind's log may be off
+            by, see `wind_log`; None where the wind is known, as in nulls.
     """
 
     recording: NDArray[np.int64]
@@ -65,6 +72,7 @@ class Statistics:
     lines: Floats | None = None
     turning: Statistics | None = None
     course: Course | None = None
+    log: Floats | None = None
 
     @property
     def spectra(self) -> Floats:
@@ -85,6 +93,7 @@ class Statistics:
             lines=None if self.lines is None else self.lines[chosen],
             turning=None if self.turning is None else self.turning.select(chosen),
             course=None if self.course is None else self.course.select(chosen),
+            log=None if self.log is None else self.log[chosen],
         )  # fmt: skip
 
     @classmethod
@@ -99,12 +108,14 @@ class Statistics:
         lines = _all_or_none([p.lines for p in parts], "spectra")
         turning = _all_or_none([p.turning for p in parts], "moments")
         courses = _all_or_none([p.course for p in parts], "courses")
+        logs = _all_or_none([p.log for p in parts], "what the log may be off by")
         return cls(
             recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
             response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
             marker_error=np.concatenate([p.marker_error for p in parts]),
             lines=np.concatenate(lines) if lines else None,
             turning=cls.joined(turning) if turning else None, course=Course.joined(courses) if courses else None,
+            log=np.concatenate(logs) if logs else None,
         )  # fmt: skip
 
 
@@ -123,7 +134,7 @@ class Projection:
         directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
         scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
         spectrum: what their periodograms are taken along; None where lines are not looked at.
-        lever: what their moments are taken by; None where they are not looked at.
+        pole_moment: what their moments are taken by; None where they are not looked at.
         turning: (segment, column, frame) the sensitivities' moments, of length 1.
         gauge: what the wind's course is told by; None where not looked at.
     """
@@ -131,7 +142,7 @@ class Projection:
     directions: Tensor
     scale: Tensor
     spectrum: Spectrum | None = None
-    lever: Lever | None = None
+    pole_moment: PoleMoment | None = None
     turning: Tensor | None = None
     gauge: Gauge | None = None
 
@@ -154,9 +165,9 @@ class Projection:
 
     def turned(self, errors: Tensor) -> Floats | None:
         """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
-        if self.lever is None or self.turning is None:
+        if self.pole_moment is None or self.turning is None:
             return None
-        moment = self.lever.moment(errors[None])[0].to(self.turning)
+        moment = self.pole_moment.moment(errors[None])[0].to(self.turning)
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def course(self, errors: Tensor) -> Course | None:
@@ -197,27 +208,36 @@ def projected(
     """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
     pieces: list[Projection] = []
-    levers: list[Lever] = []
+    pole_moments: list[PoleMoment] = []
     turning: list[Tensor] = []
     gauges: list[Gauge] = []
-    for found, changes, scale, lever, gauge in _pieces(forecaster, segments, calibrations, columns):
+    for found, changes, scale, pole_moment, gauge in _pieces(forecaster, segments, calibrations, columns, log=True):
         parts.append(found)
         pieces.append(Projection.along(changes, scale))
-        levers.append(lever)
-        turning.append(_moments(lever, changes)[1])
+        pole_moments.append(pole_moment)
+        turning.append(_moments(pole_moment, changes)[1])
         gauges.append(gauge)
     whole = Projection(
         directions=torch.cat([piece.directions for piece in pieces]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
-        lever=Lever.joined(levers), turning=torch.cat(turning), gauge=Gauge.joined(gauges),
+        pole_moment=PoleMoment.joined(pole_moments), turning=torch.cat(turning), gauge=Gauge.joined(gauges),
     )  # fmt: skip
     return Statistics.joined(parts), whole
 
 
 def _pieces(
-    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
-) -> Iterator[tuple[Statistics, list[Tensor], Tensor, Lever, Gauge]]:
-    """Statistics of some segments at a time, with the sensitivities, the scale of the errors, lever and gauge."""
+    forecaster: Forecaster,
+    segments: Segments,
+    calibrations: Sequence[Calibration],
+    columns: Sequence[Column],
+    *,
+    log: bool = False,
+) -> Iterator[tuple[Statistics, list[Tensor], Tensor, PoleMoment, Gauge]]:
+    """Statistics of some segments at a time, with the sensitivities, the scale of the errors, pole_moment and gauge.
+
+    Args:
+        log: whether the wind was logged, so that what its log may be off by is looked at.
+    """
     recording = segments.recording
     # Segments of one recording share weights, and so stay in one chunk.
     for chosen in _chunks(recording):
@@ -227,29 +247,68 @@ def _pieces(
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities((*columns, *winds()), own, starts, base)
         changes, blown = changes[: -len(winds())], changes[-len(winds()) :]
-        lever, scale = Lever.of(base, own, forecaster.specimen), error_scale(base, recording[chosen], noise)
+        pole_moment, scale = (
+            PoleMoment.of(base, own, forecaster.specimen),
+            error_scale(base, recording[chosen], noise, own.counted),
+        )
         gauge = Gauge.of(blown, scale, period=own.period)
         found = replace(
-            reduced(base, changes, recording[chosen], noise), lines=_spectrum(forecaster, own).prominence(base),
-            turning=_turned(lever, base, changes, recording[chosen]), course=gauge.course(_over_scale(base, scale)),
+            reduced(base, changes, recording[chosen], noise, own.counted),
+            lines=_spectrum(forecaster, own).prominence(base),
+            turning=_turned(pole_moment, base, changes, recording[chosen]),
+            course=gauge.course(_over_scale(base, scale)),
         )  # fmt: skip
-        yield found, changes, scale, lever, gauge
+        if log:
+            found = _with_log(found, sensitivities(forecaster, own, starts, base), changes, scale, pole_moment, gauge)
+        yield found, changes, scale, pole_moment, gauge
 
 
-def _turned(lever: Lever, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]) -> Statistics:
+def _with_log(
+    found: Statistics,
+    off: Sequence[Tensor],
+    changes: Sequence[Tensor],
+    scale: Tensor,
+    pole_moment: PoleMoment,
+    gauge: Gauge,
+) -> Statistics:
+    """Statistics with how they move with what the wind's log may be off by.
+
+    Args:
+        off: (frame, marker, 3, segment) [m] of each nuisance.
+        changes: the sensitivities that the statistics are along.
+    """
+    turning, course = found.turning, found.course
+    if turning is not None:
+        moved = pole_moment.moment(torch.stack(list(off))).double().permute(2, 0, 1)
+        along = _moments(pole_moment, changes)[1] @ moved.transpose(1, 2)
+        turning = replace(turning, log=along.cpu().numpy())
+    if course is not None:
+        course = replace(course, log=np.stack([gauge.course(_plain(own, scale)).score for own in off], axis=-1))
+    log = Projection.along(changes, scale).response(off)
+    return replace(found, log=log, turning=turning, course=course)
+
+
+def _plain(changes: Tensor, scale: Tensor) -> Tensor:
+    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
+    return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
+
+
+def _turned(
+    pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
+) -> Statistics:
     """Of moments of errors and sensitivities (frame, marker, 3, segment)."""
-    moment = lever.moment(base[None])[0].double()  # (frame, segment)
-    moved, directions = _moments(lever, changes)
-    size = ((moment * lever.scale) ** 2).mean(0).cpu().numpy()
+    moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
+    moved, directions = _moments(pole_moment, changes)
+    size = ((moment * pole_moment.scale) ** 2).mean(0).cpu().numpy()
     return Statistics(
         recording=recording, r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
         response=(directions @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
     )  # fmt: skip
 
 
-def _moments(lever: Lever, changes: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+def _moments(pole_moment: PoleMoment, changes: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
     """(segment, column, frame) of sensitivities (frame, marker, 3, segment); and of length 1, where there is any."""
-    moved = lever.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
+    moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
     return moved, moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
 
 
@@ -268,14 +327,23 @@ def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def error_scale(base: Tensor, recording: NDArray[np.int64], noise: Floats) -> Tensor:
-    """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m]."""
+def error_scale(
+    base: Tensor, recording: NDArray[np.int64], noise: Floats, counted: NDArray[np.bool_] | None = None
+) -> Tensor:
+    """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m].
+
+    Args:
+        counted: (frame, marker, segment) whether each position was tracked; None where all were.
+    """
     mean = (base**2).mean((0, 2))
     scale = torch.empty_like(mean)
     for index in np.unique(recording):
         own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
         squared = mean[:, own].mean(1)
         noisy = _NOISE * float(noise[recording == index][0]) ** 2
+        if counted is not None:
+            share = torch.as_tensor(counted[:, :, recording == index].mean(axis=(0, 2))).to(base)
+            noisy, squared = noisy * share, torch.maximum(squared, _NEVER * squared.max())
         scale[:, own] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
     return scale
 
@@ -293,13 +361,23 @@ def _weighed(error: Tensor, scale: Tensor) -> Tensor:
     return (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1)
 
 
-def reduced(base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64], noise: Floats) -> Statistics:
-    """Of segments with their errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m]."""
+def reduced(
+    base: Tensor,
+    changes: Sequence[Tensor],
+    recording: NDArray[np.int64],
+    noise: Floats,
+    counted: NDArray[np.bool_] | None = None,
+) -> Statistics:
+    """Of segments with their errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m].
+
+    Args:
+        counted: (frame, marker, segment) whether each position was tracked; None where all were.
+    """
     mean = (base**2).mean((0, 2))  # (marker, segment)
     r = np.empty((len(recording), len(changes)))
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
-    scale = error_scale(base, recording, noise)
+    scale = error_scale(base, recording, noise, counted)
     for place in range(len(recording)):
         error = _weighed(base[..., place], scale[:, place]).double()
         moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()

@@ -50,7 +50,7 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
     first, segments = setting.experiment.recordings[0], setting.segments
     batches = [
         banks.prior_batch(
-            setting.experiment.specimen, markers=first.markers, rate=first.rate, noise=first.noise,
+            setting.experiment.specimen, markers=first.markers, rate=1 / segments.period, noise=first.noise,
             duration=segments.cut.lasting(banks.each(len(segments))),
             speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
             seed=child_seed(seed, "null", index),

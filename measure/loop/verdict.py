@@ -44,9 +44,10 @@ class Candidate:
         gain_error: its standard error.
         behind: how many standard errors of the paired difference it lies behind the best candidate; 0 for the best.
         leftover: p-value of what the model with it still leaves unexplained.
-        by_recording: strength fitted on each recording alone, in the order of the recordings; of a candidate that was
-            run again about what it then has.
-        steady: p-value of one strength in all of these; None of a single recording, and of what no law says is one.
+        by_recording: strength fitted on each recording alone, in the order of the recordings; of a refitted candidate
+            about what it then has.
+        heterogeneity: p-value of the same strength in all of these (Cochran's Q); None of a single recording, and
+            of gusts.
         why_not: why it was not named; empty where it was.
     """
 
@@ -61,7 +62,7 @@ class Candidate:
     behind: float
     leftover: float
     by_recording: tuple[Estimate, ...] = ()
-    steady: float | None = None
+    heterogeneity: float | None = None
     why_not: str = ""
     null: float = 0.0
 
@@ -147,7 +148,7 @@ class NullTest:
             `measure.loop.reference`).
         null: the same of every group of simulated nulls.
         p_value: chance of a null as large, with the interval that few kinds of numerics leave it (see
-            `measure.loop.rarity`).
+            `measure.loop.tail_probability`).
         level: at which it was judged.
         critical: the statistic beyond which the base model is rejected; None where no null is rare enough for it.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.

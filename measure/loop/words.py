@@ -7,10 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from measure.loop.attribution import RESPONSE, unsteady
+from measure.loop.attribution import heterogeneous
 from measure.loop.columns import FieldColumn
 from measure.loop.course import ALONG, LEFT, Variation
+from measure.loop.criteria import CRITERIA
 from measure.loop.field import Mode
+from measure.loop.forecast import Cut
 from measure.loop.lines import STROUHAL, Line
 from measure.loop.quantity import number, probability, with_error, with_level
 from measure.loop.titles import readable, titles
@@ -52,20 +54,44 @@ def sentence(verdict: Verdict) -> str:
         )
     if verdict.conclusion is Conclusion.PARTLY:
         return f"{rejected} It is partly explained by {found}; {_incomplete(verdict)}."
-    return f"{rejected} It lacks {found}; with it, what is left is what nulls leave."
+    return (
+        f"{rejected} It lacks {found}. With that added, the remaining errors are no larger than those of "
+        "simulated nulls."
+    )
 
 
 def _incomplete(verdict: Verdict) -> str:
     """Why what is named is not enough."""
     for candidate in verdict.ranking:
-        if not candidate.why_not and unsteady(candidate):
+        if not candidate.why_not and heterogeneous(candidate):
             each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
             unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
             return (
-                f"recording by recording it is {each}{unit}, which is more than chance "
-                f"(p = {probability(candidate.steady)}): another law in the wind would be a better one"
+                f"fitted to each recording alone it is {each}{unit}, which differs by more than chance "
+                f"(p = {probability(candidate.heterogeneity)}): another dependence on the wind would fit better"
             )
-    return "what is left is more than nulls leave"
+    return "the errors that remain are larger than those of simulated nulls"
+
+
+def ratios(experiment: Experiment) -> tuple[str, ...]:
+    """What the numbers are of where the mass of the cloth is not known; nothing where it is."""
+    if experiment.specimen.mass_known:
+        return ()
+    told = (
+        "The mass of the cloth is not known: motion tells forces per mass alone, so that density, bending and the "
+        f"strengths of forces are ratios to a density of {number(experiment.specimen.material.density)} kg/m²."
+    )
+    return (told,)
+
+
+def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
+    """By how much the logs of the wind were moved, as the errors told it [s]; nothing where none was."""
+    moved = [
+        f"{recording.name} by {number(lag, digits=2)} s"
+        for recording, lag in zip(experiment.recordings, late, strict=True)
+        if lag
+    ]
+    return (f"the log of the wind lags, as the motion tells it, and was moved: {', '.join(moved)}",) if moved else ()
 
 
 def separating(verdict: Verdict) -> str:
@@ -86,15 +112,15 @@ def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
     """
     told = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
     terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in told]
-    fitted = "fits best" if whole else "fits best what is left"
+    fitted = "fits the errors best" if whole else "fits the remaining errors best"
     return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
 
 
 def shedding(line: Line) -> str:
     """What a line of the errors' spectra looks like."""
     return (
-        f"The errors swing {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind: vortices of a cylinder of "
-        f"{number(STROUHAL / line.reduced, digits=2)} m do so."
+        f"The errors oscillate {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind, as vortices behind a "
+        f"cylinder of {number(STROUHAL / line.reduced, digits=2)} m do."
     )
 
 
@@ -103,8 +129,9 @@ def blowing(variation: Variation) -> str:
     along, turned = (math.sqrt(max(variation.whole[part], 0.0)) for part in (ALONG, LEFT))
     fast = math.sqrt(max(variation.fast[ALONG], 0.0))
     return (
-        f"The errors are as of a wind that varies by {number(100 * along, digits=2)} % of its mean along itself, "
-        f"{number(100 * fast, digits=2)} % within two seconds, and by {number(100 * turned, digits=2)} % across."
+        f"The errors look like those of a wind that varies by {number(100 * along, digits=2)} % of its mean along its "
+        f"own direction, by {number(100 * fast, digits=2)} % within two seconds, and by "
+        f"{number(100 * turned, digits=2)} % across it."
     )
 
 
@@ -121,15 +148,25 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     specimen = experiment.specimen
     size = np.ptp(specimen.mesh.rest, axis=0)
     air = specimen.air.plain
+    cut = Cut.of(experiment.recordings[0].rate, min(len(r.positions) for r in experiment.recordings))
+    every = "every frame" if cut.stride == 1 else f"every {cut.stride}th frame"
+    winds = [recording.wind.uncertainty for recording in experiment.recordings]
+    gain, direction, clock = (max(parts) for parts in zip(*winds, strict=True))
+    logged = (
+        "the wind at the flag is the same all over it, and the logged one within standard deviations of "
+        f"{number(100 * gain, digits=2)} % in speed, {number(math.degrees(direction), digits=2)}° in direction and "
+        f"{number(clock, digits=2)} s in time"
+    )
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
-    places = "" if specimen.anchors_told else ", tied where they are seen on the average"
+    places = "" if specimen.anchors_told else ", tied at their mean observed places"
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
         f"it is held at {len(specimen.held)} points {held}{places}",
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
-        "the wind at the flag is the logged one, the same all over it",
-        "density, bending and internal damping are free: what only changes them is no effect",
-        f"a strength may be off by {100 * RESPONSE:.0f} % by the fit's mesh alone: its interval holds that",
-        "the choice of the effect has seen all recordings; the errors before and after are of fits that had not",
+        logged,
+        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
+        "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
+        f"the coarse mesh of the fit may bias a strength by {100 * CRITERIA.response:.0f} %: its interval says so",
+        "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
     )

@@ -13,7 +13,7 @@ from flagdata.findings import Finding, Severity
 from measure.observe import cloth, noise
 from measure.observe.anchors import anchors_of
 from measure.observe.checks import attachment, frames, inertia, shape, surroundings
-from measure.observe.common import at_same_points
+from measure.observe.common import at_same_points, at_same_rate
 from measure.observe.gaps import fill_positions
 from measure.observe.observation import Known, Observation
 from measure.observe.pins import hold
@@ -46,11 +46,12 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     low = corners.min(axis=0)
     mesh = cloth.model_mesh(corners - low, vertices=setup.vertices)
     prepared = [_prepared(seen, corners) for seen in observations]
-    recordings, moved = at_same_points([_trajectory(seen, low) for seen in prepared], mesh.rest)
+    at_rate, resampled = at_same_rate([_trajectory(seen, low) for seen in prepared])
+    recordings, moved = at_same_points(at_rate, mesh.rest)
     known = [seen.known for seen in prepared]
     mesh, held = hold(mesh, _pins(known, setup, low))
     specimen = Specimen(
-        mesh=mesh, material=_material(known, setup), held=held,
+        mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known, held=held,
         anchors=anchors_of(recordings, mesh.rest[list(held)]), anchors_told=False,
         stiffness=_agreed([k.stiffness for k in known], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins"),
         gravity=(
@@ -60,7 +61,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         air=_agreed([k.air for k in known], setup.air, QuadraticNormal(), "wind force"),
     )  # fmt: skip
     experiment = Experiment(specimen=specimen, recordings=recordings)
-    found = (*found, *(f for seen in prepared for f in seen.findings), *moved, *_checked(experiment))
+    found = (*found, *(f for seen in prepared for f in seen.findings), *resampled, *moved, *_checked(experiment))
     return Observed(experiment=experiment, findings=found)
 
 
@@ -81,12 +82,13 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
     sigma = _noise(seen)
     told = shape.check_scale(seen, edges, sigma)
     seen = frames.without_repeats(shape.without_strays(seen, edges, sigma), sigma)
-    filled = fill_positions(seen.positions, where=where)
+    period = float(seen.times[1] - seen.times[0])
+    filled = fill_positions(seen.positions, seen.markers, period=period, where=where)
     begin = float(seen.times[filled.frames.start])
     markers = seen.markers[filled.markers]
     if len(markers) < shape.FEWEST:
         raise InputError(
-            f"{len(markers)} of {len(seen.markers)} markers are left", where=where, fix="track them again, without gaps"
+            f"{len(markers)} of {len(seen.markers)} markers are left", where=where, fix="track more of them"
         )
     times = seen.times[filled.frames]
     if len(times) < frames.FEWEST or times[-1] - times[0] < frames.SHORTEST * (1 - 1e-9):
@@ -95,14 +97,15 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
         )
     wind = seen.wind or seen.known.wind
     seen = replace(
-        seen, markers=markers, positions=filled.positions, times=times - begin,
+        seen, markers=markers, positions=filled.positions, times=times - begin, seen=filled.seen,
         wind=None if wind is None else wind.later(begin),
         findings=(
             *seen.findings, *told, *filled.findings, *shape.check_cover(markers, corners, where=where),
             *frames.lost_frames(filled.positions, where=where),
         ),
     )  # fmt: skip
-    seen = replace(seen, noise=_noise(seen) if filled.findings else sigma)
+    # What is filled in is smoother than what was tracked, and would make the noise look smaller.
+    seen = replace(seen, noise=sigma if filled.seen is not None or not filled.findings else _noise(seen))
     frames.check_motion(filled.positions, seen.noise or 0.0, float(np.ptp(corners, axis=0).max()), where=where)
     return seen
 
@@ -130,7 +133,8 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
         found += surroundings.check_sides(recording)
         surroundings.check_accelerations(recording, specimen)
         found += surroundings.check_strength(recording, specimen)
-        found += inertia.check_inertia(recording, specimen)
+        if specimen.mass_known:
+            found += inertia.check_inertia(recording, specimen)
     attachment.check_places(experiment.recordings, specimen)
     return tuple(found)
 
@@ -163,7 +167,7 @@ def _trajectory(seen: Observation, low: Floats) -> Trajectory:
     rate = float(f"{(len(seen.times) - 1) / float(seen.times[-1] - seen.times[0]):.9g}")
     return Trajectory(
         name=seen.name, markers=seen.markers - low, positions=seen.positions, rate=rate, wind=seen.wind,
-        noise=_noise(seen), source=seen.source,
+        noise=_noise(seen), source=seen.source, seen=seen.seen,
     )  # fmt: skip
 
 

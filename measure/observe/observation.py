@@ -75,6 +75,7 @@ class Observation:
         source: identity of the artifact it was read from; empty where there is none.
         known: from its description.
         findings: of reading it.
+        seen: (frame, marker) whether each position was tracked, once gaps are filled; None where all were.
 
     Raises:
         InputError: shapes that disagree, or times that are not finite or do not increase.
@@ -90,6 +91,7 @@ class Observation:
     source: str = ""
     known: Known = field(default_factory=Known)
     findings: tuple[Finding, ...] = ()
+    seen: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"
@@ -111,9 +113,9 @@ class Observation:
         known = replace(
             self.known,
             gravity=None if gravity is None else tuple((turn @ np.array(gravity)).tolist()),
-            wind=None if wind is None else WindTrack(times=wind.times, velocity=wind.velocity @ turn.T),
+            wind=None if wind is None else replace(wind, velocity=wind.velocity @ turn.T),
         )
-        own = None if self.wind is None else WindTrack(times=self.wind.times, velocity=self.wind.velocity @ turn.T)
+        own = None if self.wind is None else replace(self.wind, velocity=self.wind.velocity @ turn.T)
         return replace(self, positions=self.positions @ turn.T, known=known, wind=own)
 
 

@@ -48,12 +48,24 @@ from sim.material import MATERIALS, Material, named
 
 @dataclass(frozen=True, kw_only=True)
 class WindSource:
-    """A constant velocity [m/s], or a log, how it is read if it is a file, and how it lies beside the recording."""
+    """A constant velocity [m/s], or a log, how it is read if it is a file, and how it lies beside the recording.
+
+    Attributes:
+        gain, direction, clock: standard deviations of what it may be off by, see `WindTrack`; None for the usual ones.
+    """
 
     velocity: tuple[float, float, float] | None = None
     log: str = ""
     placement: LogPlacement | None = None
     options: WindOptions | None = None
+    gain: float | None = None
+    direction: float | None = None
+    clock: float | None = None
+
+    def certain(self, track: WindTrack) -> WindTrack:
+        """The track with what is said of its uncertainty."""
+        said = {"gain": self.gain, "direction": self.direction, "clock": self.clock}
+        return replace(track, **{name: value for name, value in said.items() if value is not None})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,6 +184,8 @@ def _setup(top: Table, folder: Path) -> Setup:
     vertices = flat.whole("vertices", VERTICES, least=16)
     flat.done()
     pins, stiffness = _pins(top.table("pins"))
+    stuff = top.table("material")
+    mass_known = not stuff.flag("mass-unknown")
     air = top.table("air")
     gravity = air.number("gravity", 0.0, least=0.0) if "gravity" in air else None
     force = None
@@ -182,7 +196,7 @@ def _setup(top: Table, folder: Path) -> Setup:
         )
     air.done()
     return Setup(
-        material=_material(top.table("material"), folder), outline=corners, pins=pins, stiffness=stiffness,
+        material=_material(stuff, folder), mass_known=mass_known, outline=corners, pins=pins, stiffness=stiffness,
         gravity=gravity, air=force, vertices=vertices,
     )  # fmt: skip
 
@@ -254,6 +268,10 @@ def _recording(table: Table, folder: Path) -> RecordingSource:
 
 def _wind(table: Table, folder: Path) -> WindSource:
     velocity, log = table.numbers("velocity"), table.text("log", "") or ""
+    gain, direction, clock = (
+        table.number(f"{name}-sigma", 0.0, least=0.0) if f"{name}-sigma" in table else None
+        for name in ("gain", "direction", "clock")
+    )
     given = [bool(velocity), "speed" in table, bool(log)]
     if sum(given) != 1:
         raise UsageError(f"{sum(given)} winds", where=table.where, fix="give one of velocity, speed and log")
@@ -270,11 +288,11 @@ def _wind(table: Table, folder: Path) -> WindSource:
             sensor = str(folder / sensor)
         options = WindOptions(recipe=sensor, zone=table.text("zone", None))
         table.done()
-        return WindSource(log=log, placement=placement, options=options)
+        return WindSource(log=log, placement=placement, options=options, gain=gain, direction=direction, clock=clock)
     if not velocity:
         speed, toward = table.number("speed", 0.0, least=0.0), table.number("toward", 0.0)
         velocity = (speed * math.cos(toward), speed * math.sin(toward), 0.0)
-    source = WindSource(velocity=_triple(table, "velocity", velocity))
+    source = WindSource(velocity=_triple(table, "velocity", velocity), gain=gain, direction=direction, clock=clock)
     table.done()
     return source
 
@@ -302,7 +320,7 @@ def blown(seen: Observation, source: WindSource | None, folder: Path, lake: Lake
     if source is None:
         return seen
     track, found = _track(source, folder, lake)
-    return replace(seen, wind=track, findings=(*seen.findings, *found))
+    return replace(seen, wind=source.certain(track), findings=(*seen.findings, *found))
 
 
 def opened(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:

@@ -32,6 +32,8 @@ class Setup:
 
     Attributes:
         material: nominal.
+        mass_known: whether the cloth was weighed, or its material is known; else its density is a guess, and all that
+            is found is a ratio to it.
         outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
         pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
         stiffness: of each attachment on each axis [N/m]; infinite for rigid.
@@ -44,6 +46,7 @@ class Setup:
     """
 
     material: Material | None = None
+    mass_known: bool = True
     outline: NDArray[np.float64] | None = None
     pins: Hold | tuple[tuple[float, float], ...] | None = None
     stiffness: float | None = None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,13 @@ from sim.scene import GRAVITY
 
 Floats = NDArray[np.float64]
 
+GAIN = 0.03
+"""Share: calibrated cups and sonics are good to 1 to 3 % (IEC 61400-12-1, annex I, classes them so)."""
+DIRECTION = math.radians(5.0)
+"""rad: how well north, or the axis of a tunnel, is lined up with a camera's axes by eye and compass."""
+CLOCK = 0.3
+"""s: a log of 1 Hz whose stamps are rounded, or a cup's lag at a few metres a second."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WindTrack:
@@ -24,13 +32,19 @@ class WindTrack:
     Attributes:
         times: (n,) since the recording's first frame [s], increasing.
         velocity: (n, 3) where the air goes to [m/s]. One sample stands for a constant wind.
+        gain: standard deviation of the share by which the wind is stronger than logged.
+        direction: the same of the angle by which it is turned about the vertical [rad].
+        clock: the same of the time by which the log lags behind the recording [s].
 
     Raises:
-        InputError: shapes that disagree, values that are not finite, times that do not increase.
+        InputError: shapes that disagree, values that are not finite, times that do not increase, a negative deviation.
     """
 
     times: Floats
     velocity: Floats
+    gain: float = GAIN
+    direction: float = DIRECTION
+    clock: float = CLOCK
 
     def __post_init__(self) -> None:
         times, velocity = _frozen(self.times), _frozen(self.velocity)
@@ -44,6 +58,10 @@ class WindTrack:
                 "times that do not increase, or a value that is not finite", where="wind",
                 fix="sort the log and leave its gaps out",
             )  # fmt: skip
+        if not all(0 <= deviation < math.inf for deviation in self.uncertainty):
+            raise InputError(
+                f"standard deviations of {self.uncertainty}", where="wind", fix="give gain, direction and clock, or 0"
+            )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "velocity", velocity)
 
@@ -51,6 +69,11 @@ class WindTrack:
     def constant(cls, velocity: tuple[float, float, float]) -> WindTrack:
         """The same wind (x, y, z) [m/s] all the time."""
         return cls(times=np.zeros(1), velocity=np.array([velocity], dtype=np.float64))
+
+    @property
+    def uncertainty(self) -> tuple[float, float, float]:
+        """Standard deviations of gain, direction [rad] and clock [s]."""
+        return self.gain, self.direction, self.clock
 
     @property
     def steady(self) -> bool:
@@ -64,7 +87,7 @@ class WindTrack:
 
     def later(self, seconds: float) -> WindTrack:
         """The same wind, with its times since an instant that many seconds later."""
-        return WindTrack(times=self.times - seconds, velocity=self.velocity)
+        return replace(self, times=self.times - seconds)
 
     def at(self, times: Floats) -> Floats:
         """(k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
@@ -83,6 +106,8 @@ class Trajectory:
         wind: beside it.
         noise: standard deviation of a coordinate [m].
         source: identity of the artifact it was read from; empty where there is none.
+        seen: (frame, marker) whether each position was tracked, where gaps are filled; None where all were. What is
+            filled starts a prediction, and is never compared with one.
 
     Raises:
         InputError: shapes that disagree, a rate or noise that makes no sense, infinite positions.
@@ -95,6 +120,7 @@ class Trajectory:
     wind: WindTrack
     noise: float = 0.0
     source: str = ""
+    seen: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         markers, positions = _frozen(self.markers), _frozen(self.positions)
@@ -110,6 +136,11 @@ class Trajectory:
             raise InputError(f"a rate of {self.rate!r} frames a second", where=where, fix="give Hz")
         if not (np.isfinite(self.noise) and self.noise >= 0):
             raise InputError(f"a noise of {self.noise!r} m", where=where, fix="give at least 0 metres")
+        if self.seen is not None and self.seen.shape != positions.shape[:2]:
+            raise InputError(
+                f"a mask of shape {self.seen.shape} with positions of shape {positions.shape}", where=where,
+                fix="give (frame, marker)",
+            )  # fmt: skip
         object.__setattr__(self, "markers", markers)
         object.__setattr__(self, "positions", positions)
 
@@ -126,6 +157,7 @@ class Specimen:
     Attributes:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.
         material: nominal.
+        mass_known: whether its density is known about as well as a material's name tells it.
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
@@ -143,6 +175,7 @@ class Specimen:
     anchors: Floats
     stiffness: float = ARCSIM_STIFFNESS
     anchors_told: bool = True
+    mass_known: bool = True
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
 

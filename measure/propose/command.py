@@ -18,18 +18,26 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("recipe_path", metavar="RECIPE.toml", type=click.Path(path_type=Path))
-@click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings; seek no other.")
-@click.option("--known", multiple=True, metavar="EFFECT.STRENGTH", help="What the model has already; may be repeated.")
-@click.option("--nulls", type=click.IntRange(min=1), help="Null recordings, 160 (the default) or more.")
-@click.option("--bank", type=click.Path(path_type=Path, exists=True), help="Nulls made before, for such a design.")
+@click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings and seek no other.")
+@click.option(
+    "--known", multiple=True, metavar="EFFECT.STRENGTH", help="Effect that the model has already; may be repeated."
+)
+@click.option(
+    "--nulls", type=click.IntRange(min=1), help="Number of null recordings to simulate: 160 (the default) or more."
+)
+@click.option(
+    "--bank",
+    type=click.Path(path_type=Path, exists=True),
+    help="Folder of null recordings that were simulated before for such recordings.",
+)
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              help="Of the test of every term; 0.03 by default.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the nulls.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes; by default one for each core.")
+              help="Significance level of the test of every term; 0.03 by default.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls.")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
-              help="Where artifacts are; also FLAGDATA_LAKE.")  # fmt: skip
+              help="Lake that artifacts are read from; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
-              help="Folder for proposal/: the effect file, its tests, ledger.json.")  # fmt: skip
+              help="Folder in which proposal/ is written: the effect file, its tests and ledger.json.")  # fmt: skip
 @json_option
 def propose(
     recipe_path: Path,

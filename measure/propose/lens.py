@@ -22,7 +22,7 @@ from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model, errors_of
 from measure.loop.statistics import Projection, Statistics, error_scale, reduced
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.propose.sensitivities import of_columns
 
 Floats = NDArray[np.float64]
@@ -62,12 +62,14 @@ class Lens:
             directions=tuple(direction[..., chosen] for direction in self.directions),
         )  # fmt: skip
 
-    def yardstick(self, null: NullModel, of_recordings: Floats) -> Yardstick:
+    def whitened(self, null: NullModel, of_recordings: Floats) -> WhitenedMisfit:
         """The measure of any model's errors along the lens, of speeds by recording [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
-        return Yardstick(
-            found=reduced(self.base, self.directions, recording, noise),
-            projection=Projection.along(self.directions, error_scale(self.base, recording, noise)),
+        return WhitenedMisfit(
+            found=reduced(self.base, self.directions, recording, noise, self.segments.counted),
+            projection=Projection.along(
+                self.directions, error_scale(self.base, recording, noise, self.segments.counted)
+            ),
             null=null, speeds=self.speeds(of_recordings),
         )  # fmt: skip
 
@@ -97,7 +99,9 @@ class Lens:
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
         """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
-        found = reduced(base, [*self.directions, *changes], self.segments.recording, self.segments.noise)
+        found = reduced(
+            base, [*self.directions, *changes], self.segments.recording, self.segments.noise, self.segments.counted
+        )
         count = len(self.directions)
         return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
 

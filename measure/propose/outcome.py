@@ -127,8 +127,8 @@ class Retest:
     def decided(self) -> tuple[Decision, str]:
         """Whether the proposal is kept, and why: misfits must fall beyond their interval, and below the control's."""
         if self.helped.low <= 0:
-            return Decision.REJECTED, "the misfit on untouched data is not lower beyond its interval"
-        lower = "the misfit on untouched data is lower, beyond its interval"
+            return Decision.REJECTED, "the misfit on unseen data is not significantly lower than before"
+        lower = "the misfit on unseen data is significantly lower than before"
         if self.apart is None:
             return Decision.KEPT, f"{lower}; there was no term of another direction to compare with"
         wrong = " and ".join(self.control_names)

@@ -1,7 +1,7 @@
 """Effects from data: terms sought in a part of recordings, fitted there, and tested on the rest.
 
 Terms are seen through a lens, along the directions in which the base model's own errors are known from nulls: its
-numerics could look like a term. What is taken is run again on data that nothing has seen, beside terms of another
+numerics could look like a term. What is taken is refitted and run on data that nothing has seen, with terms of another
 direction and beside what numerics leave.
 """
 
@@ -22,6 +22,7 @@ from measure.loop import supply
 from measure.loop.attribution import estimate
 from measure.loop.close import FEWEST_NULLS
 from measure.loop.columns import THETA, Column, EffectColumn
+from measure.loop.criteria import CRITERIA
 from measure.loop.inference import Evidence, NullModel, gains
 from measure.loop.reference import NullBank
 from measure.loop.setting import Setting, Stage
@@ -66,7 +67,7 @@ class Options:
     """
 
     seed: int = 0
-    level: float = 0.03
+    level: float = CRITERIA.level
     nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1
@@ -187,7 +188,7 @@ def weigh(
         unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
         instead = wrong(own, unlike, [step.column for step in taken], beside)
         tested = retest(
-            setting, whole.yardstick(null, setting.speeds), parts.seen, before.model, after.model, words=parts.words,
+            setting, whole.whitened(null, setting.speeds), parts.seen, before.model, after.model, words=parts.words,
             seed=options.seed,
             control=fitted([*beside, *instead]).model if instead else None,
             control_names=[labels[column] for column in instead],

@@ -11,7 +11,7 @@ from measure.loop.comparison import LeftOut, a_segment, measured, paired, root
 from measure.loop.floor import numerical_floor
 from measure.loop.model import Model
 from measure.loop.setting import Setting
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.propose.outcome import Retest
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ _ROOM = 0.02
 
 def retest(
     setting: Setting,
-    yardstick: Yardstick,
+    whitened: WhitenedMisfit,
     seen: NDArray[np.bool_],
     before: Model,
     after: Model,
@@ -36,7 +36,7 @@ def retest(
     """Prediction errors of untouched segments by the models, paired by segment, beside what numerics leave.
 
     Args:
-        yardstick: of all segments.
+        whitened: of all segments.
         seen: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
         control: the same freedom spent on other terms; None where there are none of another direction.
         control_names: which.
@@ -45,7 +45,7 @@ def retest(
     """
 
     def left(model: Model) -> LeftOut:
-        return measured(setting.forecaster, setting.segments, [model], yardstick, [~seen])[0]
+        return measured(setting.forecaster, setting.segments, [model], whitened, [~seen])[0]
 
     first, second, recording = left(before), left(after), setting.recording[~seen]
     wrong = None if control is None else left(control)

@@ -11,17 +11,17 @@ _NEAREST = 4
 
 def words(outcome: Outcome) -> str:
     """What was tried, what was found, what became of it."""
-    lines = [f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms tried; nulls: {outcome.nulls})"]
+    lines = [f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: {outcome.nulls})"]
     for step in outcome.steps:
         verb = "taken" if step.taken else f"not taken: {step.reason}"
         lines.append(
-            f"  {step.name}: p = {step.p_family:.2g} of all terms, "
+            f"  {step.name}: p = {step.p_family:.2g} over all terms, "
             f"held-out gain {step.gain:.1f} ± {step.gain_error:.1f}, {verb}"
         )
     nearest = [ranked for ranked in outcome.ranking if ranked.name not in {step.name for step in outcome.steps}]
     if nearest:
         shown = ", ".join(f"{ranked.name} {ranked.gain:.1f}" for ranked in nearest[:_NEAREST])
-        lines.append(f"  not looked at further, by held-out gain alone: {shown}")
+        lines.append(f"  not tested further, listed by held-out gain: {shown}")
     for strength in outcome.strengths:
         lines.append(f"{strength.name} {interval(strength.estimate)}: {strength.words}")
         lines.append(f"  {strength.course.words}")
@@ -35,14 +35,14 @@ def _tested(tested: Retest) -> list[str]:
         f"on {tested.what}, unseen, n = {tested.segments} segments: error {interval(tested.before)} before, "
         f"{interval(tested.after)} after, reduction {interval(tested.reduction)}"
     )
-    floor = f"  numerics alone leave {interval(tested.floor)}"
+    floor = f"  numerical floor: {interval(tested.floor)}"
     if tested.share is not None:
-        floor += f": of what is above, in squares, {100 * tested.share:.0f} % is gone"
-    lines = [errors, floor, f"  misfit: {interval(tested.helped)} nat a segment less than before"]
+        floor += f"; of the squared error above it, {100 * tested.share:.0f} % is removed"
+    lines = [errors, floor, f"  misfit: lower by {interval(tested.helped)} nat per segment than before"]
     if tested.control is not None and tested.apart is not None:
         lines.append(
             f"  instead with {' and '.join(tested.control_names)}: {interval(tested.control)}, "
-            f"whose misfit is {interval(tested.apart)} nat a segment more than the proposal's"
+            f"whose misfit is higher by {interval(tested.apart)} nat per segment than the proposal's"
         )
     return lines
 

@@ -11,7 +11,7 @@ from measure.refine.space import QUANTITIES
 
 
 def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
-    """What a refinement found, with its trace and pictures, as `<section id="refinement">`.
+    """What a refinement found, with its trace and pictures; the page gives it a heading.
 
     Args:
         in_motion: whether the nearest simulated clip plays beside the target; it is simulated once more for that.

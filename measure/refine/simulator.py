@@ -1,4 +1,4 @@
-"""From points of the search space to films: simulated abreast in one batch, then filmed one by one.
+"""From points of the search space to films: simulated in one joint batch, then filmed one by one.
 
 Replicates of one θ differ in a start that is a millimetre off, of which nothing is left after the seconds that settle
 but another phase of the same motion, in the camera's noise, and in ζ where it is not known.

@@ -47,10 +47,19 @@ def from_document(document: Mapping[str, Any]) -> Verdict:
         InputError: another schema, a field that is missing, unknown or of another type; it says which.
     """
     content = dict(document)
+    if "ranking" in content:
+        content["ranking"] = [_current(candidate) for candidate in content["ranking"]]
     tag = content.pop("schema", None)
     if tag != SCHEMA:
         raise InputError(f"schema {tag!r}", where="schema", fix=f"give a document of schema {SCHEMA!r}")
     return _read(content, Verdict, "verdict")
+
+
+def _current(candidate: Any) -> Any:
+    """A candidate with the names of today: documents of version 0.1 called the p of heterogeneity `steady`."""
+    if not isinstance(candidate, Mapping) or "steady" not in candidate:
+        return candidate
+    return {"heterogeneity" if name == "steady" else name: value for name, value in candidate.items()}
 
 
 def _plain(value: Any) -> Any:

@@ -47,8 +47,9 @@ def test_sentence(test: NullTest) -> str:
     interval = f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}"
     return (
         f"The base model {says}: p = {probability(p.value)} {interval} at level {test.level:g}. {as_large(test)} of "
-        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}; beyond their highest "
-        f"tenth p is that of an exponential tail, and its interval that of other draws of the kinds of numerics."
+        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}. Beyond the highest tenth "
+        "of the nulls, p follows from an exponential tail fitted to them; its interval is a bootstrap over kinds of "
+        "numerics."
     )
 
 
@@ -57,11 +58,11 @@ def test_remark(test: NullTest) -> str:
     if test.critical is None:
         count = sum(map(math.isfinite, test.null))
         return (
-            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible: it could not have "
-            f"rejected at level {test.level:g}."
+            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible, so that the test could "
+            f"not have rejected the base model at level {test.level:g}."
         )
     if test.p_value.value > test.level:
-        return "An effect too weak for these recordings to show may still be there."
+        return "An effect that is too weak to show in these recordings may still act."
     return ""
 
 
@@ -77,7 +78,7 @@ def control_warnings(verdict: Verdict) -> list[str]:
         if c.apart is None or not known(c.apart):
             continue
         if c.apart.value <= 0:
-            what = f"the control {c.control_name} does as well as the named effect: the attribution fails there"
+            what = f"the control {c.control_name} does as well as the named effect, so that the attribution fails there"
             found.append(f"{_begun(c.what)}: {what}.")
         elif c.apart.low <= 0:
             found.append(f"{_begun(c.what)}: the control {c.control_name} cannot be told from the named effect there.")
@@ -90,10 +91,10 @@ def control_summary(verdict: Verdict) -> str:
     if apart is None or not known(apart):
         return ""
     control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
-    told = "the named effect is told from it" if apart.low > 0 else "the named effect is not told from it"
+    told = "the named effect does better" if apart.low > 0 else "the named effect cannot be told from it"
     return (
-        f"With {control} instead, the misfit of what was left out is larger by {estimate_text(apart)} nat a segment "
-        f"({level_text(apart.level)}): {told}."
+        f"With {control} instead, the misfit of the recordings left out is larger by {estimate_text(apart)} nat per "
+        f"segment ({level_text(apart.level)}): {told}."
     )
 
 
@@ -104,7 +105,7 @@ def reduction_warnings(verdict: Verdict) -> list[str]:
         if not known(c.after):
             continue
         if c.share is None and known(c.floor):
-            what = "the base model errs no more than the numerical floor: nothing was to be gained"
+            what = "the base model's error is no larger than the numerical floor, so that nothing could be gained"
             found.append(f"{_begun(c.what)}: {what}.")
         elif known(c.reduction) and c.reduction.low <= 0:
             found.append(f"{_begun(c.what)}: the reduction cannot be told from zero.")

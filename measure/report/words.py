@@ -71,12 +71,12 @@ def _weighed(candidate: Candidate) -> str:
     gain = with_error(candidate.gain, candidate.gain_error)
     parts = [
         f"{readable(candidate.parameter)} {with_level(candidate.strength)}",
-        f"z = {in_errors(candidate.z)}, p = {probability(candidate.p_family)} in the family",
+        f"z = {in_errors(candidate.z)}, family-wise p = {probability(candidate.p_family)}",
         f"held-out gain {gain} nat",
-        f"p = {probability(candidate.leftover)} for what it leaves",
+        f"p = {probability(candidate.leftover)} for the errors that remain with it",
     ]
-    if candidate.steady is not None:
-        parts.append(f"p = {probability(candidate.steady)} of one strength in all recordings")
+    if candidate.heterogeneity is not None:
+        parts.append(f"p = {probability(candidate.heterogeneity)} for the same strength in all recordings")
     return _joined(parts)
 
 
@@ -93,7 +93,7 @@ def _compared(comparison: Comparison, after_label: str) -> str:
     if known(comparison.control):
         parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
         if known(comparison.apart):
-            parts[-1] += f", worse by {estimate_text(comparison.apart)} nat a segment"
+            parts[-1] += f", worse by {estimate_text(comparison.apart)} nat per segment"
     parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
     return _joined(parts)
 

@@ -19,8 +19,8 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.inertia import effective, mean_normals
-from sim.integrate.abreast import Abreast
 from sim.integrate.implicit import BackwardEuler
+from sim.integrate.joint_batch import JointBatch
 from sim.state import State
 from sim.system import Drive, System
 
@@ -51,11 +51,11 @@ class SplitEuler:
             state = _carried(system, state, self.base.stepped(plain, begun, drive, h), h)
         return state
 
-    def advance_abreast(self, batches: Abreast, state: State, duration: float) -> State:
-        """The same of batches abreast: their members move as they do in batches of their own.
+    def advance_jointly(self, batches: JointBatch, state: State, duration: float) -> State:
+        """The same of several batches jointly: their members move as they do in batches of their own.
 
         Raises:
-            UsageError: as `advance`, or batches that cannot go abreast.
+            UsageError: as `advance`, or batches that cannot be joined.
         """
         plain = batches.plain
         steps, h = self._steps(duration)

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from measure.observe.gaps import LONGEST
+from measure.observe.gaps import LONGEST, frames_of
 from measure.observe.observation import Observation
 from measure.observe.trajectory import Floats
 
@@ -17,6 +17,7 @@ SHORTEST = 2.0
 """Seconds that a recording must last."""
 FEWEST = 40
 """Frames that it must have."""
+_SLOWEST, _FASTEST = 9.0, 550.0  # Hz: 10 to 500, and what cameras and trackers are off by
 _JITTER = 0.1  # of a frame: times that are further off an even grid are not of a constant rate
 _REPEATED = 0.02  # of the usual squared step: a frame that moved less repeats the one before
 _MANY = 0.2  # of the frames: repeats that are so many mean a lower rate
@@ -45,6 +46,11 @@ def even(seen: Observation) -> Observation:
             fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: less does not tell one effect from another",
         )  # fmt: skip
     step = float(np.median(np.diff(seen.times)))
+    if not _SLOWEST <= 1 / step <= _FASTEST:
+        raise InputError(
+            f"{1 / step:.4g} frames a second", where=where,
+            fix=f"give {_SLOWEST:g} to {_FASTEST:g} Hz: cloth moves on too far between rarer frames",
+        )  # fmt: skip
     index = np.concatenate([[0], np.cumsum(np.rint(np.diff(seen.times) / step).astype(np.int64))])
     step, first = np.polyfit(index, seen.times, 1).tolist()  # the median of rounded times is a rounded step
     off = np.abs(seen.times - first - index * step)
@@ -61,9 +67,9 @@ def even(seen: Observation) -> Observation:
         return replace(seen, times=times)
     longest = int(np.diff(index).max()) - 1
     gap = int(index[np.argmax(np.diff(index) > 1)]) + 1
-    if longest > LONGEST:
+    if longest > frames_of(LONGEST, step):
         raise InputError(
-            f"{longest} frames on end are missing", where=f"{where}, frame {gap}",
+            f"{longest} frames on end are missing, {longest * step:.2g} s", where=f"{where}, frame {gap}",
             fix="cut the recording there and give its parts as recordings of their own",
         )  # fmt: skip
     positions = np.full((len(times), *seen.positions.shape[1:]), np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, LimitError, UnknownNameError
-from measure.cases.kept import kept
+from measure.cases.cached import cached
 from measure.cases.recipe import Group, load_case, parse_case
 
 TEXT = """
@@ -81,10 +81,10 @@ def test_what_was_computed_is_computed_once_for_the_same_inputs(tmp_path: Path) 
         made.append(1)
         return {"x": np.array([1.0, np.nan])}
 
-    method = (sys.modules["measure.cases.kept"],)
+    method = (sys.modules["measure.cases.cached"],)
     for inputs in ({"a": 1}, {"a": 1}, {"a": 2}):
-        assert np.array_equal(kept(tmp_path, inputs, method, make)["x"], [1.0, np.nan], equal_nan=True)
+        assert np.array_equal(cached(tmp_path, inputs, method, make)["x"], [1.0, np.nan], equal_nan=True)
     assert len(made) == 2
     assert len(list(tmp_path.iterdir())) == 2  # and nothing unfinished
-    kept(None, {"a": 1}, method, make)
+    cached(None, {"a": 1}, method, make)
     assert len(made) == 3

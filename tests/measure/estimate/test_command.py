@@ -250,14 +250,18 @@ def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path,
         (("FILM", "--start", "20s"), 2, "of a film of"),
         (("FILM", "--crop", "whole"), 2, "not a box"),
         (("FILM", "--json", "--csv"), 2, "more than one form"),
+        (("FILM", "--refine", "28"), 2, "whose size is not known"),
+        (("FILM", "--cache", "clips"), 2, "--cache without --refine"),
+        (("--query", "true", "--flag-size", "1.5x1.0", "--refine", "28", "--lake", "LAKE"), 2, "is of one film"),
         (("FILM", "--report", "nowhere/report.html"), 2, "create it first"),
         (("FILM", "--lake", "nowhere"), 1, "no lake here"),
     ],
 )
 def test_what_cannot_be_measured_is_told_with_the_fix(
-    film: Path, arguments: tuple[str, ...], code: int, words: str
+    film: Path, lake: Path, arguments: tuple[str, ...], code: int, words: str
 ) -> None:
-    done = run(*(str(film) if argument == "FILM" else argument for argument in arguments), code=code)
+    named = {"FILM": str(film), "LAKE": str(lake)}
+    done = run(*(named.get(argument, argument) for argument in arguments), code=code)
     assert words in done.stderr
     assert "fix:" in done.stderr
 

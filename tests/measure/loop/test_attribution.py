@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
-from measure.loop.again import Rerun, less_moments, less_swing
 from measure.loop.attribution import (
     FLUCTUATING,
     GUST_COLUMN,
@@ -31,6 +30,7 @@ from measure.loop.course import Course
 from measure.loop.inference import Evidence, NullModel, Nulls
 from measure.loop.lines import REDUCED
 from measure.loop.reference import GUSTS, NullBank, Reference
+from measure.loop.refit import Refit, less_moments, less_swing
 from measure.loop.statistics import Statistics
 from measure.loop.verdict import Conclusion
 
@@ -183,7 +183,7 @@ def test_nothing_is_found_where_nothing_acts() -> None:
     rejected = 0
     for bank in (made(seed) for seed in range(6)):
         null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
-        chances = [reference.rarity.p(reference.farthest(seen(null, {}, seed=seed), names())) for seed in range(40)]
+        chances = [reference.tail.p(reference.farthest(seen(null, {}, seed=seed), names())) for seed in range(40)]
         rejected += sum(p <= 0.05 for p in chances)
     assert rejected <= 18
 
@@ -237,11 +237,11 @@ def test_an_effect_that_nulls_often_show_is_not_named(null: NullModel, reference
     """However it predicts: what rejects the base model is something else."""
     lift = names().index("lift.coefficient")
     evidence = seen(null, {"lift.coefficient": 0.03}, line=20.0)
-    rerun = Rerun(
+    refitted = Refit(
         coefficient=0.03 * float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 50.0), leftover=0.5,
         evidence=seen(null, {}, seed=3),
     )  # fmt: skip
-    found = judge(evidence, reference, level=0.02, again={lift: rerun})
+    found = judge(evidence, reference, level=0.02, refits={lift: refitted})
     leader = found.ranking[0].candidate
     assert (leader.effect, leader.p_family > 0.25) == ("lift", True)
     assert (found.conclusion, found.named) == (Conclusion.OUTSIDE, ())
@@ -281,7 +281,7 @@ def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
     assert same.conclusion is Conclusion.EFFECT
     assert other.conclusion is Conclusion.PARTLY
     assert named(other) == ["vertical-wind.inclination"]
-    first, second = same.ranking[0].candidate.steady, other.ranking[0].candidate.steady
+    first, second = same.ranking[0].candidate.heterogeneity, other.ranking[0].candidate.heterogeneity
     assert first is not None
     assert second is not None
     assert second < 0.02 < first
@@ -350,11 +350,11 @@ def test_a_line_is_the_effects_own_if_its_model_has_it(
 ) -> None:
     # Lift makes a flag flutter in another way: the base model's errors swing, those with the lift need not.
     lift, left = names().index("lift.coefficient"), seen(null, {}, line=line, seed=3)
-    rerun = Rerun(
+    refitted = Refit(
         coefficient=float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 5.0), leftover=0.02 if line else 0.5,
         evidence=left, line=reference.line(left) if line else None,
     )  # fmt: skip
-    found = judge(seen(null, {"lift.coefficient": 1.0}, line=20.0), reference, level=0.02, again={lift: rerun})
+    found = judge(seen(null, {"lift.coefficient": 1.0}, line=20.0), reference, level=0.02, refits={lift: refitted})
     assert found.conclusion is conclusion
     assert (found.line is not None) == (line > 0)
     assert (found.ranking[0].candidate.why_not == SWINGING) == (line > 0)
@@ -390,7 +390,7 @@ def test_gusts_are_named_where_the_course_is_turbulences(blowing: tuple[NullMode
     # The same pressure, in a wind that comes in pulses from one direction.
     passing = judge(seen(null, {}, gusts=1.0, course=pulses(0.3)), reference, level=0.02)
     assert "gusts" not in named(passing)
-    assert "turns by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
+    assert "varies across its mean by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
 
 
 @pytest.mark.parametrize(("left", "conclusion"), [(0.38, Conclusion.OUTSIDE), (0.0, Conclusion.EFFECT)])
@@ -402,11 +402,11 @@ def test_a_course_is_the_effects_own_if_its_model_has_it(
     before = seen(null, {"lift.coefficient": 1.0}, course=pulses(0.4))
     after = less_swing(seen(null, {}, course=pulses(left), seed=3), before)
     assert (after.course is None) == (left == 0)
-    rerun = Rerun(
+    refitted = Refit(
         coefficient=float(EXPECTED[lift]), gains=np.full(3 * SEGMENTS, 5.0), leftover=0.5 if left == 0 else 0.01,
         evidence=after,
     )  # fmt: skip
-    found = judge(before, reference, level=0.02, again={lift: rerun})
+    found = judge(before, reference, level=0.02, refits={lift: refitted})
     assert found.conclusion is conclusion
     assert (found.ranking[0].candidate.why_not == FLUCTUATING) == (left > 0)
 
@@ -456,7 +456,7 @@ def test_a_second_effect_that_failed_leaves_a_part_explained(null: NullModel, re
 
 
 def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Reference) -> None:
-    """An effect whose model, run again, predicts nothing is not named."""
+    """An effect whose refitted model predicts nothing is not named."""
     rng = np.random.default_rng(2)
     delta = np.zeros((12, COUNT))
     place = names().index("lift.coefficient")
@@ -466,5 +466,5 @@ def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Refer
     evidence = Evidence.of(own, speeds[own.recording], null)
     linear = judge(evidence, reference, level=0.02)
     assert linear.named == (place,)
-    useless = Rerun(coefficient=0.1, gains=np.full(12, -1.0), leftover=0.5, evidence=evidence)
-    assert place not in judge(evidence, reference, level=0.02, again={place: useless}).named
+    useless = Refit(coefficient=0.1, gains=np.full(12, -1.0), leftover=0.5, evidence=evidence)
+    assert place not in judge(evidence, reference, level=0.02, refits={place: useless}).named

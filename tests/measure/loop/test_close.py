@@ -22,7 +22,7 @@ from measure.loop.nulls import NullBatch
 from measure.loop.setting import Setting
 from measure.loop.statistics import projected
 from measure.loop.verdict import Conclusion, Estimate, Verdict
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect
@@ -124,8 +124,8 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     nominal = [setting.nominal] * len(setting.segments)
     found, projection = projected(setting.forecaster, setting.segments, nominal, banks.columns())
     null = banks.load(bank, words="made").model(setting.design)
-    yardstick = Yardstick(found=found, projection=projection, null=null, speeds=setting.speeds[setting.recording])
-    modes = corrective_field(setting, yardstick)
+    whitened = WhitenedMisfit(found=found, projection=projection, null=null, speeds=setting.speeds[setting.recording])
+    modes = corrective_field(setting, whitened)
     assert [mode.column for mode in modes] == list(fields())
     across = next(mode for mode in modes if mode.column.name == "field.y.00")
     assert across.value == pytest.approx(6.0, abs=3 * across.error)
@@ -135,7 +135,7 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     segments, forecaster = setting.segments, setting.forecaster
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     change = forecaster.sensitivities([across.column], segments, nominal, errors)[-1]
-    rest = corrective_field(setting, yardstick, left=errors - across.value * change)
+    rest = corrective_field(setting, whitened, left=errors - across.value * change)
     unmoved = next(mode for mode in rest if mode.column == across.column)
     assert abs(unmoved.value) < across.error
 

@@ -103,7 +103,8 @@ def test_a_warning_that_may_be_what_was_found_is_said_with_the_verdict() -> None
     doubt = Finding(kind="inertia-does-not-fit", severity=Severity.WARNING, what="it moves as in 8 m/s", where="flag")
     other = replace(doubt, kind="cloth-not-covered", what="no marker near", severity=Severity.NOTE)
     told = doubted(whole, (doubt, other))
-    assert told.words == f"{whole.words} Beware, this may be an error of the data: flag: it moves as in 8 m/s."
+    remark = "The data themselves may be wrong, which would look like an effect: flag: it moves as in 8 m/s."
+    assert told.words == f"{whole.words} {remark}"
     assert told.findings == (
         ("inertia-does-not-fit", "flag: it moves as in 8 m/s"), ("cloth-not-covered", "flag: no marker near"),
     )  # fmt: skip

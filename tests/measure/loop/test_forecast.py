@@ -25,7 +25,7 @@ from measure.loop.forecast import Forecaster, Segments
 from measure.loop.model import Model, errors_of
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from measure.propose.terms import Term, columns_of
-from sim.integrate.abreast import Abreast
+from sim.integrate.joint_batch import JointBatch
 
 NOMINAL = Calibration()
 
@@ -132,7 +132,7 @@ def test_calibration_sensitivities_are_those_of_their_parameters(
     assert float((errors - expected).norm() / errors.norm()) < 0.2
 
 
-def test_steps_abreast_are_those_taken_alone(
+def test_steps_in_a_joint_batch_are_those_taken_alone(
     monkeypatch: pytest.MonkeyPatch, forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
     segments = Segments.of([own_recording])
@@ -151,17 +151,17 @@ def test_steps_abreast_are_those_taken_alone(
         torch.testing.assert_close(change, alone, rtol=1e-9, atol=1e-12)
 
 
-def test_batches_that_are_not_of_one_cloth_do_not_go_abreast(forecaster: Forecaster, own_recording: Trajectory) -> None:
+def test_batches_that_are_not_of_one_cloth_are_not_joined(forecaster: Forecaster, own_recording: Trajectory) -> None:
     segments = Segments.of([own_recording])
     system, state = forecaster.system(segments, [NOMINAL] * len(segments))
     held = replace(system, handles=replace(system.handles, stiffness=2.0))
     with pytest.raises(UsageError, match="differ in one of: handles"):
-        _ = Abreast.of([(system, state), (held, state)])[0].plain
+        _ = JointBatch.of([(system, state), (held, state)])[0].plain
     finer = replace(system.cloth, gradients=2 * system.cloth.gradients)
     with pytest.raises(UsageError, match="differ in mesh"):
-        _ = Abreast.of([(system, state), (replace(system, cloth=finer), state)])[0].plain
+        _ = JointBatch.of([(system, state), (replace(system, cloth=finer), state)])[0].plain
     with pytest.raises(UsageError, match="different times"):
-        Abreast.of([(system, state), (system, replace(state, time=1.0))])
+        JointBatch.of([(system, state), (system, replace(state, time=1.0))])
 
 
 def test_models_in_one_batch_leave_what_they_leave_alone(

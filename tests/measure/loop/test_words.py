@@ -28,18 +28,18 @@ def test_the_modes_that_are_told_best_are_said_first() -> None:
     assert second.startswith("along the wind, hoist against fly (0.5")
     assert third.startswith("up, both ends against the middle (−4")
     assert "corner" not in said
-    assert "fits best what is left, per mass: across" in proposal(modes, whole=False)
+    assert "fits the remaining errors best, per mass: across" in proposal(modes, whole=False)
 
 
 def test_a_strength_that_is_another_in_every_recording_is_told_with_its_values() -> None:
     partly = verdict(Conclusion.PARTLY)
-    assert "what is left is more than nulls leave" in sentence(partly)
-    ranking = [replace(c, steady=None if c.why_not else 0.001) for c in partly.ranking]
+    assert "the errors that remain are larger than those of simulated nulls" in sentence(partly)
+    ranking = [replace(c, heterogeneity=None if c.why_not else 0.001) for c in partly.ranking]
     said = sentence(replace(partly, ranking=tuple(ranking)))
     each = ", ".join(f"{e.value:.2g}" for e in next(c for c in ranking if not c.why_not).by_recording)
-    assert f"recording by recording it is {each}" in said
+    assert f"fitted to each recording alone it is {each}" in said
     assert "p = 0.0010" in said or "p = 0.001" in said
-    assert "more than nulls leave" not in said
+    assert "the errors that remain" not in said
 
 
 def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
@@ -51,4 +51,5 @@ def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
 
 def test_a_course_that_is_not_turbulence_is_said_in_shares_of_the_wind() -> None:
     said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
-    assert "varies by 13 % of its mean along itself, 12 % within two seconds, and by 0 % across" in said
+    told = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
+    assert told in said

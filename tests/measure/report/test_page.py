@@ -145,7 +145,7 @@ def test_a_sufficient_base_model_has_no_columns_for_an_effect() -> None:
 
 def test_whether_a_strength_is_one_in_all_recordings_is_shown_beside_them() -> None:
     of = [element.text for element in parsed(page(verdict(Conclusion.EFFECT))).all("span")]
-    assert any("0.83" in text and "of one" in text for text in of), of
+    assert any("0.83" in text and "for the same" in text for text in of), of
 
 
 def test_missing_numbers_are_dashes() -> None:

@@ -50,7 +50,7 @@ def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
 
 def test_a_base_model_that_is_not_rejected_is_not_called_true() -> None:
     remark = sentences.test_remark(verdict(Conclusion.SUFFICIENT).test)
-    assert remark == "An effect too weak for these recordings to show may still be there."
+    assert remark == "An effect that is too weak to show in these recordings may still act."
 
 
 def test_a_control_that_does_as_well_as_the_named_effect_is_pointed_out() -> None:
@@ -70,10 +70,12 @@ def test_a_control_that_cannot_be_told_from_the_named_effect_is_pointed_out() ->
     near, far = (replace(whole.comparisons[0], apart=about(0.3, half, unit="1")) for half in (0.4, 0.2))
     (warning,) = sentences.control_warnings(replace(whole, comparisons=(near, far)))
     assert "cannot be told from the named effect" in warning
-    assert "worse by 0.3 [−0.1, 0.7] nat a segment" in words(replace(whole, comparisons=(near,))).replace("\n    ", " ")
+    assert "worse by 0.3 [−0.1, 0.7] nat per segment" in words(replace(whole, comparisons=(near,))).replace(
+        "\n    ", " "
+    )
 
 
-@pytest.mark.parametrize(("half", "told"), [(0.2, "is told from it"), (0.4, "is not told from it")])
+@pytest.mark.parametrize(("half", "told"), [(0.2, "does better"), (0.4, "cannot be told from it")])
 def test_the_control_over_all_that_was_left_out_is_summed_up(half: float, told: str) -> None:
     whole = replace(verdict(Conclusion.EFFECT), apart=about(0.3, half, unit="1"))
     summary = sentences.control_summary(whole)

@@ -94,7 +94,7 @@ def candidates(named: tuple[str, ...], recordings: int) -> tuple[Candidate, ...]
                 by_recording=tuple(
                     about(value * (1 + 0.1 * n), 1.6 * spread * (1 + n / 3), unit) for n in range(recordings)
                 ),
-                steady=0.83 if recordings > 1 else None,
+                heterogeneity=0.83 if recordings > 1 else None,
                 why_not="" if effect in named else f"held-out error {1.9 * place:.1f} standard errors behind the best",
             )
         )

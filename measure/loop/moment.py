@@ -23,7 +23,7 @@ from measure.observe.trajectory import Floats, Specimen
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Lever:
+class PoleMoment:
     """Of some segments.
 
     Attributes:
@@ -35,7 +35,7 @@ class Lever:
     scale: Tensor
 
     @classmethod
-    def of(cls, errors: Tensor, segments: Segments, specimen: Specimen) -> Lever:
+    def of(cls, errors: Tensor, segments: Segments, specimen: Specimen) -> PoleMoment:
         """About the vertical through the middle of the attachments, of errors (frame, marker, 3, segment) [m]."""
         anchors = [specimen.anchors if item.anchors is None else item.anchors for item in segments.items]
         axis = np.stack([own.mean(axis=0) for own in anchors], axis=-1)[None, None, :2]
@@ -54,7 +54,7 @@ class Lever:
         return torch.einsum("fmxs,cfmxs->cfs", self.arms, changes[:, :, :, :2]) / self.scale
 
     @classmethod
-    def joined(cls, parts: list[Lever]) -> Lever:
+    def joined(cls, parts: list[PoleMoment]) -> PoleMoment:
         """Of the segments of some, one after another."""
         return cls(arms=torch.cat([p.arms for p in parts], dim=-1), scale=torch.cat([p.scale for p in parts]))
 

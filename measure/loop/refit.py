@@ -1,4 +1,4 @@
-"""The first candidates fitted beyond the linear and run again, before one of them is named.
+"""The first candidates refitted beyond the linear model, before one of them is named.
 
 Strong effects are far from linear: a lift of 1.4 shows as 0.3 where sensitivities are taken at none, and predicts
 unseen recordings worse than nothing.
@@ -16,20 +16,16 @@ from torch import Tensor
 
 from measure.loop.bank import columns, names
 from measure.loop.comparison import LeftOut, left_out
+from measure.loop.criteria import CRITERIA
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, left_together
 from measure.loop.lines import Line
 from measure.loop.reference import Reference
 from measure.loop.refine import DivergedError, Refined, refine
 from measure.loop.statistics import Projection
-from measure.loop.yardstick import Yardstick
+from measure.loop.whitened_misfit import WhitenedMisfit
 
 Floats = NDArray[np.float64]
-_TAKEN = 0.25
-"""Share of a line's power, of the moments' misfit, or of a swing of the wind's course, that an effect takes away if
-these are its own, whatever its strength on the fit's mesh: of the flutter that a lift of 1.9 had left it took 0.4, of a
-vortex street's lines no effect takes more than 0.03; of their own moments lifts and reactive loads took 0.42 to 0.54,
-and left what the mesh does to them, a drag that a turning pole passed for took none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,12 +33,12 @@ class Fits:
     """Models of one experiment beyond the linear: each is fitted once, and once without the same segments.
 
     Attributes:
-        yardstick: the measure; its statistics at the nominal model are where the fits begin.
+        whitened: the measure; its statistics at the nominal model are where the fits begin.
     """
 
     forecaster: Forecaster
     segments: Segments
-    yardstick: Yardstick
+    whitened: WhitenedMisfit
     _made: dict[tuple[int, ...], Refined | None] = field(default_factory=dict)
     _left: dict[tuple[tuple[int, ...], bytes], LeftOut] = field(default_factory=dict)
     _errors: dict[tuple[int, ...], Tensor] = field(default_factory=dict)
@@ -52,7 +48,7 @@ class Fits:
         key = tuple(chosen)
         if key not in self._made:
             try:
-                self._made[key] = refine(self.forecaster, self.segments, self.yardstick, key, weighed=columns())
+                self._made[key] = refine(self.forecaster, self.segments, self.whitened, key, weighed=columns())
             except DivergedError:
                 self._made[key] = None
         return self._made[key]
@@ -63,7 +59,7 @@ class Fits:
         new = [place for place, key in enumerate(keys) if key not in self._left]
         if new:
             own = [outsides[place] for place in new]
-            made = left_out(self.forecaster, self.segments, fitted, self.yardstick, own)
+            made = left_out(self.forecaster, self.segments, fitted, self.whitened, own)
             self._left.update(zip([keys[place] for place in new], made, strict=True))
         return [self._left[key] for key in keys]
 
@@ -89,8 +85,8 @@ class Fits:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rerun:
-    """A candidate run again.
+class Refit:
+    """A refitted candidate.
 
     Attributes:
         coefficient: fitted to all recordings.
@@ -108,29 +104,29 @@ class Rerun:
     line: Line | None = None
 
 
-def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Rerun]:
+def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Refit]:
     """Column → what its model does; columns whose cloth diverges are left out.
 
     Args:
         workers: threads; each model is run in one.
     """
-    together = left_together(fits.yardstick.found.recording)
+    together = left_together(fits.whitened.found.recording)
     parts = [together == index for index in np.unique(together)]
 
     def left(fitted: Refined) -> list[Floats]:
         return [left.misfit for left in fits.left_out(fitted, parts)]
 
-    def rerun(column: int) -> Rerun | None:
+    def one(column: int) -> Refit | None:
         fitted = fits.of((column,))
         if fitted is None:
             return None
         errors = fits.errors(fitted)
-        evidence = less_swing(less_moments(fits.yardstick.of(errors), bare), bare)
-        line = _own(fits.yardstick.projection, reference.line(evidence), unaided, errors)
+        evidence = less_swing(less_moments(fits.whitened.of(errors), bare), bare)
+        line = _own(fits.whitened.projection, reference.line(evidence), unaided, errors)
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, left(fitted), strict=True):
             gains[outside] = old - new
-        return Rerun(
+        return Refit(
             coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
             leftover=reference.p_left_by(evidence, names(), [column], swinging=line is not None), evidence=evidence,
             line=line,
@@ -139,8 +135,8 @@ def run_again(fits: Fits, reference: Reference, candidates: Sequence[int], *, wo
     with ThreadPoolExecutor(max_workers=workers) as pool:
         list(pool.map(fits.of, [(), *((column,) for column in candidates)]))
         before, unaided = left(fits.base), fits.errors(fits.base)
-        bare = fits.yardstick.of(unaided)
-        found = dict(zip(candidates, pool.map(rerun, candidates), strict=True))
+        bare = fits.whitened.of(unaided)
+        found = dict(zip(candidates, pool.map(one, candidates), strict=True))
     return {column: made for column, made in found.items() if made is not None}
 
 
@@ -148,7 +144,7 @@ def less_moments(evidence: Evidence, before: Evidence) -> Evidence:
     """Without the moments that a model leaves, if it takes away much of their misfit."""
     if evidence.turning is None or before.turning is None:
         return evidence
-    taken = evidence.turning.fit(()).left < (1 - _TAKEN) * before.turning.fit(()).left
+    taken = evidence.turning.fit(()).left < (1 - CRITERIA.taken) * before.turning.fit(()).left
     return replace(evidence, turning=None) if taken else evidence
 
 
@@ -158,11 +154,11 @@ def less_swing(evidence: Evidence, before: Evidence) -> Evidence:
     if swing is None or whole is None:
         return evidence
     most = int(np.argmax(np.abs(whole)))
-    return replace(evidence, course=None) if abs(swing[most]) < (1 - _TAKEN) * abs(whole[most]) else evidence
+    return replace(evidence, course=None) if abs(swing[most]) < (1 - CRITERIA.taken) * abs(whole[most]) else evidence
 
 
 def _own(projection: Projection, line: Line | None, before: Tensor, after: Tensor) -> Line | None:
     """A line of the errors that a model leaves, unless the base model's errors had it, and more of it."""
     if line is None or projection.spectrum is None:
         return None
-    return None if projection.spectrum.share_left(line, before, after) < 1 - _TAKEN else line
+    return None if projection.spectrum.share_left(line, before, after) < 1 - CRITERIA.taken else line

@@ -10,7 +10,7 @@ from scipy.stats import chi2, norm
 from measure.loop.verdict import Estimate
 
 
-def steady(strengths: Sequence[Estimate]) -> float | None:
+def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
     """p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer than two.
 
     A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as one that rises by

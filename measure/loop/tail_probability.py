@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
+from measure.loop.criteria import CRITERIA
 
 Floats = NDArray[np.float64]
 
-TAIL = 0.1
-"""Share of the groups beyond which chances are those of the exponential tail."""
 _RESAMPLES = 400
 
 
@@ -29,7 +28,7 @@ def share_as_large(null: Floats, value: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rarity:
+class TailProbability:
     """Of a statistic that is large where something is missing.
 
     Attributes:
@@ -46,14 +45,14 @@ class Rarity:
         if value <= self._threshold or self._reaching == 0:
             return share_as_large(self.null, value)
         excess = (value - self._threshold) / (self._reaching * self._mean)
-        return max(TAIL * (1 + excess) ** -self._reaching, self._least)
+        return max(CRITERIA.tail * (1 + excess) ** -self._reaching, self._least)
 
     def critical(self, level: float) -> float | None:
         """The statistic beyond which the chance is at most `level`; None where there are too few groups for any."""
         if level < self._least:
             return None
-        if level <= TAIL and self._reaching:
-            excess = (TAIL / level) ** (1 / self._reaching) - 1
+        if level <= CRITERIA.tail and self._reaching:
+            excess = (CRITERIA.tail / level) ** (1 / self._reaching) - 1
             return self._threshold + self._reaching * self._mean * excess
         larger = np.sort(self.null)[::-1]
         allowed = int(level * (1 + len(larger)) + 1e-9) - 1
@@ -61,21 +60,21 @@ class Rarity:
 
     def interval(self, value: float, *, level: float) -> tuple[float, float]:
         """Of the chance, for what kinds of numerics happen to be among the nulls: by drawing kinds anew (bootstrap)."""
-        rng = stream(0, "null", "rarity")
+        rng = stream(0, "null", "tail")
         numbers, place = np.unique(self.kinds, return_inverse=True)
         members = [np.flatnonzero(place == k) for k in range(len(numbers))]
         found = np.empty(_RESAMPLES)
         for index in range(_RESAMPLES):
             drawn = [members[k] for k in rng.integers(len(members), size=len(members))]
-            again = np.concatenate(drawn)
+            drawn_anew = np.concatenate(drawn)
             own = np.repeat(np.arange(len(drawn)), [len(part) for part in drawn])
-            found[index] = Rarity(null=self.null[again], kinds=own).p(value)
+            found[index] = TailProbability(null=self.null[drawn_anew], kinds=own).p(value)
         low, high = np.quantile(found, [(1 - level) / 2, (1 + level) / 2])
         return float(low), float(high)
 
     @cached_property
     def _threshold(self) -> float:
-        return float(np.quantile(self.null, 1 - TAIL))
+        return float(np.quantile(self.null, 1 - CRITERIA.tail))
 
     @cached_property
     def _beyond(self) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Yardstick:
+class WhitenedMisfit:
     """A squared distance of markers is mostly what the fit's mesh cannot show, and its bias by the mesh is larger than
     what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
 
@@ -36,12 +36,15 @@ class Yardstick:
         lines, turned = self.projection.lines(errors), self.projection.turned(errors)
         known = self.found.turning
         turning = None if known is None or turned is None else replace(known, r=turned)
+        course, whole = self.projection.course(errors), self.found.course
+        if course is not None and whole is not None:
+            course = replace(course, log=whole.log)
         found = replace(
             self.found,
             r=self.projection.of(errors),
             lines=lines,
             turning=turning,
-            course=self.projection.course(errors),
+            course=course,
         )
         return self.evidence(found)
 

@@ -31,7 +31,7 @@ class _Winds:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Abreast:
+class JointBatch:
     """Batches on one mesh, held alike.
 
     Attributes:
@@ -41,14 +41,14 @@ class Abreast:
     systems: tuple[System, ...]
 
     @classmethod
-    def of(cls, batches: Sequence[tuple[System, State]]) -> tuple[Abreast, State]:
+    def of(cls, batches: Sequence[tuple[System, State]]) -> tuple[JointBatch, State]:
         """Batches with their starts, and the start of all: members in order, and what frictions remember.
 
         Raises:
             UsageError: none, or starts at different times.
         """
         if not batches or any(state.time != batches[0][1].time for _, state in batches):
-            raise UsageError("no batches, or of different times", where="abreast", fix="start all of them at once")
+            raise UsageError("no batches, or of different times", where="joint batch", fix="start all of them at once")
         return cls(systems=tuple(system for system, _ in batches)), _joined([state for _, state in batches])
 
     @cached_property
@@ -64,7 +64,9 @@ class Abreast:
             shared = ("handles", "air", "contact", "limits")
             if not torch.equal(part.held, first.held) or any(getattr(part, s) != getattr(first, s) for s in shared):
                 raise UsageError(
-                    f"batches that differ in one of: {', '.join(shared)}", where="abreast", fix="run them one by one"
+                    f"batches that differ in one of: {', '.join(shared)}",
+                    where="joint batch",
+                    fix="run them one by one",
                 )
         return replace(
             first, cloth=Cloth.joined([part.cloth for part in parts]), wind=_Winds(parts=tuple(p.wind for p in parts)),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flagdata.provenance import file_hash, recipe_hash
 
 
-def kept(
+def cached(
     folder: Path | None,
     inputs: Mapping[str, Any],
     method: Sequence[ModuleType],
@@ -26,7 +26,7 @@ def kept(
     """The arrays that `make` returns, computed once for the same inputs and method.
 
     Args:
-        folder: where they are kept; None keeps nothing.
+        folder: where they are cached; None caches nothing.
         inputs: everything that shapes the arrays, as JSON values.
         method: the modules whose source shapes them.
     """

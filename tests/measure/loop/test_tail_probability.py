@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from measure.loop.rarity import Rarity
+from measure.loop.tail_probability import TailProbability
 
 LEVELS = (0.005, 0.02, 0.05, 0.5)
 
 
-def drawn(rng: np.random.Generator, *, kinds: int, each: int) -> Rarity:
-    return Rarity(null=np.repeat(rng.exponential(size=kinds), each), kinds=np.repeat(np.arange(kinds), each))
+def drawn(rng: np.random.Generator, *, kinds: int, each: int) -> TailProbability:
+    return TailProbability(null=np.repeat(rng.exponential(size=kinds), each), kinds=np.repeat(np.arange(kinds), each))
 
 
 def test_few_kinds_of_numerics_make_no_null_rare() -> None:
@@ -30,24 +30,24 @@ def test_few_kinds_of_numerics_make_no_null_rare() -> None:
 
 @pytest.mark.parametrize("level", [0.01, 0.02, 0.05, 0.1, 0.3])
 def test_beyond_the_critical_value_the_chance_is_at_most_the_level(level: float) -> None:
-    rarity = drawn(np.random.default_rng(1), kinds=60, each=5)
-    critical = rarity.critical(level)
+    tail = drawn(np.random.default_rng(1), kinds=60, each=5)
+    critical = tail.critical(level)
     assert critical is not None
-    assert rarity.p(critical * 1.001) <= level < rarity.p(critical * 0.98) + 1e-12
+    assert tail.p(critical * 1.001) <= level < tail.p(critical * 0.98) + 1e-12
 
 
 def test_of_nulls_1_to_99_those_beyond_70_are_the_highest_tenths_three() -> None:
     """p ≤ 0.3 allows 29 of 99 nulls at least as large, (1 + 29)/(1 + 99): the statistic has to exceed 70."""
-    rarity = Rarity(null=np.arange(1.0, 100.0), kinds=np.arange(99))
-    assert rarity.critical(0.3) == 70.0
-    assert rarity.p(70.0) > 0.3 >= rarity.p(70.5)
+    tail = TailProbability(null=np.arange(1.0, 100.0), kinds=np.arange(99))
+    assert tail.critical(0.3) == 70.0
+    assert tail.p(70.0) > 0.3 >= tail.p(70.5)
 
 
 def test_too_few_groups_reject_nothing() -> None:
-    rarity = Rarity(null=np.arange(1.0, 20.0), kinds=np.arange(19))
-    assert rarity.critical(0.04) is None
-    assert rarity.p(1e9) == 1 / 20
-    critical = rarity.critical(0.06)
+    tail = TailProbability(null=np.arange(1.0, 20.0), kinds=np.arange(19))
+    assert tail.critical(0.04) is None
+    assert tail.p(1e9) == 1 / 20
+    critical = tail.critical(0.06)
     assert critical is not None
     assert math.isfinite(critical)
 
@@ -58,9 +58,9 @@ def test_the_interval_is_that_of_the_kinds_not_of_the_groups() -> None:
     value = math.log(2)
     widths = []
     for each in (1, 10):
-        rarity = drawn(rng, kinds=40, each=each)
-        share = float(np.mean(rarity.null >= value))
-        low, high = rarity.interval(value, level=0.9)
+        tail = drawn(rng, kinds=40, each=each)
+        share = float(np.mean(tail.null >= value))
+        low, high = tail.interval(value, level=0.9)
         assert low < share + 1 / 40
         assert high > share
         widths.append(high - low)

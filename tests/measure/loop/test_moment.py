@@ -9,7 +9,7 @@ import torch
 from flagdata.rng import stream
 from measure.loop.columns import Calibration, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
-from measure.loop.lever import Lever, shares
+from measure.loop.moment import PoleMoment, shares
 from measure.loop.statistics import projected, statistics
 from measure.observe.trajectory import Trajectory
 
@@ -29,8 +29,8 @@ def seen(forecaster: Forecaster, segments: Segments) -> np.ndarray:
 
 def moment(forecaster: Forecaster, segments: Segments, field: np.ndarray) -> np.ndarray:
     """(frame, segment) of a field, in its own units."""
-    lever = Lever.of(torch.as_tensor(field), segments, forecaster.specimen)
-    return (lever.moment(torch.as_tensor(field)[None])[0] * lever.scale).numpy()
+    pole_moment = PoleMoment.of(torch.as_tensor(field), segments, forecaster.specimen)
+    return (pole_moment.moment(torch.as_tensor(field)[None])[0] * pole_moment.scale).numpy()
 
 
 def test_the_shares_are_the_cloths_area(forecaster: Forecaster, segments: Segments) -> None:

@@ -1,0 +1,69 @@
+"""A measurement refined by simulation: `measure.refine` at the flag's own size.
+
+Refinement simulates flags of the size that the models are trained on. The film's frames were taken at the instants at
+which a flag of its own size looks like one of those (`measure.estimate.similarity`), so what is found scales back like
+what the model says: wind by √s, area weight by s, bending stiffness by s⁴.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from flagdata.errors import UsageError
+from measure.estimate.measuring import Measurement
+from measure.estimate.similarity import LOGARITHMS, POWERS
+from measure.estimate.source import Subject
+from measure.refine.command import Clip, run
+from measure.refine.refinement import Interval, Refinement
+from models.estimator import Estimator
+
+
+def refined(
+    measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cropped: bool, cache: Path | None
+) -> Refinement:
+    """Refine the first window of a film.
+
+    Args:
+        budget: simulated clips.
+        cropped: whether the film was cropped, so that the view that its record states is not what was seen.
+        cache: folder for evaluations, so that an interrupted run goes on; None for none.
+
+    Raises:
+        UsageError: the flag's size is not known.
+        InputError: a budget that is too small, see `measure.refine.procedure.refine`.
+    """
+    if measured.sizes.given is None:
+        raise UsageError(
+            "a refinement simulates the flag, whose size is not known", where=measured.film,
+            fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
+        )  # fmt: skip
+    clip = Clip(name=measured.film, frames=measured.clip, recording=None if cropped else subject.artifact)
+    options = measured.options
+    found = run([clip], model, budget=budget, seed=options.seed, level=options.level, cache=cache)
+    return scaled(found, float(measured.sizes.scale[0]))
+
+
+def scaled(found: Refinement, s: float) -> Refinement:
+    """The same of a flag s times as large as the one simulated."""
+    if math.isclose(s, 1.0):
+        return found
+    return replace(
+        found, intervals=_all(found.intervals, s), amortised=_all(found.amortised, s), bending=found.bending * s**4,
+        rounds=tuple(replace(one, intervals=_all(one.intervals, s)) for one in found.rounds),
+    )  # fmt: skip
+
+
+def _all(intervals: tuple[Interval, ...], s: float) -> tuple[Interval, ...]:
+    return tuple(_one(interval, s) for interval in intervals)
+
+
+def _one(interval: Interval, s: float) -> Interval:
+    name = interval.name.partition(".")[0]
+    factor = s ** POWERS.get(name, 0.0)
+    shift = LOGARITHMS.get(name, 0.0) * math.log10(s)
+    return replace(
+        interval, median=interval.median * factor + shift, low=interval.low * factor + shift,
+        high=interval.high * factor + shift,
+    )  # fmt: skip

@@ -1,0 +1,64 @@
+"""A refinement of a flag of another size: what was found of the simulated one scales with the flag."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from measure.estimate.refined import scaled
+from measure.refine.refinement import Interval, Refinement, Round
+
+NOTHING: Any = None
+
+
+def interval(name: str, median: float, half: float) -> Interval:
+    return Interval(name=name, unit="", median=median, low=median - half, high=median + half, prior_share=0.5)
+
+
+@pytest.fixture
+def found() -> Refinement:
+    intervals = (
+        interval("wind_speed", 4.0, 0.5), interval("density", 0.12, 0.01), interval("bending_scale", -4.0, 0.2),
+        interval("anisotropy", 0.3, 0.1), interval("nonlinearity", -0.2, 0.1), interval("wind_speed.1", 6.0, 1.0),
+    )  # fmt: skip
+    step = Round(evaluations=28, distance=2.0, floor=1.0, intervals=intervals[:2], seconds=3.0)
+    return Refinement(
+        targets=(), level=0.9, intervals=intervals, amortised=intervals[:4], bending=np.full((15, 3), 1e-4),
+        rounds=(step,), traces=(), floor=1.0, reached=True, stopped="", posterior=NOTHING, evaluators=(), seconds={},
+        findings=(), seed=1,
+    )  # fmt: skip
+
+
+def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_4_to_the_4th_the_stiffness(
+    found: Refinement,
+) -> None:
+    """Froude number U²/(gL), mass ratio ρ_s/(ρ_air L) and B/(ρ_air U² L³) are those of the simulated flag."""
+    larger = scaled(found, 4.0)
+    by_name = {entry.name: entry for entry in larger.intervals}
+    assert (by_name["wind_speed"].median, by_name["wind_speed"].high) == (8.0, 9.0)
+    assert by_name["wind_speed.1"].low == 10.0
+    assert by_name["density"].median == pytest.approx(0.48)
+    assert by_name["bending_scale"].median == pytest.approx(-4.0 + math.log10(256))
+    assert by_name["bending_scale"].high - by_name["bending_scale"].low == pytest.approx(0.4)
+    np.testing.assert_allclose(larger.bending, 256e-4)
+
+
+def test_what_has_no_size_stays(found: Refinement) -> None:
+    before = {entry.name: entry for entry in found.intervals}
+    after = {entry.name: entry for entry in scaled(found, 0.5).intervals}
+    for name in ("anisotropy", "nonlinearity"):
+        assert after[name] == before[name]
+
+
+def test_rounds_and_what_the_network_said_before_scale_alike(found: Refinement) -> None:
+    larger = scaled(found, 4.0)
+    assert larger.amortised == larger.intervals[:4]
+    assert larger.rounds == (replace(found.rounds[0], intervals=larger.intervals[:2]),)
+
+
+def test_a_flag_of_the_simulated_size_is_left_as_it_is(found: Refinement) -> None:
+    assert scaled(found, 1.0) is found

@@ -1,0 +1,103 @@
+"""Thresholds live in one frozen object, which verdicts record; nowhere else in the loop is one."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import UsageError
+from measure.loop.criteria import CRITERIA, Criteria
+
+LOOP = Path(__file__).resolve().parents[3] / "measure" / "loop"
+
+METHOD = {
+    "alignment": {"_CALM"},
+    "artifacts": {"_FORMAT"},
+    "attribution": {"GUST_COLUMN"},
+    "bank": {"BATCH", "WINDS", "FILE_LIMIT", "_DENSITY", "_BENDING", "_DAMPING"},
+    "close": {"_FLOOR_COPIES"},
+    "columns": {
+        "_DENSITY",
+        "_BENDING",
+        "_DAMPING",
+        "DAMPING_UNIT",
+        "_MODES",
+        "_MOTIONS",
+        "PRIOR",
+        "PRIOR_WITHOUT_MASS",
+    },
+    "comparison": {"_ENOUGH"},
+    "course": {"ALONG", "LEFT", "_WINDOW"},
+    "floor": {"_DURATION"},
+    "forecast": {"HORIZON", "_SEGMENT", "_SHORTEST", "WIDEST", "_WARM_UP"},
+    "inference": {"_SHIFTS", "_POWERS", "_UNSEEN"},
+    "lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},
+    "named": {"_SETTLE", "_FRAMES", "_ROUGH"},
+    "nulls": {"_SETTLE", "_FINER", "_STEPS", "_GENTLE"},
+    "quantity": {"_DIGITS", "_MOST_DIGITS", "_WIDEST", "_NARROWEST"},
+    "reference": {"_GROUPS", "_NOTHING"},
+    "refine": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST"},
+    "residuals": {"_SHOWN"},
+    "statistics": {"_CHUNK", "_CLIP", "_NEVER", "_NOISE"},
+    "tail_probability": {"_RESAMPLES"},
+    "wind_log": {"_STEPS", "_REACH", "_LAGS", "_CALM"},
+}
+"""Numbers that say what is simulated, how errors are brought down and how it is shown; no verdict is decided by one."""
+PLAIN = {0, 1, 2, 3, -1}
+"""Counts and places, not thresholds."""
+
+
+def numbers(node: ast.AST) -> list[float]:
+    return [
+        found.value for found in ast.walk(node)
+        if isinstance(found, ast.Constant) and type(found.value) in (int, float)
+    ]  # fmt: skip
+
+
+def constants(path: Path) -> set[str]:
+    """Names of upper case that a module binds to something with a number in it."""
+    names: set[str] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        targets = (
+            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        )
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None and numbers(node.value):
+            for target in targets:
+                names |= {n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id.upper() == n.id}
+    return names
+
+
+@pytest.mark.parametrize("path", sorted(LOOP.glob("*.py")), ids=lambda path: path.stem)
+def test_no_threshold_lives_outside_the_criteria(path: Path) -> None:
+    if path.stem == "criteria":
+        pytest.skip("the criteria themselves")
+    tables = {"THETA", "_FIRST", "_AXES", "SHAPES"}  # of parameters, places and names, in which numbers are no limits
+    tables |= {name for name in constants(path) if name.startswith("_STEPS")}
+    assert constants(path) - METHOD.get(path.stem, set()) - tables == set()
+
+
+@pytest.mark.parametrize("name", ["attribution", "close", "refit", "heterogeneity", "tail_probability"])
+def test_what_decides_compares_with_no_number_of_its_own(name: str) -> None:
+    tree = ast.parse((LOOP / f"{name}.py").read_text(encoding="utf-8"))
+    compared = {value for node in ast.walk(tree) if isinstance(node, ast.Compare) for value in numbers(node)}
+    assert compared <= PLAIN
+
+
+def test_the_hash_is_that_of_the_values() -> None:
+    assert Criteria().hash == CRITERIA.hash == CRITERIA.as_dict()["hash"]
+    assert replace(CRITERIA, enough=0.02).hash != CRITERIA.hash
+    assert replace(CRITERIA, never_second=()).hash != CRITERIA.hash
+
+
+def test_criteria_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        CRITERIA.level = 0.5  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@pytest.mark.parametrize("name", ["level", "usual", "tail"])
+def test_a_share_is_between_nothing_and_all(name: str) -> None:
+    with pytest.raises(UsageError, match="between 0 and 1"):
+        replace(CRITERIA, **{name: 1.0})
