@@ -60,7 +60,8 @@ def evaluate(
     """Judge trained networks on one side of a data set and write the table.
 
     MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
-    that comes with the package. Networks that were trained on a part of the sequences make the learning curve.
+    of flags that comes with the package, "shipped/NAME" for another. Networks that were trained on a part of the
+    sequences make the learning curve.
 
     \b
       flagdata evaluate wave sdn --at v1 --lake lake --out evaluation
@@ -121,8 +122,8 @@ class _Desk:
         rows = lake.rows(f"kind = '{Kind.NETWORK}'", at=self._at, columns=["artifact", "name"]).to_pylist()
         found: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
-            if name == "shipped":
-                found.append((None, estimator.shipped()))
+            if name == "shipped" or name.startswith("shipped/"):
+                found.append((None, estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)))
                 continue
             meant = [row["artifact"] for row in rows if row["name"] == name]
             meant = meant or [row["artifact"] for row in rows if len(name) >= 6 and row["artifact"].startswith(name)]

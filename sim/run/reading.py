@@ -9,8 +9,8 @@ member draws its own value.
                  [[x, y, z], …] (of a mesh); stiffness (of the handles), or rigid = true; evaluation = "arcsim" |
                  "corrected"; gravity
     [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML, or ArcSim JSON) or
-                 table (what such a TOML file holds); density, stretching-factor, bending-factor, damping:
-                 quantities; bending-factors: a quantity drawn for each of the 15 coefficients
+                 table (what such a TOML file holds); density, density-factor, stretching-factor,
+                 bending-factor, damping: quantities; bending-factors: a quantity drawn for each of the 15 coefficients
     [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
