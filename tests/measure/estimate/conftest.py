@@ -88,7 +88,7 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
     front_end = FrontEnd(maps="wave-maps", size=SIZE, frames=FRAMES, rate=RATE)
     cropping = Cropping(frames=FRAMES, size=SIZE)
     write_card(folder, {
-        "name": "small", "seed": 1, "front_end": asdict(front_end), "cropping": asdict(cropping),
+        "name": folder.name, "seed": 1, "front_end": asdict(front_end), "cropping": asdict(cropping),
         "recipe": {
             "network": {"name": "wave", "options": options},
             "loss": {"name": "posterior", "targets": list(targets), "components": 2, "margin": 1.0},
