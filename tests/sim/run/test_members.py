@@ -55,11 +55,12 @@ def test_a_density_factor_multiplies_each_materials_own_density(small: Callable)
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
     members = [crew.member(index) for index in range(200)]
     own = {"paper": 0.1, "gray-interlock": 0.187}  # kg/m², of the catalog's files
-    factors = np.array([float(m.parameters["density"]) / own[str(m.parameters["material"])] for m in members])
+    density = np.array([m.parameters["density"] for m in members], dtype=np.float64)
+    factors = density / [own[str(m.parameters["material"])] for m in members]
     assert factors.min() >= 0.7
     assert factors.max() <= 1.4
     assert abs(np.log(factors).mean() - np.log(0.7 * 1.4) / 2) < 4 * np.log(2) / np.sqrt(12 * 200)
-    np.testing.assert_allclose([m.scene.material.density for m in members], [m.parameters["density"] for m in members])
+    np.testing.assert_allclose([m.scene.material.density for m in members], density)
 
 
 def test_the_stable_step_is_looked_for_at_the_lightest_cloth(small: Callable) -> None:
