@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,7 +124,9 @@ class _Desk:
         found: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
-                found.append((None, estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)))
+                ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
+                # Under a name of its own: its seeds may be judged beside it.
+                found.append((None, replace(ours, name=f"{ours.name}, as shipped")))
                 continue
             meant = [row["artifact"] for row in rows if row["name"] == name]
             meant = meant or [row["artifact"] for row in rows if len(name) >= 6 and row["artifact"].startswith(name)]
