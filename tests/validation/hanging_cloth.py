@@ -77,6 +77,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for k in chosen
     ]  # fmt: skip
     result["targets_median_error"] = float(np.median(errors))
+    trivial = np.abs(_of(train, "density").mean() - truth)[chosen]
+    result["targets_always_the_mean_median_error"] = float(np.median(trivial))
     result["paper_median_error"] = float(np.median([abs(a - b) for a, b in PAPER]))
     _draw(out / "validate-hanging-cloth.png", truth, mean, low[:, weight], high[:, weight], chosen)
     return result
