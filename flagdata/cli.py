@@ -17,6 +17,10 @@ VERBS: dict[str, tuple[str, str]] = {
     "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
     "align": ("flagdata.commands.align:align", "Put a camera and an anemometer, or two anemometers, on one clock."),
     "declare": ("flagdata.commands.declare:declare", "State the constant wind of a film, as of a wind tunnel."),
+    "declare-cloths": (
+        "flagdata.commands.declare_cloths:declare_cloths",
+        "Ingest films of measured cloths, by a table.",
+    ),
     "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
     "simulate": ("sim.commands:simulate", "Simulate cloth in the wind: mesh sequences from a recipe or a scene."),
     "build": ("sim.datasets.command:build", "Build a data set: sequences, their films, ground truth and a card."),

@@ -23,7 +23,7 @@ from models.frontend import FrontEnd
 from models.learner import Learner, Loss, build
 from models.outliers import Familiarity
 from models.storage import WEIGHTS, read_card, read_tensors
-from models.targets import TARGETS, Target
+from models.targets import Cloth, Target
 
 SHIPPED = Path(__file__).parent / "shipped"
 """Models that come with the package, a folder each."""
@@ -87,7 +87,18 @@ class Estimator:
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        return tuple(TARGETS[name] for name in self.learners[0].scaling.names)
+        return self.learners[0].scaling.targets
+
+    @property
+    def cloth(self) -> Cloth:
+        """The kind of cloth that it judges.
+
+        Raises:
+            InputError: a model without targets, which has no ranges.
+        """
+        if not self.targets:
+            raise InputError(f"the model {self.name!r} tells nothing", fix="take one that was trained for targets")
+        return self.targets[0].cloth
 
     @property
     def device(self) -> torch.device:

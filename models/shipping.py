@@ -126,7 +126,7 @@ def _seedless(recipe: dict[str, Any]) -> dict[str, Any]:
 @click.option("--cache", type=click.Path(path_type=Path), help="Of prepared inputs; by default LAKE.inputs.")
 @click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Path) -> None:
-    """Make the model NAME, which comes with the package, of all seeds that its recipe was trained with in a lake."""
+    """Make a model that comes with the package of all seeds that the training recipe NAME has in a lake."""
     import flagdata
     from models.training.command import sides_of
     from models.training.inputs import prepare_clips, prepare_films
@@ -134,7 +134,7 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
 
     recipe = recipe_of(name)
     source = flagdata.open(lake_path)
-    rows = source.lake.rows(f"kind = 'network' and name = '{name}'", columns=["object", "recipe"]).to_pylist()
+    rows = source.lake.rows(f"kind = 'network' and name = '{recipe.name}'", columns=["object", "recipe"]).to_pylist()
     wanted = _seedless(recipe.identity())
     members = [
         source.lake.object_path(row["object"])
@@ -142,7 +142,7 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
         if _seedless(json.loads(row["recipe"])["recipe"]) == wanted
     ]
     if not members:
-        raise UsageError(f"no network {name!r} was trained by its recipe", where=str(lake_path), fix="train it")
+        raise UsageError(f"no network {recipe.name!r} was trained by its recipe", where=str(lake_path), fix="train it")
     folder = cache if cache is not None else Path(f"{str(lake_path).rstrip('/')}.inputs")
     workers = os.cpu_count() or 1
     train, validation = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
@@ -155,7 +155,7 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
         judged = prepare_clips(
             validation, recipe.front_end, recipe.cropping, folder=folder, workers=workers, advance=advance
         )
-    shipped = write(out / name, members, train=inputs, validation=judged, name=name)
+    shipped = write(out / recipe.name, members, train=inputs, validation=judged, name=recipe.name)
     say(f"{len(members)} networks, spread by {', '.join(f'{factor:.2f}' for factor in shipped.widening.tolist())}")
 
 

@@ -26,6 +26,7 @@ from flagdata.dataset.clips import clip_rows
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
 from flagdata.record.parent import open_parent
@@ -52,6 +53,7 @@ class Alignment:
         findings: what the catalog should know of it.
         details: numbers for the report (offset, interval, confidence, …), JSON.
         curve: the search that led to it, a JSON document attached to the record; `None` where nothing was searched.
+        parameters: what is known of the cloth, by the names that simulated recordings have, SI; the recipe has it too.
     """
 
     clock: ClockModel
@@ -59,6 +61,7 @@ class Alignment:
     findings: tuple[Finding, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
     curve: bytes | None = None
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,7 +235,7 @@ def make_recording(
     wind = _near(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
     with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
-        _write(staged, pair, alignment, frames, wind, progress=progress)
+        _write(staged, pair, alignment, wind, first=int(frames[0]), progress=progress)
         recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=chosen)
         transaction.add(replace(recording, branch=branch))
         clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=window)
@@ -269,9 +272,9 @@ def _write(
     path: Path,
     pair: Pair,
     alignment: Alignment,
-    frames: NDArray[np.int64],
     wind: WindSeries,
     *,
+    first: int,
     progress: Progress | None,
 ) -> None:
     source, clock = pair.camera_record, alignment.clock
@@ -281,27 +284,41 @@ def _write(
     }
     if CAMERA in source.metadata:
         metadata[CAMERA] = source.metadata[CAMERA]
-    device = source.device_frame_times
     with RecordWriter(path, metadata=metadata) as record:
-        for first in range(0, len(device), _FRAMES_AT_ONCE):
-            count = min(_FRAMES_AT_ONCE, len(device) - first)
-            exposed = clock.to_common(source.timestamps(first, count))
-            images = source.jpegs(first, count)
-            for index in range(first, first + count):
-                record.frame(
-                    log_time=int(frames[index]),
-                    publish_time=int(device[index]),
-                    timestamp=int(exposed[index - first]),
-                    image=images[index - first],
-                )
-                if progress:
-                    progress(1)
+        copy_frames(record, source, clock, progress=progress)
         record.wind(wind)
         if alignment.curve is not None:
-            record.attach(CURVE, alignment.curve, media_type="application/json", log_time=int(frames[0]))
+            record.attach(CURVE, alignment.curve, media_type="application/json", log_time=first)
         for name in pair.wind_record.attachments:
             media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
             record.attach(name, pair.wind_record.attachment(name), media_type=media_type, log_time=int(wind.time[0]))
+
+
+def copy_frames(
+    record: RecordWriter, source: Record, clock: ClockModel | None, *, progress: Progress | None = None
+) -> None:
+    """Copy all frames of a camera's record as JPEGs, their instants taken to the common clock.
+
+    Args:
+        clock: of the camera on the common clock; `None` where its own is all there is.
+        progress: called with 1 for each frame copied.
+    """
+    device = source.device_frame_times
+    common = device if clock is None else clock.to_common(device)
+    for first in range(0, len(device), _FRAMES_AT_ONCE):
+        count = min(_FRAMES_AT_ONCE, len(device) - first)
+        stamps = source.timestamps(first, count)
+        exposed = stamps if clock is None else clock.to_common(stamps)
+        images = source.jpegs(first, count)
+        for index in range(first, first + count):
+            record.frame(
+                log_time=int(common[index]),
+                publish_time=int(device[index]),
+                timestamp=int(exposed[index - first]),
+                image=images[index - first],
+            )
+            if progress:
+                progress(1)
 
 
 def _artifact(
@@ -340,6 +357,7 @@ def _artifact(
         clock_drift=clock.segments[0].drift,
         clock_sigma=float(clock.sigma(middle)),
         clock_model=clock.to_json(),
+        parameters=canonical(dict(alignment.parameters)) if alignment.parameters else None,
         quality=sorted({*pair.camera.quality, *pair.wind.quality, *own}),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )

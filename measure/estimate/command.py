@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("source", required=False, metavar="[SOURCE]")
 @click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
-@click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0.")
+@click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0; "
+              "of a hanging cloth its width and height.")  # fmt: skip
 @click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
               help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
 @click.option("--crop", metavar="X,Y,W,H", help="Region of the flag [px]; by default the largest centred square.")
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
               help="Of the intervals.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of all draws.")
-@click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default the shipped one.")
+@click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default wave, of flags.")
 @click.option("--refine", type=click.IntRange(min=28), metavar="N",
               help="Refine the first window by N simulated clips, 28 or more; 50 take minutes.")  # fmt: skip
 @click.option("--cache", type=click.Path(path_type=Path), metavar="FOLDER",

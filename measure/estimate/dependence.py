@@ -109,8 +109,8 @@ def errors(model: Estimator, pairs: Pairs, *, seed: int = 0, advance: Callable[[
     parameters = {str(name): table.parameters[chosen, k] for k, name in enumerate(table.names)}
     known = scaling.learned(torch.from_numpy(truth(parameters, scaling.names))).double().numpy()
     centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
-    found = errors_of((draws - centre) / spread, (known - centre) / spread, scaling.names)
-    return Errors(names=tuple(scaling.names), first=found[:, 0], last=found[:, 1])
+    found = errors_of((draws - centre) / spread, (known - centre) / spread, scaling.quantities)
+    return Errors(names=scaling.quantities, first=found[:, 0], last=found[:, 1])
 
 
 def errors_of(draws: NDArray[np.float64], truth: NDArray[np.float64], names: Sequence[str]) -> NDArray[np.float64]:

@@ -18,11 +18,10 @@ from measure.estimate.answer import Quantity, quantities, sentence
 from measure.estimate.combine import OWN, Dependence, combined
 from measure.estimate.film import Film
 from measure.estimate.gate import Gate, Reason, Verdict, verdict
-from measure.estimate.similarity import POWERS, FlagSize, Sizes, scaled_back, sizes, spacing
+from measure.estimate.similarity import POWERS, TRAINED, FlagSize, Sizes, scaled_back, sizes, spacing
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
 from models.estimator import Estimator
 from models.learner import Loss
-from models.targets import TARGETS
 
 DRAWS = 400
 """Of each window's posterior, for each size of flag."""
@@ -180,7 +179,7 @@ def measure(
         )  # fmt: skip
     considered = sizes(
         options.size, rate=film.rate, frames_rate=model.front_end.rate, draws=DRAWS,
-        generator=stream(options.seed, "sizes"),
+        generator=stream(options.seed, "sizes"), trained=TRAINED[model.cloth],
     )  # fmt: skip
     layout = lay_out(
         frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
@@ -278,7 +277,7 @@ class _Answer:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(self.model.learners[0].scaling.names)
+        return self.model.learners[0].scaling.quantities
 
     def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> NDArray[np.float64]:
         """(n, target) draws of all windows together."""
@@ -323,7 +322,7 @@ class _Answer:
     @cached_property
     def assumed(self) -> NDArray[np.float64]:
         """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
-        ends = np.array([[TARGETS[name].low for name in self.names], [TARGETS[name].high for name in self.names]])
+        ends = np.array([[t.low for t in self.model.targets], [t.high for t in self.model.targets]])
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
         low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
         even = np.array([name in POWERS for name in self.names])[:, None]

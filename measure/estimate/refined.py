@@ -18,6 +18,7 @@ from measure.estimate.source import Subject
 from measure.refine.command import Clip, run
 from measure.refine.refinement import Interval, Refinement
 from models.estimator import Estimator
+from models.targets import Cloth
 
 
 def refined(
@@ -31,13 +32,18 @@ def refined(
         cache: folder for evaluations, so that an interrupted run goes on; None for none.
 
     Raises:
-        UsageError: the flag's size is not known.
+        UsageError: the flag's size is not known, or the model is of no flags.
         InputError: a budget that is too small, see `measure.refine.procedure.refine`.
     """
     if measured.sizes.given is None:
         raise UsageError(
             "a refinement simulates the flag, whose size is not known", where=measured.film,
             fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
+        )  # fmt: skip
+    if model.cloth is not Cloth.FLAG:
+        raise UsageError(
+            f"the model {model.name!r} is of {model.cloth.value}, refinement simulates flags", where="--refine",
+            fix="leave --refine out, or name a model of flags",
         )  # fmt: skip
     clip = Clip(name=measured.film, frames=measured.clip, recording=None if cropped else subject.artifact)
     options = measured.options

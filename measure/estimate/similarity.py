@@ -35,11 +35,29 @@ from scipy.special import ndtr, ndtri
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
+from models.targets import Cloth
 
-TRAINED_LENGTH = 1.5
-"""Length of the flags that the models are trained on, along the wind [m]."""
-TRAINED_ASPECT = 1.5
-"""Their length over their height."""
+
+@dataclass(frozen=True, kw_only=True)
+class Trained:
+    """The cloths that a model is trained on: all of one size and shape.
+
+    Attributes:
+        noun: what they are called.
+        length: of a flag along the wind, of a hanging cloth along the edge that is held [m].
+        aspect: length over height.
+    """
+
+    noun: str
+    length: float
+    aspect: float
+
+
+TRAINED = {
+    Cloth.FLAG: Trained(noun="flag", length=1.5, aspect=1.5),
+    Cloth.HANGING: Trained(noun="cloth", length=1.0, aspect=1.0),
+}
+FLAG = TRAINED[Cloth.FLAG]
 _SHORTEST, _LONGEST = 0.1, 20.0  # m
 _ASPECT_SLACK = 0.05  # relative; printed sizes are rounded
 _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:m)?\s*")
@@ -52,7 +70,7 @@ LOGARITHMS: dict[str, float] = {"bending_scale": 4.0, "anisotropy": 0.0}
 
 @dataclass(frozen=True, kw_only=True)
 class FlagSize:
-    """Length along the wind and height along the pole [m].
+    """Length along the wind and height along the pole [m]; of a hanging cloth its width and height.
 
     Raises:
         UsageError: a size that no flag has.
@@ -68,21 +86,21 @@ class FlagSize:
                 fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as in 1.5x1.0",
             )  # fmt: skip
 
-    @property
-    def scale(self) -> float:
-        """s, the length in lengths of the flags that models are trained on."""
-        return self.length / TRAINED_LENGTH
+    def scale(self, trained: Trained = FLAG) -> float:
+        """s, the length in lengths of the cloths that the model is trained on."""
+        return self.length / trained.length
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self, trained: Trained = FLAG) -> tuple[Finding, ...]:
         """What is to be said of its shape."""
         aspect = self.length / self.height
-        if abs(aspect / TRAINED_ASPECT - 1) <= _ASPECT_SLACK:
+        if abs(aspect / trained.aspect - 1) <= _ASPECT_SLACK:
             return ()
         return (
             Finding(
                 kind="aspect-ratio", severity=Severity.WARNING, value=aspect,
-                what=f"the flag is {aspect:.2f} times as long as it is high, those of the training 1.50 times: "
-                "similarity holds for flags of one shape, so that intervals may be too narrow",
+                what=f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
+                f"{trained.aspect:.2f} times: similarity holds for cloths of one shape, so that intervals may be too "
+                "narrow",
             ),
         )  # fmt: skip
 
@@ -105,9 +123,9 @@ def parse_size(text: str) -> FlagSize:
 class SizePrior:
     """What is assumed of a flag's length where nobody states it: a log-normal distribution.
 
-    The median is the 1.5 m × 1.0 m (5 ft × 3 ft) flag, the most common size on house and club poles; a factor of 1.3
-    for one standard deviation puts 90 % of the flags between 0.97 m and 2.31 m. It is a choice of this project, not a
-    measured distribution.
+    A flag's median is the 1.5 m × 1.0 m (5 ft × 3 ft) flag, the most common size on house and club poles; a factor of
+    1.3 for one standard deviation puts 90 % of the flags between 0.97 m and 2.31 m. It is a choice of this project, not
+    a measured distribution.
 
     Attributes:
         median: [m].
@@ -154,7 +172,7 @@ class Sizes:
 
 def sizes(
     given: FlagSize | None, *, rate: float, frames_rate: float, draws: int, generator: np.random.Generator,
-    prior: SizePrior | None = None,
+    prior: SizePrior | None = None, trained: Trained = FLAG,
 ) -> Sizes:  # fmt: skip
     """The lengths to consider for a film.
 
@@ -168,29 +186,33 @@ def sizes(
         frames_rate: of the model's frames [Hz].
         draws: for each stratum.
         generator: for the lengths within the strata.
-        prior: of the length; by default `SizePrior()`.
+        prior: of the length; by default about the length of those of the training.
+        trained: the cloths that the model is trained on.
 
     Raises:
         InputError: the film is too slow for the flag's size, or for half of what is likely where that is unknown.
     """
-    prior = prior if prior is not None else SizePrior()
+    prior = prior if prior is not None else SizePrior(median=trained.length)
     if given is not None:
-        needed = frames_rate / math.sqrt(given.scale)
+        own = given.scale(trained)
+        needed = frames_rate / math.sqrt(own)
         if rate < RATE_SLACK * needed:
             raise InputError(
-                f"the film has {rate:.4g} frames a second, a flag of {given.length:g} m needs {needed:.4g}",
+                f"the film has {rate:.4g} frames a second, a {trained.noun} of {given.length:g} m needs {needed:.4g}",
                 where="frame rate", fix=f"film at {RATE_SLACK * needed:.3g} frames a second or more",
             )  # fmt: skip
-        scale = np.array([given.scale])
-        return Sizes(given=given, scale=scale, draws=np.full((1, draws), given.scale), findings=given.findings())
-    least = TRAINED_LENGTH * (RATE_SLACK * frames_rate / rate) ** 2
+        return Sizes(
+            given=given, scale=np.array([own]), draws=np.full((1, draws), own), findings=given.findings(trained)
+        )
+    least = trained.length * (RATE_SLACK * frames_rate / rate) ** 2
     admitted = prior.share_above(least)
     if admitted < LEAST_SHARE:
-        enough = RATE_SLACK * frames_rate * math.sqrt(TRAINED_LENGTH / prior.median)
+        enough = RATE_SLACK * frames_rate * math.sqrt(trained.length / prior.median)
         raise InputError(
-            f"the film has {rate:.4g} frames a second, too few for flags shorter than {least:.2f} m, and the flag's "
-            "size was not given",
-            where="frame rate", fix=f"give --flag-size if the flag is larger, or film at {enough:.3g} Hz or more",
+            f"the film has {rate:.4g} frames a second, too few for a {trained.noun} shorter than {least:.2f} m, and "
+            "its size was not given",
+            where="frame rate",
+            fix=f"give --flag-size if the {trained.noun} is larger, or film at {enough:.3g} Hz or more",
         )  # fmt: skip
     below = 1 - admitted
     edges = below + admitted * np.arange(STRATA + 1) / STRATA
@@ -200,8 +222,8 @@ def sizes(
     found = [
         Finding(
             kind="size-assumed", severity=Severity.WARNING, value=prior.median,
-            what=f"the flag's size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken as possible "
-            "and widen the intervals",
+            what=f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken "
+            "as possible and widen the intervals",
             fix="give --flag-size LENGTHxHEIGHT",
         )
     ]  # fmt: skip
@@ -209,13 +231,13 @@ def sizes(
         found.append(
             Finding(
                 kind="small-sizes-left-out", severity=Severity.WARNING, value=below,
-                what=f"at {rate:.4g} frames a second flags shorter than {least:.2f} m cannot be judged; {below:.0%} of "
-                "what was assumed of the size was left out",
+                what=f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot be judged; "
+                f"{below:.0%} of what was assumed of the size was left out",
                 fix="give --flag-size, or film faster",
             )
         )  # fmt: skip
     return Sizes(
-        given=None, scale=prior.quantile(middles) / TRAINED_LENGTH, draws=prior.quantile(within) / TRAINED_LENGTH,
+        given=None, scale=prior.quantile(middles) / trained.length, draws=prior.quantile(within) / trained.length,
         findings=tuple(found),
     )  # fmt: skip
 

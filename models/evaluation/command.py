@@ -61,7 +61,8 @@ def evaluate(
     """Judge trained networks on one side of a data set and write the table.
 
     MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
-    that comes with the package. Networks that were trained on a part of the sequences make the learning curve.
+    of flags that comes with the package, "shipped/NAME" for another. Networks that were trained on a part of the
+    sequences make the learning curve.
 
     \b
       flagdata evaluate wave sdn --at v1 --lake lake --out evaluation
@@ -122,9 +123,9 @@ class _Desk:
         rows = lake.rows(f"kind = '{Kind.NETWORK}'", at=self._at, columns=["artifact", "name"]).to_pylist()
         found: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
-            if name == "shipped":
-                ours = estimator.shipped()  # under a name of its own: its seeds may be judged beside it
-                found.append((None, replace(ours, name=f"{ours.name}, as shipped")))
+            if name == "shipped" or name.startswith("shipped/"):
+                ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
+                found.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
                 continue
             meant = [row["artifact"] for row in rows if row["name"] == name]
             meant = meant or [row["artifact"] for row in rows if len(name) >= 6 and row["artifact"].startswith(name)]

@@ -37,15 +37,15 @@ def predict(
     """
     learner = estimator.learners[0]
     if learner.objective is Loss.CONTRASTIVE:
-        targets = READ_FROM
+        targets = names = READ_FROM
         embedding = embedded(learner, prepared)
         mean = _read(embedding, prepared, fitted_on if fitted_on is not None else prepared, learner, targets)
         samples = None
     else:
-        targets = learner.scaling.names
+        targets, names = learner.scaling.quantities, learner.scaling.names
         samples, mean, embedding = _told(estimator, prepared, seed=seed)
     return Predictions(
-        label=label, targets=targets, truth=prepared.truth(targets), mean=mean, samples=samples, embedding=embedding,
+        label=label, targets=targets, truth=prepared.truth(names), mean=mean, samples=samples, embedding=embedding,
         group=prepared.sequence,
         parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
         milliseconds=milliseconds, note=note,

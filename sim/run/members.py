@@ -112,7 +112,8 @@ class Crew:
         each = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
         material = _material(
             base,
-            density=drawn(_of(spec.density, base.density), "material", "density"),
+            density=drawn(_of(spec.density, base.density), "material", "density")
+            * drawn(spec.density_factor, "material", "density-factor"),
             stretching=drawn(spec.stretching, "material", "stretching-factor"),
             bending=drawn(spec.bending, "material", "bending-factor") * each,
             damping=drawn(_of(spec.damping, base.damping), "material", "damping"),
@@ -159,7 +160,7 @@ class Crew:
         for end in (0, 1):
             material = _material(
                 base,
-                density=ends(_of(spec.density, base.density))[0],
+                density=ends(_of(spec.density, base.density))[0] * ends(spec.density_factor)[0],
                 damping=ends(_of(spec.damping, base.damping))[1],
                 stretching=ends(spec.stretching)[1],
                 bending=stiffest,

@@ -9,8 +9,8 @@ member draws its own value.
                  [[x, y, z], …] (of a mesh); stiffness (of the handles), or rigid = true; evaluation = "arcsim" |
                  "corrected"; gravity
     [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML, or ArcSim JSON) or
-                 table (what such a TOML file holds); density, stretching-factor, bending-factor, damping:
-                 quantities; bending-factors: a quantity drawn for each of the 15 coefficients
+                 table (what such a TOML file holds); density, density-factor, stretching-factor,
+                 bending-factor, damping: quantities; bending-factors: a quantity drawn for each of the 15 coefficients
     [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
@@ -205,6 +205,7 @@ def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
     spec = MaterialSpec(
         bases=bases,
         density=table.quantity("density", bases[0].density, above=0.0) if "density" in table else None,
+        density_factor=table.quantity("density-factor", 1.0, above=0.0),
         stretching=table.quantity("stretching-factor", 1.0, above=0.0),
         bending=table.quantity("bending-factor", 1.0, least=0.0),
         bending_each=table.quantity("bending-factors", 1.0, least=0.0),

@@ -121,6 +121,7 @@ class MaterialSpec:
     Attributes:
         bases: the materials, of which each member draws one.
         density: [kg/m²]; None for the base's.
+        density_factor: factor on it.
         stretching: factor on its table.
         bending: factor on its table.
         bending_each: factor drawn for each of the 15 coefficients on its own.
@@ -129,6 +130,7 @@ class MaterialSpec:
 
     bases: tuple[Material, ...]
     density: Quantity | None = None
+    density_factor: Quantity = 1.0
     stretching: Quantity = 1.0
     bending: Quantity = 1.0
     bending_each: Quantity = 1.0
@@ -266,7 +268,7 @@ class Recipe:
                 "bases": [_base(base) for base in material.bases], "density": plain(material.density),
                 "stretching_factor": plain(material.stretching), "bending_factor": plain(material.bending),
                 "bending_factors": plain(material.bending_each),
-                "damping": plain(material.damping),
+                "damping": plain(material.damping), **_weighed(material),
             },
             "wind": {
                 "speed": plain(wind.speed), "toward": plain(wind.toward), "vertical": wind.vertical,
@@ -294,6 +296,11 @@ def _held(scene: SceneSpec) -> dict[str, Any]:
     if scene.stiffness == ARCSIM_STIFFNESS:
         return {}
     return {"stiffness": "rigid" if math.isinf(scene.stiffness) else scene.stiffness}
+
+
+def _weighed(material: MaterialSpec) -> dict[str, Any]:
+    """The factor on the density, where there is one."""
+    return {} if material.density_factor == 1.0 else {"density_factor": plain(material.density_factor)}
 
 
 def _base(base: Material) -> dict[str, Any]:

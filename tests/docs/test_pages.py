@@ -7,7 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import av
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from flagdata.lake import Lake
 from flagdata.rng import stream
@@ -19,7 +21,7 @@ from tests.models.conftest import fill
 OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
 """Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the inference."""
 AFTER_START = ("alignment.md", "measure.md", "versions-and-recovery.md", "exports.md")
-ALONE = ("sensors.md", "simulator.md", "models.md")
+ALONE = ("sensors.md", "simulator.md", "models.md", "datasets.md")
 RECIPE = FieldRecipe(seed=2026, duration=150, frame_rate=25)
 
 
@@ -28,13 +30,18 @@ def write_small_field(folder: Path, recipe: FieldRecipe) -> None:
     wind, at_frames, offset = film(recipe)
     write_log(folder / "anemometer.csv", recipe, wind, offset)
     (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
+    write_flag(folder / "flag.mp4", at_frames, recipe)
+
+
+def write_flag(path: Path, winds: NDArray[np.float64], recipe: FieldRecipe) -> None:
+    """A film of a drawn flag in the winds (n,) of its frames [m/s]."""
     flag = DrawnFlag(width=200, height=150, length=95)
-    with av.open(str(folder / "flag.mp4"), "w") as container:
+    with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = START.isoformat()
         video = container.add_stream("libx264", rate=recipe.frame_rate, options={"preset": "ultrafast", "crf": "23"})
         video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
         video.codec_context.time_base = Fraction(1, recipe.frame_rate)
-        drawn = flag.frames(at_frames, recipe.frame_rate, stream(recipe.seed, "camera"))
+        drawn = flag.frames(winds, recipe.frame_rate, stream(recipe.seed, "camera"))
         for number, image in enumerate(drawn):
             frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
             frame.pts = number
@@ -105,6 +112,10 @@ def test_every_command_of_a_page_that_stands_alone_runs(
         lake = Lake.create(tmp_path / "lake")
         fill(lake, "flags")
         lake.tag("v1")
+    if page == "datasets.md":
+        Lake.create(tmp_path / "lake")
+        for number, row in enumerate(files(page)["fabrics.csv"].splitlines()[1:]):
+            write_flag(tmp_path / row.split(",")[0], np.full(35, 3.0 + number), RECIPE)
     assert any(run_page(page))
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import torch
 
 from flagdata.errors import InputError, UnknownNameError
-from models.targets import TARGETS, Scaling, truth
+from flagdata.tables import ends
+from models.targets import TARGETS, Cloth, Scaling, truth
 
 NAMES = ("wind_speed", "density", "bending_scale", "anisotropy")
 
@@ -21,7 +24,7 @@ def test_bending_is_summed_up_by_its_mean_logarithm_and_by_warp_over_weft() -> N
 
 
 def test_logits_come_back_within_the_range_and_at_its_ends() -> None:
-    values = torch.tensor([[0.0, 0.10, -5.0, -1.8], [10.0, 0.17, -4.0, 1.8], [5.0, 0.135, -4.5, 0.0]])
+    values = torch.tensor([[0.0, 0.10, -4.6, -1.8], [10.0, 0.17, -3.25, 1.8], [5.0, 0.135, -3.925, 0.0]])
     scaling = Scaling(names=NAMES)
     assert scaling.learned(values).isfinite().all()
     torch.testing.assert_close(scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-4)
@@ -51,3 +54,49 @@ def test_clips_that_do_not_state_a_parameter_are_an_error_that_names_it() -> Non
 def test_the_papers_ranges_are_the_papers() -> None:
     assert (TARGETS["wind_speed"].low, TARGETS["wind_speed"].high) == (0.0, 10.0)
     assert (TARGETS["density"].low, TARGETS["density"].high) == (0.10, 0.17)
+
+
+CLOTH = ("cloth_wind", "cloth_density", "cloth_bending")
+
+
+def test_a_quantity_has_one_name_whatever_cloth_it_is_of() -> None:
+    hanging = Scaling(names=CLOTH)
+    assert hanging.quantities == Scaling(names=NAMES[:3]).quantities == NAMES[:3]
+    assert {target.cloth for target in hanging.targets} == {Cloth.HANGING}
+    assert [target.unit for target in hanging.targets] == [TARGETS[name].unit for name in NAMES[:3]]
+
+
+def test_the_truth_of_hanging_cloth_is_read_from_the_same_parameters() -> None:
+    parameters = {f"bending.{index}": np.array([1e-4]) for index in range(15)}
+    parameters |= {"wind_speed": np.array([3.0]), "density": np.array([0.3])}
+    assert truth(parameters, CLOTH)[0] == pytest.approx([3.0, 0.3, -4.0])
+
+
+def test_no_weight_of_hanging_cloth_is_cut_to_the_range_of_flags() -> None:
+    scaling = Scaling(names=("cloth_density",))
+    values = torch.tensor([[0.08], [0.30], [0.45]])
+    torch.testing.assert_close(scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("names", [("wind_speed", "cloth_density"), ("density", "density")])
+def test_targets_of_two_kinds_of_cloth_or_named_twice_are_refused(names: tuple[str, ...]) -> None:
+    with pytest.raises(InputError, match=names[1]):
+        Scaling(names=names)
+
+
+def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
+    """Ends of the factors times the tables of the ten materials, in log10 for the 15 bending coefficients."""
+    from sim.run.reading import load
+
+    scene = load("hanging-cloth-wide")
+    spec = scene.material
+    density = [base.density * factor for base in spec.bases for factor in ends(spec.density_factor)]
+    own = [float(np.log10(base.bending).mean()) for base in spec.bases]
+    bending = [scale + math.log10(factor) for scale in own for factor in ends(spec.bending)]
+    for name, drawn in (
+        ("cloth_wind", ends(scene.wind.speed)), ("cloth_density", density), ("cloth_bending", bending),
+    ):  # fmt: skip
+        target = TARGETS[name]
+        assert target.low <= min(drawn)
+        assert max(drawn) <= target.high
+        assert (max(drawn) - min(drawn)) / (target.high - target.low) > 0.9  # and hardly more than that

@@ -14,6 +14,7 @@ VALIDATIONS = {
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
     "gate": "tests.validation.gate",
+    "hanging-cloth": "tests.validation.hanging_cloth",
     "measure-windows": "tests.validation.measure_windows",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",

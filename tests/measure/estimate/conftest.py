@@ -76,18 +76,22 @@ def even(count: int, *, rate: float = RATE, seed: int = 3) -> Pictures:
 @pytest.fixture(scope="session")
 def model_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The model as a folder, familiar with clips of `pictures`."""
-    folder = tmp_path_factory.mktemp("estimate") / "small"
+    return written(tmp_path_factory.mktemp("estimate") / "small", TARGETS)
+
+
+def written(folder: Path, targets: tuple[str, ...]) -> Path:
+    """A model of these targets, its weights as they were drawn."""
     folder.mkdir()
     options = {"dimension": 4, "widths": (6, 6, 6)}
     with torch_draws(1, "weights"):
-        learner = Learner(WaveNetwork(**options), loss=Loss.POSTERIOR, targets=TARGETS, components=2).eval()  # type: ignore[arg-type]
+        learner = Learner(WaveNetwork(**options), loss=Loss.POSTERIOR, targets=targets, components=2).eval()  # type: ignore[arg-type]
     front_end = FrontEnd(maps="wave-maps", size=SIZE, frames=FRAMES, rate=RATE)
     cropping = Cropping(frames=FRAMES, size=SIZE)
     write_card(folder, {
-        "name": "small", "seed": 1, "front_end": asdict(front_end), "cropping": asdict(cropping),
+        "name": folder.name, "seed": 1, "front_end": asdict(front_end), "cropping": asdict(cropping),
         "recipe": {
             "network": {"name": "wave", "options": options},
-            "loss": {"name": "posterior", "targets": list(TARGETS), "components": 2, "margin": 1.0},
+            "loss": {"name": "posterior", "targets": list(targets), "components": 2, "margin": 1.0},
             "data": {"dataset": "made", "sequences": None},
         },
     })  # fmt: skip
@@ -104,6 +108,17 @@ def model_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def model(model_folder: Path) -> Estimator:
     return estimator.load(model_folder)
+
+
+@pytest.fixture(scope="session")
+def cloth_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model of hanging cloth as a folder."""
+    return written(tmp_path_factory.mktemp("cloth") / "small-cloth", ("cloth_wind", "cloth_density", "cloth_bending"))
+
+
+@pytest.fixture(scope="session")
+def cloth_model(cloth_folder: Path) -> Estimator:
+    return estimator.load(cloth_folder)
 
 
 def write_video(path: Path, images: NDArray[np.uint8], *, rate: int = 25) -> Path:

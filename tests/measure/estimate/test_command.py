@@ -270,3 +270,14 @@ def test_a_text_file_is_no_film(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("no film")
     assert "fix:" in run(path, code=1).stderr
+
+
+def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: Path) -> None:
+    found = answer(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway")
+    assert set(found["quantities"]) == {"wind_speed", "density", "bending_scale"}  # type: ignore[call-overload]
+    assert found["model"] == "small-cloth"
+
+
+def test_a_hanging_cloth_is_not_refined_by_simulating_flags(film: Path, cloth_folder: Path) -> None:
+    said = run(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway", "--refine", "28", "--json", code=2)
+    assert "hanging-cloth" in said.stdout + said.stderr

@@ -125,3 +125,22 @@ def test_a_model_without_distributions_measures_nothing(model: Estimator) -> Non
     regression = type(learner)(learner.network, loss=Loss.REGRESSION, targets=tuple(learner.scaling.names))
     with pytest.raises(UsageError, match="without intervals"):
         measured(even(2 * FRAMES), replace(model, learners=(regression,)))
+
+
+def test_a_hanging_cloth_is_measured_in_its_own_ranges_and_size(cloth_model: Estimator) -> None:
+    """1 m × 1 m is the size of its training: what the model says needs no scaling, and what is assumed is its range."""
+    found = measured(even(3 * FRAMES), cloth_model, size=FlagSize(length=1.0, height=1.0))
+    assert found.names == ("wind_speed", "density", "bending_scale")
+    assert found.sizes.scale == pytest.approx([1.0])
+    assert "aspect-ratio" not in {finding.kind for finding in found.findings}
+    wind, density = found.quantities[:2]
+    assert wind.assumed == pytest.approx((0.0, 6.0))
+    assert density.assumed == pytest.approx((0.079, 0.454))
+    assert found.sentence.startswith(("wind", "area weight"))
+
+
+def test_an_unknown_size_of_a_hanging_cloth_is_about_that_of_its_training(cloth_model: Estimator) -> None:
+    found = measured(even(8 * FRAMES, rate=50.0), cloth_model, size=None)
+    assert np.median(found.sizes.draws) == pytest.approx(1.0, abs=0.05)
+    (assumed,) = [finding for finding in found.findings if finding.kind == "size-assumed"]
+    assert "the cloth's size" in assumed.what

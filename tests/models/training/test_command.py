@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +18,13 @@ from flagdata.errors import CorruptError, InputError, NotFoundError, RefusedErro
 from flagdata.lake import Lake
 from models import estimator, shipping
 from models.storage import WEIGHTS, read_card
+from models.targets import Cloth
 from models.training.command import sides_of
 from models.training.inputs import prepare_clips, prepare_films
 from models.training.recipe import TRAININGS, load, parse
 
 
-def run(*arguments: str) -> dict[str, object]:
+def run(*arguments: str) -> dict[str, Any]:
     done = CliRunner().invoke(root, [*arguments, "--json"], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     return json.loads(done.stdout)
@@ -100,6 +102,29 @@ def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(lake: 
     assert odd.max() <= found.unlike.max()
     with pytest.raises(InputError, match="12"):
         shipped.inputs(clips[:, :11])
+
+
+def test_a_model_of_hanging_cloth_tells_the_same_quantities_in_its_own_ranges(
+    lake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Trained, shipped and judged by the commands that are there for flags."""
+    from tests.models.conftest import RECIPE
+
+    path = tmp_path / "small-cloth.toml"
+    path.write_text(RECIPE.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
+    trained = run("train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main")
+    options = ["--lake", str(lake), "--at", "v1", "--out", str(tmp_path / "shipped")]
+    done = CliRunner().invoke(shipping.main, [str(path), *options], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    monkeypatch.setattr(estimator, "SHIPPED", tmp_path / "shipped")
+    model = estimator.shipped("small-cloth")
+    assert trained["name"] == model.name == "small-cloth"
+    assert model.cloth is Cloth.HANGING
+    assert [(target.name, target.high) for target in model.targets] == [("wind_speed", 6.0), ("density", 0.454)]
+    found = run(
+        "evaluate", "shipped/small-cloth", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path / "page")
+    )
+    assert {row["target"] for row in found["targets"]} == {"wind_speed", "density"}
 
 
 def test_a_model_that_was_cut_off_is_an_error_with_its_place(lake: Path, tmp_path: Path) -> None:

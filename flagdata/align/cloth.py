@@ -1,0 +1,117 @@
+"""A film of a cloth whose material was measured by itself: a recording whose clips know the cloth, and maybe the wind.
+
+Where a steady wind is known to an uncertainty it is declared, as `flagdata.align.constant` has it. Where nobody knows
+it the recording has frames alone, on the camera's clock, and its clips bear the quality flag "wind-missing".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from flagdata.align.constant import ConstantWind, declared_wind
+from flagdata.align.declared import by_stamps
+from flagdata.align.present import find_made, provenance
+from flagdata.align.recording import Alignment, Pair, RecordingResult, copy_frames, make_recording
+from flagdata.dataset.clips import clip_rows
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.ingest.cloths import ClothFilm
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical
+from flagdata.record import Record, RecordWriter
+from flagdata.record.metadata import CAMERA, PROVENANCE
+from flagdata.record.parent import open_parent
+from flagdata.schema import TRUTH_WINDOW, Kind
+from flagdata.timebase import NANOSECONDS, iso
+
+REPORT_SCHEMA = "flagdata.cloth-report/1"
+SAME_CLOCK = 1e-3
+"""σ of a film's clock on a declared wind's [s]: they are one clock, and the model asks for a σ above 0."""
+Progress = Callable[[int], object]
+
+
+def cloth_recording(
+    lake: Lake, camera: Artifact, cloth: ClothFilm, *, branch: str = "main", progress: Progress | None = None
+) -> RecordingResult:
+    """The recording of a film of a measured cloth and its clips; what is there where it is there.
+
+    Args:
+        camera: the film, ingested.
+        cloth: what is known of it; the recording's session is its fabric.
+        progress: called with 1 for each frame copied.
+
+    Raises:
+        UsageError: `camera` is no camera artifact.
+        ConflictError: the recording is there under another name or session.
+    """
+    if camera.kind is not Kind.CAMERA or camera.object is None:
+        raise UsageError(
+            f"{camera.name!r} is a {camera.kind}, not a camera", where=camera.id,
+            fix="name a camera artifact; see flagdata ls",
+        )  # fmt: skip
+    stated = Finding(
+        kind="cloth-declared", severity=Severity.NOTE, value=cloth.density,
+        what=f"the cloth is {cloth.fabric}, of {cloth.density:g} kg/m²: measured by itself, as the table says",
+    )  # fmt: skip
+    if cloth.wind is None:
+        return _without_wind(lake, camera, cloth, stated, branch=branch, progress=progress)
+    wind = ConstantWind(speed=cloth.wind[0], sigma=cloth.wind[1])
+    series = declared_wind(lake, camera, wind, session=cloth.fabric, branch=branch)
+    pair = Pair.of(lake, camera.id, series.id, at=branch)
+    start, end = pair.span
+    clock = by_stamps(camera.name, series.name, start=start, end=end, sigma=SAME_CLOCK)
+    alignment = Alignment(
+        clock=clock, recipe={**wind.recipe(), **_recipe(cloth)}, findings=(stated,), parameters=cloth.parameters,
+        details={"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0},
+    )  # fmt: skip
+    return make_recording(
+        lake, pair, alignment, name=camera.name, session=cloth.fabric, branch=branch, progress=progress
+    )
+
+
+def _recipe(cloth: ClothFilm) -> dict[str, Any]:
+    return {"cloth": cloth.parameters}
+
+
+def _without_wind(
+    lake: Lake, camera: Artifact, cloth: ClothFilm, stated: Finding, *, branch: str, progress: Progress | None
+) -> RecordingResult:
+    recipe, parents = _recipe(cloth), {"camera": camera}
+    there = find_made(
+        lake, Kind.RECORDING, parents, recipe, what="recording", name=camera.name, session=cloth.fabric, branch=branch
+    )
+    if there is not None:
+        rows = lake.rows(f"kind = 'clip' and recording = '{there.id}'", at=branch, columns=["artifact"])
+        return RecordingResult(recording=there, clips=tuple(rows["artifact"].to_pylist()), created=False)
+    source = open_parent(lake, str(camera.object))
+    times = source.device_frame_times
+    start, end = int(times[0]), int(times[-1])
+    metadata = {PROVENANCE: provenance(parents, recipe)}
+    if CAMERA in source.metadata:
+        metadata[CAMERA] = dict(source.metadata[CAMERA])
+    report = {
+        "schema": REPORT_SCHEMA, "kind": Kind.RECORDING.value, "frames": len(times), "start": iso(start),
+        "end": iso(end), "findings": [stated.as_dict()],
+    }  # fmt: skip
+    with lake.transaction(f"declare the cloth of {camera.name}", branch=branch) as transaction:
+        staged = transaction.staging(".mcap")
+        with RecordWriter(staged, metadata=metadata) as record:
+            copy_frames(record, source, None, progress=progress)
+        recording = Artifact(
+            kind=Kind.RECORDING, name=camera.name, object=transaction.put(staged), parents=(camera.id,), recipe=recipe,
+            session=cloth.fabric, day=iso(start)[:10], start=start, end=end, frame_count=len(times),
+            rate=(len(times) - 1) * NANOSECONDS / (end - start) if end > start else None,
+            parameters=canonical(cloth.parameters), quality=sorted({*camera.quality, *quality_flags((stated,))}),
+            report=json.dumps(report, allow_nan=False, ensure_ascii=False), branch=branch,
+        )  # fmt: skip
+        transaction.add(recording)
+        clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=TRUTH_WINDOW)
+        for clip in clips:
+            transaction.add(clip)
+    committed = transaction.result
+    return RecordingResult(
+        recording=lake.artifact(recording.id, at=branch), clips=tuple(clip.id for clip in clips),
+        created=committed is not None and recording.id in committed.added,
+    )  # fmt: skip

@@ -1,0 +1,63 @@
+"""`flagdata declare-cloths`: films of cloths whose material was measured, as a table names them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flagdata.console import document, json_option, lake_option, progress
+
+
+@click.command("declare-cloths")
+@click.argument("table", type=click.Path(path_type=Path))
+@click.option("--crop", default="square", show_default=True, metavar="BOX",
+              help="Of all films: x,y,width,height in px of the upright image; whole, square, or auto.")  # fmt: skip
+@click.option("--branch", default="main", show_default=True, help="Branch to commit on.")
+@json_option
+@lake_option
+def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path: str) -> None:
+    """Ingest the films that TABLE names, with the area weight and stiffness that were measured of their cloths.
+
+    TABLE is a CSV file, one row a film: film (a path from the table's folder on), fabric, area_weight [kg/m²], and as
+    far as they are known bending_stiffness [N·m], wind_level, wind_speed and wind_sigma [m/s]. The whole table is
+    checked before the first film is read. Clips know their cloth as simulated ones do, as parameters of the catalog;
+    where no wind is stated they have none. Films of one fabric are one session.
+
+    \b
+      flagdata declare-cloths fabrics.csv --lake lake
+      flagdata query --where "kind = 'clip' and session = 'felt'" --lake lake
+    """
+    from flagdata.align.cloth import cloth_recording
+    from flagdata.ingest.camera import CameraOptions, parse_crop
+    from flagdata.ingest.camera.start import UNKNOWN
+    from flagdata.ingest.cloths import read_cloths
+    from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
+    from flagdata.lake import Lake
+
+    box = parse_crop(crop)
+    lake = Lake.open(lake_path)
+    cloths = read_cloths(table)
+    made = []
+    with progress(len(cloths), label="films", unit="film") as advance:
+        for cloth in cloths:
+            options = CameraIngest(camera=CameraOptions(start=UNKNOWN, crop=box))
+            film = ingest_camera(lake, cloth.film, options, labels=Labels(session=cloth.fabric), branch=branch)
+            made.append((cloth, cloth_recording(lake, film.artifact, cloth, branch=branch)))
+            advance(1)
+    if as_json:
+        document(
+            "declare-cloths",
+            {
+                "recordings": [
+                    {
+                        "recording": one.recording.id, "clips": list(one.clips), "created": one.created,
+                        "parameters": cloth.parameters, "wind": cloth.wind,
+                    }
+                    for cloth, one in made
+                ]
+            },
+        )  # fmt: skip
+        return
+    for cloth, one in made:
+        click.echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips")

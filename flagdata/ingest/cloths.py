@@ -1,0 +1,169 @@
+"""Tables of films of hanging cloth whose material was measured: one row a film.
+
+The recordings of Bouman, Xiao, Battaglia and Freeman (Estimating the material properties of fabric from video, ICCV
+2013) are of this kind: thirty fabrics that hang from a rod, each filmed in three strengths of a fan's wind, with area
+weight and bending stiffness measured by themselves. How the published files are named is not relied on; the table says
+which film shows what.
+
+Columns: `film` (a path, relative to the table's folder), `fabric` (its name), `area_weight` [kg/m²]; and, where they
+are known, `bending_stiffness` [N·m], `wind_level` (a fan's setting, as text), `wind_speed` and `wind_sigma` [m/s] (a
+steady wind and its standard uncertainty, both or neither). Other columns are refused: a misspelt one would be missed.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
+
+COLUMNS = ("film", "fabric", "area_weight")
+"""Columns that every table has."""
+OPTIONAL = ("bending_stiffness", "wind_level", "wind_speed", "wind_sigma")
+SIZE_LIMIT = 1 << 24
+"""Largest table that is read [B]."""
+_WEIGHTS = (0.005, 5.0)  # kg/m²; silk organza has 0.02, heavy canvas 1
+_DELIMITERS = (",", ";", "\t")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClothFilm:
+    """A film of a cloth and what was measured of it.
+
+    Attributes:
+        film: the file.
+        fabric: its name; films of one fabric are never on two sides of a split.
+        density: area weight [kg/m²].
+        bending_stiffness: flexural rigidity for each metre of width [N·m]; None if unknown.
+        wind_level: a fan's setting, as the table has it; "" if none is stated.
+        wind: mean speed and its standard uncertainty [m/s]; None if unknown.
+    """
+
+    film: Path
+    fabric: str
+    density: float
+    bending_stiffness: float | None = None
+    wind_level: str = ""
+    wind: tuple[float, float] | None = None
+
+    @property
+    def parameters(self) -> dict[str, float | str]:
+        """What the catalog keeps, by the names that simulated recordings have."""
+        found: dict[str, float | str] = {"fabric": self.fabric, "density": self.density}
+        if self.bending_stiffness is not None:
+            found["bending_stiffness"] = self.bending_stiffness
+        if self.wind_level:
+            found["wind_level"] = self.wind_level
+        return found
+
+
+def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
+    """The films of a table, CSV (comma, semicolon or tab; decimal points), in its order.
+
+    Raises:
+        NotFoundError: no such table, or a film that it names is not there.
+        LimitError: a table too large to be read.
+        UnknownNameError: a column that is none of these.
+        InputError: columns or values that are missing, doubled or malformed; a film that is named twice; a fabric with
+            two area weights or stiffnesses.
+    """
+    if not path.is_file():
+        raise NotFoundError("no such table", where=str(path), fix="check the path")
+    if path.stat().st_size > SIZE_LIMIT:
+        raise LimitError(
+            f"a table of {path.stat().st_size} bytes", where=str(path), fix=f"at most {SIZE_LIMIT} are read"
+        )
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("the table is not UTF-8", where=str(path), fix="export it as UTF-8") from None
+    heading = text.split("\n", 1)[0]
+    reader = csv.reader(text.splitlines(), delimiter=max(_DELIMITERS, key=heading.count), strict=True)
+    try:
+        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as error:
+        raise InputError(
+            f"not a table: {error}", where=f"{path}, line {reader.line_num}", fix="export it anew"
+        ) from None
+    rows = [(line, cells) for line, cells in lines if any(cells)]
+    if len(rows) < 2:
+        raise InputError("no rows", where=str(path), fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film")
+    names = rows[0][1]
+    _check_columns(names, str(path))
+    found: list[ClothFilm] = []
+    for line, cells in rows[1:]:
+        where = f"{path}, line {line}"
+        if len(cells) != len(names):
+            raise InputError(
+                f"{len(cells)} cells, the heading has {len(names)}", where=where, fix="mind the delimiters"
+            )
+        found.append(_film(dict(zip(names, cells, strict=True)), path.parent, where))
+        _check_alike(found, where)
+    return tuple(found)
+
+
+def _check_columns(names: list[str], where: str) -> None:
+    for name in names:
+        if name not in (*COLUMNS, *OPTIONAL):
+            raise UnknownNameError.of("column", name, [*COLUMNS, *OPTIONAL], where=where)
+    missing = [name for name in COLUMNS if name not in names]
+    if missing or len(set(names)) < len(names):
+        what = f"columns missing: {', '.join(missing)}" if missing else "a column is there twice"
+        raise InputError(what, where=where, fix=f"give {', '.join(COLUMNS)}, each once")
+
+
+def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
+    for name in COLUMNS:
+        if not row[name]:
+            raise InputError(f"no {name}", where=where, fix="fill the cell, or leave the row out")
+    film = folder / row["film"]
+    if not film.exists():
+        raise NotFoundError(f"no such film: {row['film']}", where=where, fix="give its path from the table's folder on")
+    density = _number(row, "area_weight", where, unit="kg/m²")
+    if density is None or not _WEIGHTS[0] <= density <= _WEIGHTS[1]:
+        raise InputError(
+            f"an area weight of {row['area_weight']} kg/m²", where=where,
+            fix=f"give kg/m², {_WEIGHTS[0]:g} to {_WEIGHTS[1]:g}; 1 oz/yd² is 0.0339 kg/m², 100 g/m² is 0.1",
+        )  # fmt: skip
+    speed, sigma = (_number(row, name, where, unit="m/s") for name in ("wind_speed", "wind_sigma"))
+    if (speed is None) != (sigma is None) or sigma == 0:
+        raise InputError(
+            "a wind without its uncertainty, or the other way round", where=where,
+            fix="give wind_speed and wind_sigma (above 0), in m/s, or neither",
+        )  # fmt: skip
+    return ClothFilm(
+        film=film, fabric=row["fabric"], density=density, wind_level=row.get("wind_level", ""),
+        bending_stiffness=_number(row, "bending_stiffness", where, unit="N·m"),
+        wind=None if speed is None or sigma is None else (speed, sigma),
+    )  # fmt: skip
+
+
+def _number(row: Mapping[str, str], name: str, where: str, *, unit: str) -> float | None:
+    """A number of 0 or more; None where the cell is empty or the column is not there."""
+    text = row.get(name, "")
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value >= 0):
+        raise InputError(f"{name} is {text!r}", where=where, fix=f"give a number of 0 or more in {unit}, or nothing")
+    return value
+
+
+def _check_alike(found: list[ClothFilm], where: str) -> None:
+    """Make sure that the newest row does not contradict those before it."""
+    newest = found[-1]
+    for other in found[:-1]:
+        if other.film == newest.film:
+            raise InputError(f"{newest.film.name} is named twice", where=where, fix="keep one of the rows")
+        same = (other.density, other.bending_stiffness) == (newest.density, newest.bending_stiffness)
+        if other.fabric == newest.fabric and not same:
+            raise InputError(
+                f"{newest.fabric} has another area weight or stiffness than before", where=where,
+                fix="give each fabric one name and its own values in all rows",
+            )  # fmt: skip
