@@ -33,8 +33,7 @@ def sway(seen: Seen) -> float:
     rim = SIDE // 6
     mask[rim:-rim, rim:-rim] = False
     change = np.diff(seen.gray, axis=0)[:, mask]
-    down, right = (slope[mask] for slope in np.gradient(seen.mean))
-    slopes = np.stack([down, right])
+    slopes = np.stack([np.asarray(np.gradient(seen.mean, axis=axis))[mask] for axis in (0, 1)])
     square = slopes @ slopes.T + np.eye(2) * mask.sum() * 0.25
     moved = np.linalg.solve(square, slopes @ change.T)
     return float(np.log10(max(float(np.sqrt(np.square(moved).sum(axis=0).mean())), 1e-3)))

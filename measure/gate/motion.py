@@ -74,7 +74,7 @@ def height(seen: Seen) -> float:
 
 def second_region(seen: Seen) -> float:
     """Motion of the second strongest separate region over that of the strongest, 0 to 1."""
-    amplitude = ndimage.gaussian_filter(np.sqrt(seen.excess), _SMOOTHING)
+    amplitude = np.asarray(ndimage.gaussian_filter(np.sqrt(seen.excess), _SMOOTHING), dtype=np.float32)
     if amplitude.max() <= 0:
         return 0.0
     masses = _masses(amplitude > _REGION * amplitude.max(), amplitude)

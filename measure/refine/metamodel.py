@@ -82,7 +82,7 @@ class Metamodel:
                 f"{rows:.1f} independent evaluations for {p} regressors and {k} summaries",
                 fix="evaluate more points, or fewer replicates of each",
             )
-        inverse = np.linalg.inv((x * weight[:, None]).T @ x)
+        inverse = np.asarray(np.linalg.inv((x * weight[:, None]).T @ x), dtype=np.float64)
         coefficients = inverse @ (x * weight[:, None]).T @ summaries
         residual = summaries - x @ coefficients
         return cls(

@@ -125,8 +125,7 @@ class _Desk:
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
                 ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
-                # Under a name of its own: its seeds may be judged beside it.
-                found.append((None, replace(ours, name=f"{ours.name}, as shipped")))
+                found.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
                 continue
             meant = [row["artifact"] for row in rows if row["name"] == name]
             meant = meant or [row["artifact"] for row in rows if len(name) >= 6 and row["artifact"].startswith(name)]

@@ -94,7 +94,8 @@ def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decisi
 @pytest.mark.parametrize(
     ("low", "apart", "decision", "said"),
     [
-        (-1e-4, None, Decision.REJECTED, "not significantly lower"), (1e-4, (-1e-4, -2e-4), Decision.REJECTED, "as much"),
+        (-1e-4, None, Decision.REJECTED, "not significantly lower"),
+        (1e-4, (-1e-4, -2e-4), Decision.REJECTED, "as much"),
         (1e-4, (1e-4, -1e-4), Decision.KEPT, "form is open"), (1e-4, (1e-3, 5e-4), Decision.KEPT, "spent on drag"),
         (1e-4, None, Decision.KEPT, "no term of another direction"),
     ],
