@@ -61,6 +61,8 @@ class TimeError(FlagdataError):
 class ZoneMissingError(TimeError):
     """Stamps of a wall clock whose zone nobody named."""
 
+    kind = "zone-missing"
+
 
 class NotFoundError(FlagdataError):
     """An artifact, ref, file or row that is not there."""

@@ -45,7 +45,7 @@ def test_an_unknown_name_suggests_the_nearest_and_says_where_it_stands() -> None
 
 
 def test_a_name_far_from_all_lists_those_there_are() -> None:
-    with pytest.raises(UnknownNameError, match="known: clothsim, field, flagsim, flagsim-small"):
+    with pytest.raises(UnknownNameError, match="known: clothsim, clothsim-wide, field, flagsim"):
         Shelf(folder="datasets", noun="data set").find("zzz")
 
 
