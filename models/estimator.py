@@ -153,6 +153,11 @@ class Estimator:
         return [learner.network(inputs) for learner in self.learners]
 
     @torch.no_grad()
+    def summaries(self, inputs: Tensor) -> Tensor:
+        """(n, dimension) of the first learner: what `cloud` is of."""
+        return self.learners[0].network(inputs)
+
+    @torch.no_grad()
     def logits(self, embeddings: Sequence[Tensor], *, seed: int, draws: int) -> Tensor:
         """(n, draw, target) draws as the learners know them (`models.targets`), spread by `widening`.
 

@@ -81,7 +81,10 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     loaded = [load(member) for member in members]
     first = loaded[0]
     for other in loaded[1:]:
-        if _seedless(_recipe(first)) != _seedless(_recipe(other)) or first.card["data"] != other.card["data"]:
+        if (
+            _seedless(first.card["recipe"]) != _seedless(other.card["recipe"])
+            or first.card["data"] != other.card["data"]
+        ):
             raise UsageError(
                 f"{other.card['name']} was trained otherwise than {first.card['name']}", where=str(members),
                 fix="ship seeds of one recipe, trained on the same data",
@@ -108,12 +111,7 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     return load(folder)
 
 
-def _recipe(estimator: Estimator) -> dict[str, Any]:
-    recipe = estimator.card["recipe"]
-    return dict(recipe) if isinstance(recipe, dict) else {}
-
-
-def _seedless(recipe: dict[str, Any]) -> dict[str, Any]:
+def _seedless(recipe: object) -> dict[str, Any]:
     """A recipe as JSON, without its seed."""
     return {**json.loads(json.dumps(recipe)), "seed": None}
 

@@ -18,7 +18,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
+from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.ingest.headings import check_columns, delimiter_of
 
 COLUMNS = ("film", "fabric", "area_weight")
 """Columns that every table has."""
@@ -26,7 +27,6 @@ OPTIONAL = ("bending_stiffness", "wind_level", "wind_speed", "wind_sigma")
 SIZE_LIMIT = 1 << 24
 """Largest table that is read [B]."""
 _WEIGHTS = (0.005, 5.0)  # kg/m²; silk organza has 0.02, heavy canvas 1
-_DELIMITERS = (",", ";", "\t")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
     except UnicodeDecodeError:
         raise InputError("the table is not UTF-8", where=str(path), fix="export it as UTF-8") from None
     heading = text.split("\n", 1)[0]
-    reader = csv.reader(text.splitlines(), delimiter=max(_DELIMITERS, key=heading.count), strict=True)
+    reader = csv.reader(text.splitlines(), delimiter=delimiter_of(heading), strict=True)
     try:
         lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     except csv.Error as error:
@@ -92,7 +92,9 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
     if len(rows) < 2:
         raise InputError("no rows", where=str(path), fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film")
     names = rows[0][1]
-    _check_columns(names, str(path))
+    check_columns(
+        names, needed=COLUMNS, optional=OPTIONAL, where=str(path), fix=f"give {', '.join(COLUMNS)}, each once"
+    )
     found: list[ClothFilm] = []
     for line, cells in rows[1:]:
         where = f"{path}, line {line}"
@@ -103,16 +105,6 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
         found.append(_film(dict(zip(names, cells, strict=True)), path.parent, where))
         _check_alike(found, where)
     return tuple(found)
-
-
-def _check_columns(names: list[str], where: str) -> None:
-    for name in names:
-        if name not in (*COLUMNS, *OPTIONAL):
-            raise UnknownNameError.of("column", name, [*COLUMNS, *OPTIONAL], where=where)
-    missing = [name for name in COLUMNS if name not in names]
-    if missing or len(set(names)) < len(names):
-        what = f"columns missing: {', '.join(missing)}" if missing else "a column is there twice"
-        raise InputError(what, where=where, fix=f"give {', '.join(COLUMNS)}, each once")
 
 
 def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:

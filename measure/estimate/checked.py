@@ -29,7 +29,7 @@ class CheckedGate:
     false_alarm: float
 
     def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
-        found = judge(frames, self.model, self.calibrated, false_alarm=self.false_alarm)
+        found = judge(frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary)
         if not found.reasons:
             return [Reason(kind="familiar", what=f"nothing stands out, p = {found.p:.3f} over all checks", p=found.p)]
         # The first speaks for all checks together.

@@ -102,11 +102,6 @@ def measure(
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
     if cache is not None and refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
-    if refine is not None and flag_size is None:
-        raise UsageError(
-            "a refinement simulates the flag, whose size is not known",
-            fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
-        )
     for path in (report, zarr_path):
         if path is not None and not path.absolute().parent.is_dir():
             raise UsageError("no such folder", where=str(path.parent), fix="create it first")

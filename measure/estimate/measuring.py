@@ -39,6 +39,9 @@ class Options:
         false_alarm: rate of the gate.
         seed: of all draws.
         refine: simulated clips of a refinement; None for none.
+
+    Raises:
+        UsageError: a refinement of a flag whose size is not known.
     """
 
     size: FlagSize | None = None
@@ -49,6 +52,13 @@ class Options:
     false_alarm: float = 0.05
     seed: int = 0
     refine: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.refine is not None and self.size is None:
+            raise UsageError(
+                "a refinement simulates the flag, whose size is not known",
+                fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
+            )
 
     def recipe(self) -> dict[str, Any]:
         """JSON values."""

@@ -61,7 +61,7 @@ def nearest(
         row = rows[place]
         record = Record.open(lake.object_path(row["object"]))
         frames = record.frames(row["frame_first"], count)
-        own = model.embeddings(model.inputs(frames[None]))[0][0].cpu().numpy()
+        own = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
         distance = float(np.linalg.norm(whitening @ (own.astype(np.float64) - summary)))
         found.append(
             Neighbour(

@@ -24,7 +24,7 @@ from models.targets import Cloth
 def refined(
     measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cropped: bool, cache: Path | None
 ) -> Refinement:
-    """Refine the first window of a film.
+    """Refine the first window of a film of a flag whose size is known.
 
     Args:
         budget: simulated clips.
@@ -32,14 +32,9 @@ def refined(
         cache: folder for evaluations, so that an interrupted run goes on; None for none.
 
     Raises:
-        UsageError: the flag's size is not known, or the model is of no flags.
+        UsageError: the model is of no flags.
         InputError: a budget that is too small, see `measure.refine.procedure.refine`.
     """
-    if measured.sizes.given is None:
-        raise UsageError(
-            "a refinement simulates the flag, whose size is not known", where=measured.film,
-            fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
-        )  # fmt: skip
     if model.cloth is not Cloth.FLAG:
         raise UsageError(
             f"the model {model.name!r} is of {model.cloth.value}, refinement simulates flags", where="--refine",

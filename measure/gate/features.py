@@ -51,12 +51,13 @@ class Features:
         return np.concatenate([self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs])
 
 
-def features_of(model: Estimator, frames: NDArray[np.uint8]) -> Features:
+def features_of(model: Estimator, frames: NDArray[np.uint8], summary: NDArray[np.floating] | None = None) -> Features:
     """Measure a clip.
 
     Args:
         model: with a cloud of training summaries.
         frames: (n, height, width) gray, n and their rate the model's.
+        summary: (d,) the model's first learner's of them, where it is known already.
 
     Raises:
         InputError: frames that do not fit the model, a clip without contrast, or a model without a cloud.
@@ -67,13 +68,14 @@ def features_of(model: Estimator, frames: NDArray[np.uint8]) -> Features:
     top, left = (frames.shape[1] - side) // 2, (frames.shape[2] - side) // 2
     square = frames[:, top : top + side, left : left + side]
     middle = square[:, cut : side - cut, cut : side - cut]
-    inputs = [model.inputs(clip[None]) for clip in (square, square[..., ::-1], middle)]
-    embeddings = model.embeddings(torch.cat(inputs))[0].detach().cpu().double().numpy()
-    moved = (embeddings[1:] - embeddings[0]) @ cloud.whitening.T
+    clips = [square[..., ::-1], middle] if summary is not None else [square, square[..., ::-1], middle]
+    found = model.summaries(torch.cat([model.inputs(clip[None]) for clip in clips])).cpu().double().numpy()
+    own = found[0] if summary is None else np.asarray(summary, dtype=np.float64)
+    moved = (found[-len(MOVES) :] - own) @ cloud.whitening.T
     return Features(
         checks=measured(frames),
         handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0].double().numpy(),
-        summary=embeddings[0], distance=float(cloud.distance(embeddings[:1])[0]),
+        summary=own, distance=float(cloud.distance(own[None])[0]),
         moved=np.linalg.norm(moved, axis=1),
     )  # fmt: skip
 

@@ -103,6 +103,7 @@ def judge(
     *,
     false_alarm: float = FALSE_ALARM,
     confidence: float = CONFIDENCE,
+    summary: NDArray[np.floating] | None = None,
 ) -> Judgement:
     """Whether a clip is like what a model was trained on.
 
@@ -112,6 +113,7 @@ def judge(
         gate: calibrated for this model.
         false_alarm: share of familiar clips that may be refused, by all checks together.
         confidence: probability that no larger share of them is, over the draw of the calibration clips.
+        summary: (d,) the network's of these frames, where it is known already.
 
     Raises:
         InputError: more frames than the model takes, another shape or type, or a rate that the calibration clips are
@@ -139,7 +141,7 @@ def judge(
     if float(frames.std()) < 1:
         what = f"{REASONS['too-dark'].sentence}: all gray levels lie within {frames.std():.2g} of each other"
         return refused("too-dark", what, "contrast", float(frames.std()))
-    found = features_of(model, frames)
+    found = features_of(model, frames, summary)
     vector = found.vector(model)
     scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
     p = gate.p_value(float(surprises.max()))

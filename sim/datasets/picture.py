@@ -53,7 +53,7 @@ def coded(frames: NDArray[np.uint8], drawn: dict[str, float], spec: CameraSpec, 
     encoder = VideoEncoder(
         height=frames.shape[1], width=frames.shape[2], rate_factor=drawn["camera.rate_factor"], preset=_PRESET
     )
-    return [encoder.encode(gray) for gray in noisy(frames, drawn, seed=seed)]
+    return [encoder.encode(gray) for gray in _noisy(frames, drawn, seed=seed)]
 
 
 def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed: int) -> tuple[list[bytes], int]:
@@ -68,7 +68,7 @@ def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed
     Raises:
         InputError: a frame is longer at any quality.
     """
-    grays = list(noisy(frames, drawn, seed=seed))
+    grays = list(_noisy(frames, drawn, seed=seed))
     quality = int(drawn["camera.jpeg_quality"])
     coded: list[bytes] = []
     while len(coded) < len(grays):
@@ -85,8 +85,7 @@ def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed
     return [filled(jpeg, slot) for jpeg in coded], quality
 
 
-def noisy(frames: NDArray[np.uint8], drawn: dict[str, float], *, seed: int) -> Iterator[NDArray[np.uint8]]:
-    """Gray frames (height, width) with the camera's noise, of frames (n, height, width, 3) sRGB."""
+def _noisy(frames: NDArray[np.uint8], drawn: dict[str, float], *, seed: int) -> Iterator[NDArray[np.uint8]]:
     rng = stream(seed, "camera", "noise")
     read, shot = drawn["camera.read_noise"], drawn["camera.shot_noise"]
     for frame in frames:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,8 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, read_meshes
-from sim.render import Meshes, RenderParameters
+from measure.refine.view import of_parameters
+from sim.render import Meshes
 from sim.render.stage import stage
 
 NAME = "flagsim-wide"
@@ -99,12 +99,13 @@ def _followed(lake: Lake) -> tuple[NDArray[np.float32], NDArray[np.float32], NDA
         sequence = read_meshes(lake.object_path(objects[row["parents"][0]]))
         assert isinstance(sequence, MeshSequence)
         marked = sequence.positions[:, _markers(sequence)]
-        zeta = _zeta(parameters)
-        placed = stage(Meshes.flag(sequence, heading=0.0), zeta)
+        view = of_parameters(parameters, where=row["name"])
+        assert view is not None
+        placed = stage(Meshes.flag(sequence, heading=0.0), view.zeta)
         points = torch.from_numpy(marked).double() + torch.tensor(placed.shift, dtype=torch.float64)
         places, _ = placed.camera.project(points)
         space.append(marked)
-        picture.append((places / zeta.width).float().numpy())
+        picture.append((places / view.zeta.width).float().numpy())
         truth.append((parameters["wind_speed"], parameters["density"]))
         test.append(row["name"].startswith(f"{NAME}-test"))
     return np.stack(space), np.stack(picture), np.array(truth), np.array(test)
@@ -115,15 +116,3 @@ def _markers(sequence: MeshSequence) -> NDArray[np.int64]:
     width, height = sequence.rest.max(axis=0)
     grid = np.stack(np.meshgrid(np.linspace(0, width, ACROSS), np.linspace(0, height, DOWN)), axis=-1).reshape(-1, 2)
     return np.array([((sequence.rest - place) ** 2).sum(axis=1).argmin() for place in grid])
-
-
-def _zeta(parameters: dict[str, float]) -> RenderParameters:
-    """The camera's ζ; texture and background do not matter to it."""
-    known = {
-        entry.name: parameters[f"render.{entry.name}"]
-        for entry in fields(RenderParameters)
-        if f"render.{entry.name}" in parameters
-    }
-    whole = ("width", "height", "cycles_samples", "cycles_bounces", "raster_samples")
-    numbers: dict[str, Any] = {name: int(value) if name in whole else value for name, value in known.items()}
-    return RenderParameters(**{**numbers, "background": "sky/1", "texture": "flag/japan"})

@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from flagdata.lake.meshes import MeshSequence
 from flagdata.record import Record
-from flagdata.rng import child_seed
+from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
+from measure.refine.view import DrawnView
 from models import estimator
 from sim.assets import Assets
-from sim.datasets import jobs, picture
+from sim.datasets import jobs
 from sim.datasets.cast import casts
 from sim.datasets.films import Film, Sequences
 from sim.datasets.reading import load
@@ -131,17 +132,16 @@ def _clip(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> Clip:
 
 def _reference(folder: Path, seed: int, frames: int) -> Iterator[Clip]:
     """Runs of the reference simulator, each seen by several cameras; its flags are heavier than any in training."""
-    recipe = load(_BASE)
     assets = Assets()
+    views = DrawnView(prior=load(_BASE).prior, assets=assets)
     raster = Raster(assets=assets)
     for name, wind, sequence in _sequences(folder, frames):
         for view in range(VIEWS):
-            zeta = recipe.prior.draw(child_seed(seed, "view", name, view), assets)
+            own = child_seed(seed, "view", name, view)
+            zeta, camera = views.at(own)
             with torch.no_grad():
                 seen = raster.render(Meshes.flag(sequence, heading=0.0), zeta).numpy()
-            drawn = picture.settings(recipe.camera, seed=child_seed(seed, "camera", name, view))
-            gray = np.stack(list(picture.noisy(seen, drawn, seed=child_seed(seed, "noise", name, view))))
-            yield gray, wind, DENSITY
+            yield camera.filmed(seen, seed=own), wind, DENSITY
 
 
 def _sequences(folder: Path, frames: int) -> Iterator[tuple[str, float, MeshSequence]]:
@@ -174,8 +174,7 @@ def _scores(model: estimator.Estimator, clips: list[Clip], seed: int) -> dict[st
         column = names.index(name)
         true = np.array([clip[place] for clip in clips])
         error = found.mean[:, column] - true
-        generator = np.random.default_rng(child_seed(seed, "bootstrap", name))
-        again = error[generator.integers(len(error), size=(DRAWS, len(error)))]
+        again = error[stream(seed, "bootstrap", name).integers(len(error), size=(DRAWS, len(error)))]
         scores[name] = {
             "rmse": float(np.sqrt(np.mean(error**2))),
             "rmse_interval": np.quantile(np.sqrt(np.mean(again**2, axis=1)), [0.05, 0.95]).tolist(),

@@ -20,7 +20,8 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import InputError, LimitError, NotFoundError, UsageError
+from flagdata.ingest.headings import check_columns, delimiter_of
 from flagdata.lake.markers import MarkerSequence
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
@@ -34,7 +35,6 @@ POSITIONS_LIMIT = 50_000_000
 """Most positions of a recording: frames times markers."""
 _SAME = 1e-6  # of a marker's own u and v: differences that are no difference
 _MAGIC = b"PAR1"
-_DELIMITERS = (",", ";", "\t")
 _FOOTER_LIMIT = 1 << 24  # B, and entries, of a Parquet footer's parts
 
 
@@ -125,21 +125,12 @@ def _columns(path: Path) -> list[str]:
             return list(_parquet(path).schema_arrow.names)
     with path.open("rb") as stream:
         line = stream.readline(1 << 16).decode("utf-8-sig", "replace").strip()
-    return [name.strip().strip('"') for name in line.split(_delimiter(line))]
-
-
-def _delimiter(line: str) -> str:
-    return max(_DELIMITERS, key=line.count)
+    return [name.strip().strip('"') for name in line.split(delimiter_of(line))]
 
 
 def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None:
-    for name in names:
-        if name not in (*COLUMNS, *_OPTIONAL):
-            raise UnknownNameError.of("column", name, [*COLUMNS, *_OPTIONAL], where=where)
-    missing = [name for name in COLUMNS if name not in names]
-    if missing or len(set(names)) < len(names):
-        what = f"columns missing: {', '.join(missing)}" if missing else "a column is there twice"
-        raise InputError(what, where=where, fix=f"give {', '.join(COLUMNS)}, and frame or time")
+    fix = f"give {', '.join(COLUMNS)}, and frame or time"
+    check_columns(names, needed=COLUMNS, optional=_OPTIONAL, where=where, fix=fix)
     if "time" not in names and "frame" not in names:
         raise InputError("neither frame nor time", where=where, fix="add the number of the frame, or its time in s")
     if "time" not in names and options.rate is None:
@@ -160,7 +151,7 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
                 table.validate(full=True)  # text that is not UTF-8, for one
                 return table.select(names).cast(wanted)
         with path.open("rb") as stream:
-            delimiter = _delimiter(stream.readline(1 << 16).decode("utf-8-sig", "replace"))
+            delimiter = delimiter_of(stream.readline(1 << 16).decode("utf-8-sig", "replace"))
         return pyarrow.csv.read_csv(
             path, read_options=pyarrow.csv.ReadOptions(column_names=names, skip_rows=1),
             parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),

@@ -38,12 +38,13 @@ def gate(model: Estimator) -> Gate:
 def test_a_still_film_is_refused_with_the_checks_own_reason_and_fix(model: Estimator, gate: Gate) -> None:
     asked = CheckedGate(model=model, calibrated=gate, false_alarm=0.05)
     still = np.repeat(clip(42)[:1], 12, axis=0)
-    reasons = asked.judge(still, np.zeros(1))
+    reasons = asked.judge(still, model.summaries(model.inputs(still[None]))[0].numpy())
     found = verdict([[reasons]], false_alarm=0.05, level=asked.level(0.05))
     assert found.refused
     assert found.reasons[0].kind == "no-motion"
     assert "crop" in found.reasons[0].fix
-    usual = asked.judge(clip(1005)[:12], np.zeros(1))  # one that it was calibrated by
+    known = clip(1005)[:12]  # one that it was calibrated by
+    usual = asked.judge(known, model.summaries(model.inputs(known[None]))[0].numpy())
     assert usual[0].p > asked.level(0.05)
 
 
