@@ -88,7 +88,7 @@ def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json
     with progress(kinds, label="null recordings", unit="kind") as advance:
         banks.build(folder, batches, workers=workers, progress=advance)
     if as_json:
-        document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.BATCH})
+        document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS})
     else:
         click.echo(str(folder))
 

@@ -62,7 +62,7 @@ class Outcome:
     @property
     def detected(self) -> bool:
         """Whether the base model was rejected."""
-        return self.conclusion not in (None, Conclusion.SUFFICIENT)
+        return self.conclusion not in (None, Conclusion.UNTESTED, Conclusion.SUFFICIENT)
 
     @property
     def true(self) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
-"""Which effect it is: candidates weighed, ranked by what they predict on recordings they were not fitted to, judged.
+"""Which effect it is: models of the library compared by what they predict on recordings they were not fitted to.
 
-Detection is by the calibrated statistic, attribution by held-out misfit: the largest statistic often points at the
-wrong effect, and cross-validation alone does not control false positives.
+Detection is by the calibrated statistic. Attribution is one rule. Models that held-out scores do not tell from the best
+are the confidence set (after Hansen, Lunde and Nason, Econometrica 79:453, 2011), and of these the ones that pass their
+own predictive test are the verdict. The base model and forces that are none of the library compete like any other.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from measure.loop.course import Variation
 from measure.loop.criteria import CRITERIA
 from measure.loop.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.heterogeneity import heterogeneity
-from measure.loop.inference import Evidence, Fit, gains
+from measure.loop.inference import Evidence, gains
 from measure.loop.lines import Line
 from measure.loop.quantity import number
 from measure.loop.reference import GUSTS, Reference
@@ -34,13 +35,6 @@ Floats = NDArray[np.float64]
 GUST_COLUMN = -1
 """Stands for gusts, which are no column: only their size can be found, not their course."""
 _FIRST = len(THETA)
-
-NO_HELP = "refitted and run on unseen recordings, it does not help more than the wrong-effect control"
-NOT_APART = "refitted beyond the linear model, its strength cannot be told from zero"
-"""Why an effect named is withdrawn."""
-USUAL = "no effect of the library stands out by itself: in nulls one often stands out as much by chance"
-FLUCTUATING = "even with it the errors tell of a wind that fluctuates, and not as turbulence does"
-SWINGING = "even with it the errors oscillate at a frequency that is proportional to the wind speed"
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
 """Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
@@ -56,7 +50,8 @@ class Weighed:
         error: standard error of the strength.
         gains: (segment,) held-out gain.
         recording: (segment,) of each.
-        admissible: whether the fitted strength makes physical sense: see `_plausible`.
+        admissible: whether the model exists: its strength is one that the effect may have, its cloth stays one, and a
+            wind that fluctuates does it as turbulence does.
         unlike: how the wind's course differs from that of turbulence, for gusts; empty where it does not.
     """
 
@@ -68,6 +63,11 @@ class Weighed:
     admissible: bool
     unlike: str = ""
 
+    def passes(self, level: float) -> bool:
+        """Whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is the
+        same in all recordings."""
+        return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judgement:
@@ -77,14 +77,17 @@ class Judgement:
         conclusion: see `Conclusion`.
         named: columns of the effects named.
         ranking: candidates, best first, each with the reason why it was not named.
+        confident: columns of the models of the library in the confidence set, best first; empty where the base model or
+            none of the library is as good as they are.
         statistic, p_value: of the global test.
         line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
-        course: how the wind would vary that leaves such errors, where that is farthest and not turbulence.
+        course: how the wind varies, as what the first leaves tells it, where that alone would and it is not turbulence.
     """
 
     conclusion: Conclusion
     named: tuple[int, ...]
     ranking: tuple[Weighed, ...]
+    confident: tuple[int, ...]
     statistic: float
     p_value: float
     line: Line | None = None
@@ -92,74 +95,82 @@ class Judgement:
 
 
 def judge(
-    evidence: Evidence, reference: Reference, *, level: float, refits: Mapping[int, Refit] | None = None
+    evidence: Evidence, reference: Reference, *, level: float, refits: Mapping[int, Refit | None] | None = None
 ) -> Judgement:
     """Weigh the library against the evidence of all recordings.
 
     Args:
         level: of the global test.
-        refits: of columns whose models were refitted, which count in place of the linear evidence.
+        refits: of columns whose models were refitted, which count in place of the linear evidence; None for a cloth
+            that diverged.
     """
+    known = refits or {}
     statistics = reference.statistics(evidence, names())
-    statistic, line = reference.farthest(evidence, names()), reference.line(evidence)
-    p_value = reference.tail.p(statistic)
+    statistic = reference.farthest(evidence, names())
+    p_value = reference.conformal.p(statistic)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
-    corrective = [i + _FIRST for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
     held_out = gains(evidence, [[i] for i, _ in effects])
     weighed = [
-        _weigh(evidence, reference, column, effect, own, statistics, (refits or {}).get(column))
+        _weigh(
+            evidence, reference, column, effect, own, statistics, known.get(column), lost=known.get(column, 0) is None
+        )
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
-    # An effect that changes how a flag flutters, as lift does, leaves a line too, of which it then takes much away.
-    refitted = (refits or {}).get(ranking[0].column)
-    left = line if refitted is None else refitted.line
-    swings = left is not None and reference.tail.p(left.far) <= level
-    blown = _blown(evidence, reference, statistic, level, left=evidence if refitted is None else refitted.evidence)
+    confident = _confidence_set(ranking, evidence)
+    first = known.get(ranking[0].column)
+    left = evidence if first is None else first.evidence
 
-    def judgement(conclusion: Conclusion, named: Sequence[Weighed], reasons: dict[int, str]) -> Judgement:
+    def judgement(conclusion: Conclusion, named: Sequence[Weighed], why: str = "") -> Judgement:
         taken = {w.column for w in named}
         told = [
-            replace(w, candidate=replace(w.candidate, why_not="" if w.column in taken else reasons.get(w.column, "")))
+            replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
             for w in ranking
         ]
         return Judgement(
-            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told), statistic=statistic,
-            p_value=p_value, line=left if swings else None, course=blown,
+            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told),
+            confident=tuple(w.column for w in confident), statistic=statistic, p_value=p_value,
+            line=_swinging(left, reference, level), course=_blown(left, reference, level),
         )  # fmt: skip
 
+    if not reference.conformal.tests(level):
+        return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
     if p_value > level:
-        return judgement(Conclusion.SUFFICIENT, (), {w.column: "the base model is not rejected" for w in ranking})
-    best = ranking[0]
-    reasons = {w.column: _reason(best, w) for w in ranking[1:]}
-    if not best.admissible or best.gains.sum() <= 0:
-        reasons[best.column] = "no effect of the library predicts unseen recordings better than the base model"
-        return judgement(Conclusion.OUTSIDE, (), reasons)
-    if swings and line is not None and line.far >= statistic:
-        reasons[best.column] = SWINGING
-        return judgement(Conclusion.OUTSIDE, (), reasons)
-    if blown is not None:
-        reasons[best.column] = FLUCTUATING
-        return judgement(Conclusion.OUTSIDE, (), reasons)
-    if best.candidate.p_family > CRITERIA.usual:
-        reasons[best.column] = USUAL
-        return judgement(Conclusion.OUTSIDE, (), reasons)
-    if _field_leads(evidence, best, corrective, statistics, beyond_linear=refitted is not None):
-        reasons[best.column] = "a corrective field explains more than any effect of the library"
-        return judgement(Conclusion.OUTSIDE, (), reasons)
-    near = [w for w in ranking[1:] if w.admissible and _rivals(best, w)]
-    enough = min(level, CRITERIA.enough_gusts if best.column == GUST_COLUMN else CRITERIA.enough)
-    if best.candidate.leftover > enough and not heterogeneous(best.candidate):
-        return judgement(Conclusion.ONE_OF if near else Conclusion.EFFECT, (best, *near), reasons)
-    useless = {column for column, run in (refits or {}).items() if run.gains.sum() <= 0}
-    others = [w for w in ranking[1:] if w.column not in useless]
-    second = _second(
-        evidence if refitted is None else refitted.evidence, reference, best, others, enough,
-        swinging=refitted is None or refitted.line is not None,
-    )  # fmt: skip
+        return judgement(Conclusion.SUFFICIENT, (), "the base model is not rejected")
+    if not confident:
+        return judgement(Conclusion.OUTSIDE, ())
+    passing = [w for w in confident if w.passes(level)]
+    if passing:
+        return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
+    second = _second(left, reference, confident[0], ranking, level)
     if second is not None:
-        return judgement(Conclusion.EFFECT, (best, second), reasons)
-    return judgement(Conclusion.PARTLY, (best,), reasons)
+        return judgement(Conclusion.EFFECT, (confident[0], second))
+    return judgement(Conclusion.PARTLY, confident[:1])
+
+
+def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
+    """Models of the library that held-out scores do not tell from the best, best first; none where the base model,
+    which gains nothing, is among them, or where a force that is none of the library leads them all."""
+    able = [w for w in ranking if w.admissible]
+    forces = gains(evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)])
+    scores = [*(w.gains for w in able), *forces]
+    best = max(scores, key=lambda own: own.sum())
+    if not _leads(best, np.zeros_like(best), evidence.recording):
+        return []
+    return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
+
+
+def _leads(one: Floats, other: Floats, recording: NDArray[np.int64]) -> bool:
+    """Whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the difference."""
+    if not np.isfinite(other).all():
+        return True
+    return bool((one - other).sum() > CRITERIA.lead * total_error(one - other, recording))
+
+
+def _swinging(left: Evidence, reference: Reference, level: float) -> Line | None:
+    """The line of the spectra of what is left, where it alone would reject a model."""
+    line = reference.line(left)
+    return line if line is not None and reference.conformal.p(line.far) <= level else None
 
 
 def _varying(evidence: Evidence) -> Variation | None:
@@ -167,125 +178,63 @@ def _varying(evidence: Evidence) -> Variation | None:
     return None if evidence.course is None else evidence.course.variation(evidence.recording)
 
 
-def _blown(
-    evidence: Evidence, reference: Reference, statistic: float, level: float, *, left: Evidence
-) -> Variation | None:
-    """How the wind varies, where that is farthest of all, not as turbulence does, and left by the first candidate."""
-    swing, variation = reference.swing(left), _varying(evidence)
+def _blown(left: Evidence, reference: Reference, level: float) -> Variation | None:
+    """How the wind varies as what is left tells it, where that alone would reject a model and is not turbulence."""
+    swing, variation = reference.swing(left), _varying(left)
     if swing is None or variation is None or variation.turbulent:
         return None
-    farthest = reference.swing(evidence) == statistic
-    return variation if farthest and reference.tail.p(swing) <= level else None
+    return variation if reference.conformal.p(swing) <= level else None
 
 
-def heterogeneous(candidate: Candidate) -> bool:
+def heterogeneous(candidate: Candidate, level: float) -> bool:
     """Whether its strength is another in every recording: another law in the wind would be a better one."""
-    return candidate.heterogeneity is not None and candidate.heterogeneity <= CRITERIA.heterogeneous
-
-
-def _field_leads(
-    evidence: Evidence, best: Weighed, corrective: Sequence[int], statistics: Floats, *, beyond_linear: bool
-) -> bool:
-    """Whether a corrective field says that the library has no answer.
-
-    A pressure that fluctuates pushes steady fields by chance, and a strong effect is far from linear: against gusts,
-    and against a model that was refitted, the field must also predict better.
-    """
-    field = max(corrective, key=lambda column: float(statistics[column]))
-    larger = best.candidate.z**2 * CRITERIA.field < float(statistics[field])
-    unlike = beyond_linear or best.column == GUST_COLUMN
-    return larger and (not unlike or gains(evidence, [[field]]).sum() > best.gains.sum())
+    return candidate.heterogeneity is not None and candidate.heterogeneity <= level
 
 
 def finalists(judgement: Judgement) -> tuple[int, ...]:
-    """Columns that are refitted: the first by held-out gains, and the largest statistics."""
+    """Columns that are refitted: the confidence set, the first by held-out gains, and the largest statistics."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
-    return tuple(dict.fromkeys(w.column for w in (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])))
-
-
-def withdrawn(judgement: Judgement, reason: str) -> Judgement:
-    """The same, once the effect named has failed, for `NO_HELP` or `NOT_APART`."""
-    ranking = _told(judgement.ranking, judgement.named, reason)
-    return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)
-
-
-def alone(judgement: Judgement, reason: str) -> Judgement:
-    """The same, once the second of two effects has failed: the first explains a part."""
-    ranking = _told(judgement.ranking, judgement.named[1:], reason)
-    return replace(judgement, conclusion=Conclusion.PARTLY, named=judgement.named[:1], ranking=ranking)
-
-
-def tied(judgement: Judgement, control: Weighed) -> Judgement:
-    """The same, once a control has proved as good as the effect named, within errors, on unseen data."""
-    ranking = _told(judgement.ranking, (control.column,), "")
-    named = (*judgement.named, control.column)
-    return replace(judgement, conclusion=Conclusion.ONE_OF, named=named, ranking=ranking)
-
-
-def _told(ranking: Sequence[Weighed], chosen: Sequence[int], reason: str) -> tuple[Weighed, ...]:
-    """The same candidates, those of some columns with another reason why they are not named."""
-    return tuple(
-        replace(w, candidate=replace(w.candidate, why_not=reason)) if w.column in chosen else w for w in ranking
-    )
+    first = (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])
+    chosen = dict.fromkeys([*(w.column for w in first), *judgement.confident])
+    return tuple(column for column in chosen if column != GUST_COLUMN)
 
 
 def _second(
-    evidence: Evidence,
-    reference: Reference,
-    best: Weighed,
-    others: Sequence[Weighed],
-    level: float,
-    *,
-    swinging: bool,
+    evidence: Evidence, reference: Reference, first: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:
-    """An effect that, beside the best, leaves no more than nulls do, predicts better than the best alone, and whose
-    strength is not nothing, both as strong in every recording. Beside gusts, the pressure is free in every segment.
+    """An effect with which the first passes its predictive test, and predicts better than alone. Beside gusts, the
+    pressure is free in every segment.
 
     Args:
-        evidence: of what the best leaves, if it was refitted.
-        others: candidates beside the best, but for those whose refitted models predict nothing.
-        swinging: whether lines of the errors' spectra count.
+        evidence: of what the first leaves, if it was refitted.
     """
     pressure = names().index(GUSTS)
-    known = [best.column]
-    if best.column == GUST_COLUMN:
+    known = [first.column]
+    if first.column == GUST_COLUMN:
         evidence, reference, known = evidence.freed(pressure), reference.beside(), []
-    skipped = {GUST_COLUMN, *([] if known else [pressure])}
-    others = [w for w in others if w.column not in skipped and w.candidate.effect not in CRITERIA.never_second]
-    fits = [evidence.fit([*known, w.column]) for w in others]
-    able = [
-        place
-        for place, (w, fit) in enumerate(zip(others, fits, strict=True))
-        if _plausible(_described(w), *_beside(evidence, fit, w))
-    ]
-    if not able:
-        return None
-    pairs = gains(evidence, [known, *([*known, others[place].column] for place in able)])
-    leader = int(np.argmax(pairs[1:].sum(axis=1)))
-    chosen, gained = others[able[leader]], pairs[1 + leader] - pairs[0]
-    value, error = _beside(evidence, fits[able[leader]], chosen)
-    lasting = (
-        gained.sum() > CRITERIA.lead * total_error(gained, evidence.recording) and abs(value) > CRITERIA.reach * error
-    )
-    both = [*known, chosen.column]
-    left = reference.p_left_by(evidence, names(), both, swinging=swinging)
-    constant = all(_homogeneous_beside(evidence, both, w) for w in (best, chosen) if w.column in both)
-    return chosen if lasting and constant and left > level else None
+    skipped = {GUST_COLUMN, first.column, *([] if known else [pressure])}
+    others = [w for w in ranking if w.column not in skipped]
+    pairs = gains(evidence, [known, *([*known, w.column] for w in others)])
+    for place in np.argsort(-pairs[1:].sum(axis=1)):
+        second, both = others[place], [*known, others[place].column]
+        if not _leads(pairs[1 + place], pairs[0], evidence.recording):
+            return None
+        value, _ = evidence.fit(both).of(second.column)
+        constant = all(
+            _homogeneous_beside(evidence, both, w, level) for w in (first, second) if w.column in both
+        )
+        if _physical(_described(second), value) and constant and reference.p_left_by(evidence, names(), both) > level:
+            return second
+    return None
 
 
-def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed) -> bool:
+def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed, level: float) -> bool:
     """Whether a strength is the same in all recordings, where some columns are fitted to each."""
     found = heterogeneity(
         _each(evidence, chosen, weighed.column, about=0.0, larger=_larger(evidence, weighed), unit="1")
     )
-    return found is None or found > CRITERIA.heterogeneous
-
-
-def _beside(evidence: Evidence, fit: Fit, weighed: Weighed) -> tuple[float, float]:
-    """A strength in a joint fit, and its standard error, as much larger than Σ says as when it is fitted alone."""
-    value, claimed = fit.of(weighed.column)
-    return value, claimed * _larger(evidence, weighed)
+    return found is None or found > level
 
 
 def _larger(evidence: Evidence, weighed: Weighed) -> float:
@@ -313,12 +262,10 @@ def _described(weighed: Weighed) -> Parameter:
     return EFFECTS[weighed.candidate.effect].parameters()[weighed.candidate.parameter]
 
 
-def _plausible(described: Parameter, coefficient: float, error: float) -> bool:
-    """Whether a strength is admissible, and no more than `Criteria.plausible` times what is expected there."""
+def _physical(described: Parameter, coefficient: float) -> bool:
+    """Whether a strength beyond null is one that the effect may have."""
     least, most = described.admissible
-    expected = described.prior[1 if coefficient > 0 else 0] - described.null
-    reach = CRITERIA.plausible * max(math.copysign(1.0, coefficient) * expected, 0.0)
-    return least <= described.null + coefficient <= most and abs(coefficient) - CRITERIA.lead * error <= reach
+    return least <= described.null + coefficient <= most
 
 
 def _weigh(
@@ -329,6 +276,8 @@ def _weigh(
     linear: Floats,
     statistics: Floats,
     refitted: Refit | None,
+    *,
+    lost: bool,
 ) -> Weighed:
     fit = evidence.fit([column])
     value, _ = fit.of(column)
@@ -344,7 +293,7 @@ def _weigh(
     by_recording = _each(left, [column], column, about=about, larger=error / fit.of(column)[1], unit=effect.unit)
     return Weighed(
         column=column, error=error, gains=gained, recording=evidence.recording,
-        admissible=_plausible(effect.described, value, error),
+        admissible=_physical(effect.described, value) and not lost,
         candidate=Candidate(
             effect=effect.effect, parameter=effect.parameter, null=null,
             strength=strength(null, value, error, effect.unit),
@@ -395,33 +344,23 @@ def estimate(value: float, error: float, unit: str) -> Estimate:
 
 
 def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
-    """By held-out gain; of those that it cannot tell from the first, the one that fits best leads."""
+    """By held-out gain, those first that are admissible."""
     ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
-    tied = [w for w in ordered if w.admissible and w.gains.sum() > 0 and _behind(ordered[0], w) < CRITERIA.tied]
-    best = max(tied, key=lambda w: abs(w.candidate.z), default=ordered[0])
-    ordered = [best, *(w for w in ordered if w is not best)]
-    return [replace(w, candidate=replace(w.candidate, behind=_behind(best, w))) for w in ordered]
-
-
-def _rivals(best: Weighed, other: Weighed) -> bool:
-    """Whether another effect cannot be told from the best: neither by held-out gains nor by how well it fits at all."""
-    return (
-        other.gains.sum() > 0
-        and _behind(best, other) < CRITERIA.lead
-        and other.candidate.z**2 > best.candidate.z**2 - CRITERIA.rival**2
-    )
+    return [replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered]
 
 
 def _behind(best: Weighed, other: Weighed) -> float:
     """Standard errors of the paired difference."""
-    if other is best or other.column == best.column:
+    if other is best:
         return 0.0
     difference = best.gains - other.gains
     error = total_error(difference, best.recording)
     return float(difference.sum() / error) if error > 0 else 0.0
 
 
-def _reason(best: Weighed, other: Weighed) -> str:
+def _reason(best: Weighed, other: Weighed, why: str) -> str:
+    if why:
+        return why
     if not other.admissible and other.unlike:
         return other.unlike
     if not other.admissible and other.column == GUST_COLUMN:
@@ -429,7 +368,9 @@ def _reason(best: Weighed, other: Weighed) -> str:
     if not other.admissible:
         strength = other.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"
-        return f"its strength would be {number(strength.value)}{unit}, which is not physical"
-    if other.gains.sum() <= 0:
+        return f"no cloth has it at the strength that fits, {number(strength.value)}{unit}"
+    if not _leads(other.gains, 0 * other.gains, other.recording):
         return "it predicts unseen recordings no better than the base model"
-    return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
+    if _leads(best.gains, other.gains, other.recording):
+        return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
+    return "the errors that remain are larger than those of nulls, or a force outside the library predicts better"

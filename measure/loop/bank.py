@@ -31,20 +31,20 @@ from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 from sim.integrate.split import SplitEuler
 
-BATCH = 8
 WINDS = 4
-"""Recordings of one cloth, so that a batch holds two null experiments: what they leave differs by their numerics, not
-by the cloth, so that few cloths of many numerics say more than many of few."""
+"""Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
+differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
 _ADDED = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"}
 """What batches of older versions lack, some of it or all."""
 _SEGMENTS = (
-    "recording", "r", "response", "error", "marker_error", "lines", "speeds", "offsets", "noise", "period", "cloth",
+    "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
     "turned", "turning", "moment", "course", "course_curvature",
 )  # fmt: skip
 """Arrays with a row for each segment."""
 FILE_LIMIT = 4 << 30
 """Largest batch that is read, unpacked [B]."""
-_DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.3, 3.0), (0.25e-3, 5e-3)
+_DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
+_STRETCHING = (0.5, 2.0)
 Progress = Callable[[int], object]
 
 
@@ -79,24 +79,18 @@ def prior_batch(
     speeds: tuple[float, float],
     seed: int,
 ) -> NullBatch:
-    """Null experiments over the priors: of two cloths, each in four winds.
+    """A null experiment over the priors: one cloth in four winds, one from each quarter of `speeds`.
 
-    Density and bending are log-uniform about the nominal ones, damping log-uniform: half of the batches have little of
-    it and explicit steps, half the whole range. The winds of a cloth are drawn one from each quarter of `speeds`.
+    Density and bending are log-uniform about the nominal ones, damping and the factor on the tables of stretching
+    log-uniform.
     """
     rng = stream(seed, "null", "prior")
-    gentle = rng.random() < 0.5
-    damping = (_DAMPING[0], 1e-3 if gentle else _DAMPING[1])
-    cloths = BATCH // WINDS
-    made = [
-        Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, damping))
-        for _ in range(cloths)
-    ]
-    shares = (np.arange(WINDS) + rng.random((cloths, WINDS))) / WINDS
+    cloth = Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
+    shares = (np.arange(WINDS) + rng.random(WINDS)) / WINDS
     return NullBatch(
-        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise,
-        calibrations=tuple(cloth for cloth in made for _ in range(WINDS)),
-        speeds=tuple(float(u) for u in (speeds[0] + (speeds[1] - speeds[0]) * shares).ravel()),
+        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=(cloth,) * WINDS,
+        stretching=_log(rng, _STRETCHING),
+        speeds=tuple(float(u) for u in speeds[0] + (speeds[1] - speeds[0]) * shares),
         seed=child_seed(seed, "null", "batch"),
     )  # fmt: skip
 
@@ -106,16 +100,16 @@ def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
 
 
 def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tuple[Nulls, float]:
-    """Simulate a batch and take its statistics along columns, from the nominal calibration; with the duration of a
-    segment [s]."""
+    """Simulate a batch and take its statistics along columns, each recording's at the calibration that it was simulated
+    with, as those of data are taken at the fitted one; with the duration of a segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings).tied(_anchors(batch, recordings))
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
-    nominal = Calibration()
-    found = statistics(forecaster, segments, [nominal] * len(segments), weighed)
-    offsets = np.array([c.steps_from(nominal) for c in batch.calibrations])
+    own = [batch.calibrations[recording] for recording in segments.recording]
+    found = statistics(forecaster, segments, own, weighed)
+    cloths = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
     nulls = Nulls(
-        statistics=found, speeds=np.array(batch.speeds)[found.recording], offsets=offsets[found.recording],
+        statistics=found, speeds=np.array(batch.speeds)[found.recording], calibration=cloths[found.recording],
         numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
         period=np.full(len(found.recording), segments.period),
         cloth=np.full(len(found.recording), batch.specimen.material.fingerprint),
@@ -161,7 +155,8 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
     buffer = BytesIO()
     np.savez(
         buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
-        marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, offsets=nulls.offsets, noise=nulls.noise,
+        marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, calibration=nulls.calibration,
+        noise=nulls.noise,
         period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_told), turned=_moments(own).r, turning=_moments(own).response,
         moment=_moments(own).error, course=_course(own).score, course_curvature=_course(own).curvature,
@@ -256,7 +251,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         numerics = np.full(len(own.r), _number(path))
         parts.append(
             Nulls(
-                statistics=own, speeds=content["speeds"], offsets=content["offsets"], numerics=numerics,
+                statistics=own, speeds=content["speeds"], calibration=content["calibration"], numerics=numerics,
                 noise=content["noise"], period=content["period"], cloth=content["cloth"],
             )
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """Closing the loop on trajectories: from recordings to a verdict about what the base model lacks.
 
-The steps are those of the method: align, predict one horizon ahead, compare with nulls of other numerics, weigh the
-library's effects, judge, and run the refitted model on what it was not fitted to.
+The steps are those of the method: align, predict one horizon ahead, fit the base model, compare with nulls of other
+numerics, weigh the library's effects, judge, and run the refitted model on what it was not fitted to.
 """
 
 from __future__ import annotations
@@ -25,20 +25,15 @@ from measure.loop import supply
 from measure.loop.attribution import (
     EQUIVALENT,
     GUST_COLUMN,
-    NO_HELP,
-    NOT_APART,
     Judgement,
     Weighed,
-    alone,
-    estimate,
     finalists,
     judge,
     strength,
-    tied,
-    withdrawn,
 )
-from measure.loop.columns import DAMPING_UNIT, THETA, Calibration
+from measure.loop.columns import THETA, Calibration
 from measure.loop.comparison import LeftOut, Predictions, Trial, compare, folds, predict
+from measure.loop.conformal import kinds_needed
 from measure.loop.course import ALONG
 from measure.loop.criteria import CRITERIA
 from measure.loop.field import corrective_field
@@ -46,20 +41,20 @@ from measure.loop.floor import numerical_floor
 from measure.loop.inference import Evidence
 from measure.loop.reference import NullBank, Reference
 from measure.loop.refine import Refined
-from measure.loop.refit import Fits, refit
+from measure.loop.refit import Fits, Refit, refit
 from measure.loop.residuals import residuals
 from measure.loop.setting import Setting, Stage
 from measure.loop.statistics import Projection, Statistics, projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.loop.wind_log import lags
-from measure.loop.words import assumptions, blowing, clocks, proposal, ratios, sentence, separating, shedding
+from measure.loop.words import assumptions, blowing, bounds, clocks, proposal, ratios, sentence, separating, shedding
 from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
-FEWEST_NULLS = CRITERIA.simulated_kinds * banks.BATCH
-"""So many at least are simulated: each kind of numerics is a batch, and their spread is estimated from the kinds."""
+FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
+"""So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +88,12 @@ class Options:
                 where="close-loop",
                 fix=f"give {FEWEST_NULLS} or more, and 1 or more",
             )
+        needed = banks.WINDS * kinds_needed(self.level)
+        if self.bank is None and self.nulls < needed:
+            raise UsageError(
+                f"{self.nulls} nulls cannot test at a level of {self.level:g}", where="close-loop",
+                fix=f"give {needed} nulls or more, or a higher level",
+            )  # fmt: skip
 
 
 def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Verdict:
@@ -116,33 +117,28 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
         found, projection = _looked_at(setting)
     tell("sensitivities", 1, 1)
     bank = _bank(setting, options, tell)
-    speeds = setting.speeds[setting.recording]
     reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
-    whitened = WhitenedMisfit(
-        found=found, projection=projection, null=bank.model(setting.design).under(setting.prior), speeds=speeds
-    )
-    evidence = whitened.evidence(found)
-    fits = Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
-    judgement = judge(evidence, reference, level=options.level)
-    if judgement.conclusion is not Conclusion.SUFFICIENT:
+    tell("base model", 0, 1)
+    nominal = _fits(setting, found, projection, bank)
+    setting = replace(setting, calibration=nominal.base.model.calibration)
+    fits = _fits(setting, *_looked_at(setting), bank)
+    tell("base model", 1, 1)
+    evidence = fits.whitened.evidence(fits.whitened.found)
+    judgement, refits = judge(evidence, reference, level=options.level), dict[int, Refit | None]()
+    if judgement.conclusion not in (Conclusion.SUFFICIENT, Conclusion.UNTESTED):
         tell("before and after", 0, 1)
-        refits = refit(fits, reference, finalists(judgement), workers=options.workers)
-        judgement = judge(evidence, reference, level=options.level, refits=refits)
+        while new := [column for column in finalists(judgement) if column not in refits]:
+            refits |= refit(fits, reference, new, workers=options.workers)
+            judgement = judge(evidence, reference, level=options.level, refits=refits)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
-    if solved.doubtful and solved.doubtful == judgement.named[1:]:
-        solved = replace(solved, judgement=alone(judgement, NOT_APART))
-    judgement, trial = _settled(solved, options, tell)
+    trial = _trial(solved, options)
     tell("before and after", 1, 1)
-    return _verdict(solved, judgement, bank, trial, options, began, late)
+    return _verdict(solved, bank, trial, options, began, late)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solved:
-    """A judged experiment, with the models fitted to it beyond the linear.
-
-    Attributes:
-        judgement: before the wrong-effect control was run beside it.
-    """
+    """A judged experiment, with the models fitted to it beyond the linear."""
 
     setting: Setting
     fits: Fits
@@ -151,7 +147,7 @@ class Solved:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """Of the nominal model."""
+        """Of the base model."""
         return self.fits.whitened.evidence(self.fits.whitened.found)
 
     @property
@@ -167,7 +163,8 @@ class Solved:
 
     @property
     def acting(self) -> tuple[int, ...]:
-        """Columns of the larger model: all effects named as acting, or the first of those that may be."""
+        """Columns of the larger model: all effects named as acting, or the first of those that may be; none where its
+        cloth diverges."""
         named = self.judgement.named
         return named if self.judgement.conclusion is Conclusion.EFFECT else named[:1]
 
@@ -178,16 +175,6 @@ class Solved:
         linear = self.evidence.fit([weighed.column]).of(weighed.column)[1]
         error = larger.errors[len(THETA) + place] * weighed.error / linear
         return strength(column.described.null, coefficient, error, column.unit)
-
-    @property
-    def doubtful(self) -> tuple[int, ...]:
-        """Columns of effects that are said to act but might be none, by the interval of their strength."""
-        larger, acting = self.larger, self.acting
-        if larger is None or self.judgement.conclusion is Conclusion.ONE_OF:
-            return ()
-        weighed = {w.column: w for w in self.judgement.ranking if w.column in acting}
-        found = {column: self.strength(weighed[column], larger) for column in acting}
-        return tuple(c for c in acting if found[c].low <= weighed[c].candidate.null <= found[c].high)
 
     @cached_property
     def control(self) -> tuple[Weighed, Refined] | None:
@@ -202,9 +189,18 @@ class Solved:
 
 
 def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
-    """Errors of the nominal model along all columns, and the directions."""
-    starts = [setting.nominal] * len(setting.segments)
+    """Errors of the base model along all columns, and the directions."""
+    starts = [setting.calibration] * len(setting.segments)
     return projected(setting.forecaster, setting.segments, starts, banks.columns())
+
+
+def _fits(setting: Setting, found: Statistics, projection: Projection, bank: NullBank) -> Fits:
+    """Models of the experiment, which begin at the one that statistics were taken at."""
+    whitened = WhitenedMisfit(
+        found=found, projection=projection, null=bank.model(setting.design).under(setting.prior),
+        speeds=setting.speeds[setting.recording], origin=setting.calibration,
+    )  # fmt: skip
+    return Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
 
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
@@ -213,27 +209,11 @@ def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:
     return supply.simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell)
 
 
-def _settled(solved: Solved, options: Options, tell: Stage) -> tuple[Judgement, Trial]:
-    """The judgement after the models were refitted, with what they did."""
-    judgement = solved.judgement
-    if solved.doubtful:
-        return withdrawn(judgement, NOT_APART), Trial()
-    trial = _trial(solved, options, tell)
-    partly = judgement.conclusion is Conclusion.PARTLY
-    diverges = solved.larger is None and bool(judgement.named) and GUST_COLUMN not in judgement.named
-    if diverges or trial.failed or (trial.tied and partly):
-        return withdrawn(judgement, NO_HELP), Trial()
-    if trial.tied and solved.control is not None and len(judgement.named) == 1:
-        return tied(judgement, solved.control[0]), trial
-    return judgement, trial
-
-
-def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
+def _trial(solved: Solved, options: Options) -> Trial:
     """Before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
     if larger is None:
         return Trial()
-    tell("before and after", 0, 1)
     control = solved.control
     fitted = [solved.base, larger, *([] if control is None else [control[1]])]
     every = folds(setting.segments, [float(u) for u in setting.speeds])
@@ -249,7 +229,6 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
         tried = list(pool.map(left, fitted))
         of_recording, floor = simulated.result()
     made: list[Comparison] = []
-    helped: list[Floats] = []
     apart: list[Floats] = []
     places: list[NDArray[np.int64]] = []
     frames = len(setting.segments.items[0].positions) - setting.segments.first
@@ -264,37 +243,34 @@ def _trial(solved: Solved, options: Options, tell: Stage) -> Trial:
             )
         )  # fmt: skip
         if len(every) == 1 or place < len(setting.speeds):  # the late parts are in the recordings as well
-            helped.append(before.misfit - after.misfit)
-            places.append(np.full(len(helped[-1]), place))
+            places.append(np.full(len(after.misfit), place))
             apart += [own.misfit - after.misfit for own in wrong]
     return Trial(
-        comparisons=tuple(made), helped=np.concatenate(helped), apart=np.concatenate(apart) if apart else None,
-        recording=np.concatenate(places),
+        comparisons=tuple(made), apart=np.concatenate(apart) if apart else None, recording=np.concatenate(places),
     )  # fmt: skip
 
 
 def _verdict(
     solved: Solved,
-    judgement: Judgement,
     bank: NullBank,
     trial: Trial,
     options: Options,
     began: float,
     late: Sequence[float],
 ) -> Verdict:
-    setting, larger = solved.setting, solved.larger if judgement.named else None
+    setting, larger, judgement = solved.setting, solved.larger, solved.judgement
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
-    tail = solved.reference.tail
-    low, high = tail.interval(judgement.statistic, level=CRITERIA.interval)
+    conformal, reach = solved.reference.conformal, solved.reference.reach
+    low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
-            statistic=judgement.statistic, null=[float(v) for v in tail.null],
+            statistic=judgement.statistic, null=[float(v) for v in conformal.null], kinds=conformal.count,
             p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
-            level=options.level, critical=tail.critical(options.level), nulls=bank.words,
+            level=options.level, critical=conformal.critical(options.level), nulls=bank.words,
         ),
-        parameters=_parameters(solved.base, larger), ranking=_ranking(solved, judgement, larger),
+        parameters=_parameters(solved.base, larger, reach), ranking=_ranking(solved, larger),
         comparisons=trial.comparisons, apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         assumptions=(*assumptions(setting.experiment), *clocks(setting.experiment, late)),
@@ -305,16 +281,19 @@ def _verdict(
         },
     )  # fmt: skip
     return replace(
-        verdict, words=" ".join([sentence(verdict), *ratios(setting.experiment)]), separating=separating(verdict),
-        proposal=_proposal(solved, judgement), seconds=time.perf_counter() - began,
+        verdict, separating=separating(verdict),
+        words=" ".join(
+            [sentence(verdict), *bounds(solved.base if larger is None else larger), *ratios(setting.experiment)]
+        ),
+        proposal=_proposal(solved), seconds=time.perf_counter() - began,
     )  # fmt: skip
 
 
-def _proposal(solved: Solved, judgement: Judgement) -> str:
+def _proposal(solved: Solved) -> str:
     """What the library lacks looks like, where it has no answer or half of one."""
+    judgement, larger = solved.judgement, solved.larger
     if judgement.conclusion not in (Conclusion.OUTSIDE, Conclusion.PARTLY):
         return ""
-    larger = solved.larger if judgement.named else None
     left = None if larger is None else solved.fits.errors(larger)
     modes = corrective_field(
         solved.setting, solved.fits.whitened, left=left, beside=() if larger is None else larger.chosen
@@ -341,10 +320,10 @@ def _unseen(setting: Setting, refined: Refined) -> Predictions:
     )
 
 
-def _ranking(solved: Solved, judgement: Judgement, larger: Refined | None) -> tuple[Candidate, ...]:
+def _ranking(solved: Solved, larger: Refined | None) -> tuple[Candidate, ...]:
     """The candidates; those of the larger model with their strengths beyond the linear."""
     made: list[Candidate] = []
-    for weighed in judgement.ranking:
+    for weighed in solved.judgement.ranking:
         candidate = weighed.candidate
         if larger is not None and weighed.column in solved.acting:
             candidate = replace(candidate, strength=solved.strength(weighed, larger))
@@ -360,25 +339,26 @@ def _named(judgement: Judgement) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _parameters(base: Refined, larger: Refined | None) -> tuple[Parameter, ...]:
+def _parameters(base: Refined, larger: Refined | None, reach: Floats) -> tuple[Parameter, ...]:
+    """Density, bending and damping, which are estimated by their logarithms, with the intervals that hold those of null
+    experiments: `reach` (theta,) standard errors to either side."""
     made: list[Parameter] = []
     for place, (name, _, _) in enumerate(THETA):
-        before = _shown(name, base.model.calibration, base.errors[place])
+        before = _shown(name, base.model.calibration, float(reach[place]) * base.errors[place])
         if larger is None:
             made.append(Parameter(name=name, before=before, after=None, shift=None))
             continue
         steps = larger.model.calibration.steps_from(base.model.calibration)
-        after = _shown(name, larger.model.calibration, larger.errors[place])
+        after = _shown(name, larger.model.calibration, float(reach[place]) * larger.errors[place])
         made.append(Parameter(name=name, before=before, after=after, shift=steps[place] / base.errors[place]))
     return tuple(made)
 
 
-def _shown(name: str, calibration: Calibration, error: float) -> Estimate:
-    """A calibrated parameter as a reader knows it, of its standard error in the units of `THETA`: density and bending
-    are estimated by their logarithms, and no damping is negative."""
-    if name == "damping":
-        found = estimate(calibration.damping, DAMPING_UNIT * error, "s")
-        return replace(found, low=max(found.low, 0.0))
-    value = {"density": calibration.density, "bending": calibration.bending}[name]
-    log = estimate(math.log(value), error, "of nominal")
-    return replace(log, value=value, low=math.exp(log.low), high=math.exp(log.high))
+def _shown(name: str, calibration: Calibration, half: float) -> Estimate:
+    """A calibrated parameter as a reader knows it, with half the width of its logarithm's interval."""
+    value, unit = {
+        "density": (calibration.density, "of nominal"), "bending": (calibration.bending, "of nominal"),
+        "damping": (calibration.damping, "s"),
+    }[name]  # fmt: skip
+    low, high = value * math.exp(-half), value * math.exp(half)
+    return Estimate(value=value, low=low, high=high, unit=unit, level=CRITERIA.interval)

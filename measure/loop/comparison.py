@@ -37,14 +37,12 @@ class Trial:
 
     Attributes:
         comparisons: one a fold.
-        helped: (segment,) half misfit before less after (see `whitened_misfit`), each segment of the recordings
-            left out in turn (of a single recording: of its last part).
-        apart: (segment,) control less after; None without a control.
+        apart: (segment,) half misfit (see `whitened_misfit`) of the control less that of the effect, each segment of
+            the recordings left out in turn (of a single recording: of its last part); None without a control.
         recording: (segment,) what was left out together with each.
     """
 
     comparisons: tuple[Comparison, ...] = ()
-    helped: Floats = field(default_factory=lambda: np.zeros(0))
     apart: Floats | None = None
     recording: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
@@ -52,21 +50,6 @@ class Trial:
     def control(self) -> Estimate | None:
         """Control less after, a segment [nat]; None without a control."""
         return None if self.apart is None else a_segment(self.apart, self.recording)
-
-    @property
-    def failed(self) -> bool:
-        """Whether the effect does not lower the errors, or the control lowers them more, by two standard errors."""
-        worse = self.apart is not None and _above(-self.apart, self.recording)
-        return bool(self.comparisons) and (worse or not self.helped.sum() > 0)
-
-    @property
-    def tied(self) -> bool:
-        """Whether the control cannot be told from the effect: by less than two standard errors."""
-        return bool(self.comparisons) and self.apart is not None and not _above(self.apart, self.recording)
-
-
-def _above(values: Floats, recording: NDArray[np.int64]) -> bool:
-    return bool(values.sum() > CRITERIA.lead * total_error(values, recording))
 
 
 def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
@@ -148,7 +131,8 @@ def left_out(
 ) -> list[LeftOut]:
     """Of a model, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
-    models = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
+    ended = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
+    models = [model for model, _ in ended]
     return measured(forecaster, segments, models, whitened, outsides, fitted.chosen)
 
 

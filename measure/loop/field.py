@@ -41,7 +41,7 @@ def corrective_field(
         beside: columns of that model, whose strengths are fitted with the field.
     """
     forecaster, segments, modes = setting.forecaster, setting.segments, fields()
-    nominal = [setting.nominal] * len(segments)
+    nominal = [setting.calibration] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     changes = forecaster.sensitivities(modes, segments, nominal, base)[len(THETA) :]
     found = whitened.found if left is None else replace(whitened.found, r=whitened.projection.of(left))

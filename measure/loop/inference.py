@@ -1,7 +1,8 @@
 """What the statistics of segments say: coefficients, tests against nulls, comparison on held-out segments.
 
 Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null recordings, whose own
-δ is known: the calibration they were simulated with. U is the wind's speed; μ is that of the nominal cloth, as far as
+δ is none: their statistics are taken at the calibration they were simulated with, those of data at the one that is
+fitted to them. U is the wind's speed; μ is that of the nominal cloth, as far as
 nulls of it tell. Recordings of one cloth share the numerics
 they differ from the fit's by, and what is not linear in its calibration, so that μ has a part in common to an
 experiment: nuisance columns, learnt from the nulls as well.
@@ -25,6 +26,7 @@ from measure.loop.wind_log import by_recording
 Floats = NDArray[np.float64]
 Chosen = Sequence[int]
 
+_HERE = (0.0,) * len(THETA)
 _SHIFTS = 16
 """Of 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
 
@@ -66,7 +68,7 @@ class NullModel:
     @classmethod
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
         """From segments whose calibrations are known, for segments of a design."""
-        clean = nulls.clean
+        clean = nulls.statistics.r
         features = np.c_[_features(nulls.speeds), nulls.beyond(design)]
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
         left = clean - features @ coefficients
@@ -103,7 +105,7 @@ class Nulls:
     Attributes:
         statistics: of the segments.
         speeds: (segment,) of the wind [m/s].
-        offsets: (segment, theta) steps from the calibration of the fit to the one they were simulated with.
+        calibration: (segment, theta) steps from the nominal calibration to the one they were simulated with.
         numerics: (segment,) which mesh and method.
         noise: (segment,) of a marker's coordinate [m].
         period: (segment,) between the frames used [s].
@@ -112,7 +114,7 @@ class Nulls:
 
     statistics: Statistics
     speeds: Floats
-    offsets: Floats
+    calibration: Floats
     numerics: NDArray[np.int64]
     noise: Floats
     period: Floats
@@ -121,19 +123,13 @@ class Nulls:
     @cached_property
     def experiment(self) -> NDArray[np.int64]:
         """(segment,) recordings of one cloth, by one numerics: 0, 1, …"""
-        _, index = np.unique(np.c_[self.numerics, self.offsets], axis=0, return_inverse=True)
+        _, index = np.unique(np.c_[self.numerics, self.calibration], axis=0, return_inverse=True)
         return index.reshape(-1)
-
-    @property
-    def clean(self) -> Floats:
-        """(segment, column) r less what their calibrations explain."""
-        response = self.statistics.response[:, :, : len(THETA)]
-        return self.statistics.r - np.einsum("sij,sj->si", response, self.offsets)
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Nulls:
         """Some segments."""
         return Nulls(
-            statistics=self.statistics.select(chosen), speeds=self.speeds[chosen], offsets=self.offsets[chosen],
+            statistics=self.statistics.select(chosen), speeds=self.speeds[chosen], calibration=self.calibration[chosen],
             numerics=self.numerics[chosen], noise=self.noise[chosen], period=self.period[chosen],
             cloth=self.cloth[chosen],
         )  # fmt: skip
@@ -145,7 +141,8 @@ class Nulls:
         own = [replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]) for p in parts]
         return cls(
             statistics=Statistics.joined(own), speeds=np.concatenate([p.speeds for p in parts]),
-            offsets=np.concatenate([p.offsets for p in parts]), numerics=np.concatenate([p.numerics for p in parts]),
+            calibration=np.concatenate([p.calibration for p in parts]),
+            numerics=np.concatenate([p.numerics for p in parts]),
             noise=np.concatenate([p.noise for p in parts]), period=np.concatenate([p.period for p in parts]),
             cloth=np.concatenate([p.cloth for p in parts]),
         )  # fmt: skip
@@ -276,15 +273,6 @@ class Evidence:
         return replace(own, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod
-    def of_nulls(cls, nulls: Nulls, null: NullModel) -> Evidence:
-        """Of null segments, with what their calibrations explain taken out."""
-        turning = nulls.statistics.turning
-        own = cls._of(nulls.clean, nulls.statistics, nulls.speeds, null)
-        if turning is None or null.turning is None:
-            return own
-        return replace(own, turning=cls.of_nulls(replace(nulls, statistics=turning), null.turning))
-
-    @classmethod
     def _of(cls, r: Floats, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
         left = r - null.mean(speeds)
         shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
@@ -327,7 +315,7 @@ class Evidence:
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
-    def fit(self, chosen: Chosen, *, centre: Sequence[float] = (0.0,) * len(THETA)) -> Fit:
+    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> Fit:
         """Generalised least squares of the nuisance columns, under their priors, and the chosen ones.
 
         Args:
@@ -391,6 +379,10 @@ class Fit:
     value: Floats
     covariance: Floats
     left: float
+
+    def in_errors(self, columns: Sequence[int]) -> Floats:
+        """(column,) some coefficients in their standard errors."""
+        return np.array([value / error for value, error in map(self.of, columns)])
 
     def of(self, column: int) -> tuple[float, float]:
         """Coefficient and standard error."""

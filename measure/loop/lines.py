@@ -62,15 +62,6 @@ class Spectrum:
         around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
         return self._with_the_wind(power / np.maximum(around, np.finfo(np.float64).tiny))
 
-    def share_left(self, line: Line, before: Tensor, after: Tensor) -> float:
-        """Power of a line in errors (frame, marker, 3, segment) [m], over that in others."""
-        place = int(np.argmin(np.abs(REDUCED - line.reduced)))
-        old, new = (
-            float(np.nansum(self._with_the_wind(self._power(errors))[:, place, line.direction]))
-            for errors in (before, after)
-        )
-        return new / old if old > 0 else math.inf
-
     def _power(self, errors: Tensor) -> Floats:
         """(frequency, segment, shape · axis) [m²]."""
         frames, segments = errors.shape[0], errors.shape[3]

@@ -64,7 +64,7 @@ def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) ->
 
 def acting(verdict: Verdict) -> tuple[Candidate, ...]:
     """The effects of the larger model: all that are named as acting, or the first of those that may be."""
-    if verdict.conclusion in (Conclusion.SUFFICIENT, Conclusion.OUTSIDE):
+    if not verdict.named:
         return ()
     found = tuple(candidate for candidate in verdict.ranking if not candidate.why_not)
     return found if verdict.conclusion is Conclusion.EFFECT else found[:1]

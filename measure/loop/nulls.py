@@ -1,6 +1,7 @@
 """Recordings of the base model itself, made with other numerics than the fit's: its errors when it is right.
 
-Nothing of the fitter's numerics is used: meshes are finer by random factors, steps are shorter by other methods.
+Nothing of the fitter's numerics is used: meshes are finer by random factors, half of them irregular, and steps are
+shorter by other methods.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.spatial import Delaunay
 
 from flagdata.rng import stream
 from measure.loop.columns import Calibration
@@ -30,6 +32,7 @@ Floats = NDArray[np.float64]
 _SETTLE = 3.0  # s; a flag of 1.5 m has forgotten a start from rest after two swings
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
+_UNEVEN = 0.2  # share of the spacing by which inner vertices are moved at most
 _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
 
 
@@ -46,6 +49,7 @@ class NullBatch:
         calibrations: one a recording.
         speeds: of the wind, along +x, one a recording [m/s].
         seed: of the numerics, the starts and the noise.
+        stretching: factor on the nominal tables of stretching.
         effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
     """
 
@@ -57,6 +61,7 @@ class NullBatch:
     calibrations: tuple[Calibration, ...]
     speeds: tuple[float, ...]
     seed: int
+    stretching: float = 1.0
     effects: tuple[Effect, ...] = ()
 
     def simulate(self) -> list[Trajectory]:
@@ -79,7 +84,8 @@ class NullBatch:
         return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
 
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
-        """A finer grid in the fit's frame, and its vertices nearest to the attachments."""
+        """A finer mesh in the fit's frame, and its vertices nearest to the attachments: a grid, or in half of the draws
+        one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
         rng = stream(self.seed, "null", "mesh")
         rest = self.specimen.mesh.rest
         low, size = rest.min(axis=0), np.ptp(rest, axis=0)
@@ -87,6 +93,8 @@ class NullBatch:
         columns, rows = (max(2, round(extent / spacing)) for extent in size)
         diagonals = list(Diagonals)[rng.integers(2)]
         flat = grid(width=float(size[0]), height=float(size[1]), columns=columns, rows=rows, diagonals=diagonals)
+        if rng.random() < 0.5:
+            flat = _irregular(flat, spacing, rng)
         flat = replace(flat, rest=flat.rest + low)
         held = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
         return flat, tuple(held)
@@ -105,7 +113,7 @@ class NullBatch:
         for calibration, rough, speed in zip(self.calibrations, roughness, self.speeds, strict=True):
             position = start + rough
             position[list(held)] = specimen.anchors
-            material = calibration.material(specimen.material)
+            material = calibration.material(specimen.material.scaled(stretching=self.stretching))
             scenes.append(
                 Scene(
                     mesh=flat, position=position, gravity=specimen.gravity, air=specimen.air, wind=(speed, 0.0, 0.0),
@@ -129,3 +137,16 @@ class NullBatch:
         step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))]
         base = BackwardEuler(step=step, tolerance=1e-4)
         return SplitEuler(base=base) if self.effects else base, step
+
+
+def _irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
+    """A grid's vertices, those inside moved by up to `_UNEVEN` of the spacing [m] along each axis, joined anew."""
+    low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
+    inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)
+    rest = flat.rest + np.where(inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0)
+    faces = np.asarray(Delaunay(rest).simplices, dtype=np.int64)
+    (a, b), (c, d) = (rest[faces[:, k]].T - rest[faces[:, 0]].T for k in (1, 2))
+    doubled = a * d - b * c
+    faces[doubled < 0] = faces[doubled < 0][:, ::-1]
+    # Vertices along an edge lie on a line but for rounding, which may join three of them.
+    return Mesh(rest=rest, faces=faces[np.abs(doubled) > spacing**2 * np.finfo(np.float32).eps])

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
+from measure.loop.columns import THETA
+from measure.loop.conformal import GroupedConformal, kinds_needed
 from measure.loop.criteria import CRITERIA
 from measure.loop.fluctuation import fluctuation
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
 from measure.loop.lines import Line, Lines, strongest
-from measure.loop.tail_probability import TailProbability, share_as_large
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
@@ -40,7 +41,7 @@ class LeftOutKind:
 
 
 def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOutKind]:
-    """Groups like data, of each kind in turn: so many segments of recordings of one experiment.
+    """Groups like data, of each kind in turn: so many segments of recordings of one experiment, each choice once.
 
     Args:
         nulls: what the null models learn from.
@@ -54,7 +55,7 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
     for kind in np.unique(pool.numerics):
         outside = pool.select(pool.numerics == kind)
         recording = outside.statistics.recording
-        groups: list[NDArray[np.int64]] = []
+        groups: dict[tuple[int, ...], NDArray[np.int64]] = {}
         for index in range(outside.experiment.max() + 1):
             places = [np.flatnonzero(recording == r) for r in np.unique(recording[outside.experiment == index])]
             for _ in range(each):
@@ -64,10 +65,10 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
                         f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
                         fix="simulate longer nulls, or give shorter recordings",
                     )  # fmt: skip
-                groups.append(chosen)
+                groups.setdefault(tuple(sorted(chosen.tolist())), chosen)
         yield LeftOutKind(
             model=NullModel.fit(nulls.select(nulls.numerics != kind), outside.design), outside=outside,
-            groups=tuple(groups),
+            groups=tuple(groups.values()),
         )  # fmt: skip
 
 
@@ -93,11 +94,12 @@ class NullBank:
     anchors_told: bool = True
 
     def __post_init__(self) -> None:
-        count, kinds = len(np.unique(self.nulls.statistics.recording)), len(np.unique(self.nulls.numerics))
-        if count < CRITERIA.fewest_nulls or kinds < CRITERIA.fewest_kinds:
+        kinds = len(np.unique(self.nulls.numerics))
+        if kinds < CRITERIA.fewest_kinds:
             raise InputError(
-                f"{count} null recordings of {kinds} numerics", where="null bank",
-                fix=f"simulate at least {CRITERIA.fewest_nulls} of {CRITERIA.fewest_kinds}, better 200 of 12",
+                f"nulls of {kinds} kinds of numerics", where="null bank",
+                fix=f"simulate at least {CRITERIA.fewest_kinds}, and {kinds_needed(CRITERIA.level)} to test at a level "
+                f"of {CRITERIA.level:g}",
             )  # fmt: skip
 
     def model(self, design: Design) -> NullModel:
@@ -121,12 +123,12 @@ class NullBank:
         """
         plain, beside_gusts = _Groups(), _Groups()
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
-            evidence = Evidence.of_nulls(kept.outside, kept.model)
+            evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model)
             for chosen in kept.groups:
                 picked, own = evidence.select(chosen), float(kept.outside.noise[chosen[0]])
-                kind = int(kept.outside.numerics[chosen[0]])
-                plain.add(picked, self.columns, own, kind)
-                beside_gusts.add(picked.freed(self.columns.index(GUSTS)), self.columns, own, kind)
+                kind, nominal = int(kept.outside.numerics[chosen[0]]), -kept.outside.calibration[chosen[0]]
+                plain.add(picked, self.columns, own, kind, nominal)
+                beside_gusts.add(picked.freed(self.columns.index(GUSTS)), self.columns, own, kind, nominal)
         return Reference.of(plain, noise, beside_gusts=Reference.of(beside_gusts, noise))
 
 
@@ -140,8 +142,10 @@ class _Groups:
     lines: list[Floats] = field(default_factory=list)
     noises: list[float] = field(default_factory=list)
     kinds: list[int] = field(default_factory=list)
+    deviations: list[Floats] = field(default_factory=list)
 
-    def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int) -> None:
+    def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int, nominal: Floats) -> None:
+        """Of a group whose statistics are at its true calibration, the nominal one so many steps away."""
         self.shares.append(unscaled(evidence, columns))
         self.left.append(evidence.fit(()).left)
         if evidence.swing is not None:
@@ -150,6 +154,7 @@ class _Groups:
             self.lines.append(strongest(evidence.lines))
         self.noises.append(noise)
         self.kinds.append(kind)
+        self.deviations.append(evidence.fit((), centre=nominal).in_errors(range(len(THETA))))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -231,6 +236,8 @@ class Reference:
             standard deviations; after the columns that of what the base model leaves, then swings and the line as they
             are.
         kinds: (group,) of numerics.
+        deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
+            standard errors as Σ has them.
         centre, width: (column + 1 to 5,) mean and standard deviation of the same, of nulls as noisy as the data.
         lines: of the nulls; None where spectra are not looked at.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
@@ -240,6 +247,7 @@ class Reference:
     spread: Floats
     far: Floats
     kinds: NDArray[np.int64]
+    deviations: Floats
     centre: Floats
     width: Floats
     lines: Lines | None = None
@@ -254,7 +262,7 @@ class Reference:
         """
         found, noises, kinds = _Found.of(groups), np.array(groups.noises), np.array(groups.kinds)
         alike = np.abs(noises - noise) <= CRITERIA.alike_noise
-        if alike.sum() < CRITERIA.fewest_nulls:
+        if len(np.unique(kinds[alike])) < CRITERIA.fewest_kinds:
             raise InputError(
                 f"no nulls with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
                 fix="build one with such noise, or leave it out",
@@ -264,13 +272,13 @@ class Reference:
         for kind in np.unique(kinds):
             own = kinds == kind
             near = np.abs(noises - noises[own][0]) <= CRITERIA.alike_noise
-            if (near & ~own).sum() >= CRITERIA.fewest_nulls:  # else no other kind has such noise
+            if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds - 1:  # else no others have such noise
                 near &= ~own
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
         return cls(
-            scaled=scaled, spread=usual.spread, far=far, kinds=kinds, centre=usual.centre, width=usual.width,
-            lines=usual.lines, beside_gusts=beside_gusts,
+            scaled=scaled, spread=usual.spread, far=far, kinds=kinds, deviations=np.array(groups.deviations),
+            centre=usual.centre, width=usual.width, lines=usual.lines, beside_gusts=beside_gusts,
         )  # fmt: skip
 
     def beside(self) -> Reference:
@@ -284,9 +292,21 @@ class Reference:
         return self.beside_gusts
 
     @cached_property
-    def tail(self) -> TailProbability:
+    def conformal(self) -> GroupedConformal:
         """Of how far the farthest is, of all columns, what is left and the line: the global test's."""
-        return TailProbability(null=self.far.max(axis=1), kinds=self.kinds)
+        return GroupedConformal(null=self.far.max(axis=1), kinds=self.kinds)
+
+    @cached_property
+    def reach(self) -> Floats:
+        """(theta,) standard errors, as Σ has them, to either side of an interval of the calibrated parameters: as many
+        as hold the true ones in a share of the kinds of numerics, themselves and one more counted, that is the
+        intervals' level."""
+        return np.array(
+            [
+                GroupedConformal(null=np.abs(own), kinds=self.kinds).quantile(CRITERIA.interval)
+                for own in self.deviations.T
+            ]
+        )
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
         """(column,) of data, as `scaled` has them, where some columns are fitted already."""
@@ -295,29 +315,21 @@ class Reference:
 
     def p_family(self, statistic: float, column: int) -> float:
         """Chance that in nulls any is as far as this column."""
-        return self.tail.p(float(self._far(statistic * self.spread[column], column)))
+        return self.conformal.p(float(self._far(statistic * self.spread[column], column)))
 
     def p_alone(self, statistic: float, column: int) -> float:
         """The same for the column alone."""
-        return share_as_large(self.scaled[:, column], statistic)
+        return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
 
-    def p_left_by(
-        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int], *, swinging: bool = True
-    ) -> float:
-        """Of the global test on what some columns leave, fitted to the data.
+    def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
+        """Of the global test on what some columns leave, fitted to the data."""
+        return self.conformal.p(self.farthest(evidence, columns, chosen))
 
-        Args:
-            swinging: whether lines of the errors' spectra count.
-        """
-        return self.tail.p(self.farthest(evidence, columns, chosen, swinging=swinging))
-
-    def farthest(
-        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = (), *, swinging: bool = True
-    ) -> float:
+    def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
         shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
         far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
-        swing, line = self.swing(evidence), self.line(evidence) if swinging else None
+        swing, line = self.swing(evidence), self.line(evidence)
         return max([far, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
 
     def swing(self, evidence: Evidence) -> float | None:

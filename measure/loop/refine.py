@@ -41,7 +41,7 @@ class Refined:
     Attributes:
         model: fitted to all segments.
         chosen: its columns beside the calibrated parameters.
-        errors: standard errors of its calibrated parameters and strengths, as Σ has them.
+        errors: standard errors of its calibrated parameters and strengths, as Σ has them along all directions.
         statistics: at the model before the last step, `origin`, of all segments.
         origin: that model.
         null: the null model of its columns.
@@ -72,7 +72,7 @@ def refine(
     *,
     weighed: Sequence[Column],
 ) -> Refined:
-    """Fit the calibrated parameters and chosen columns to segments, from the linear fit on.
+    """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on.
 
     Every round uses the errors along the fitted columns alone, with their part of the null model.
 
@@ -82,11 +82,11 @@ def refine(
     Raises:
         DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.
     """
-    fit = whitened.evidence(whitened.found).fit(chosen)
+    fit = whitened.evidence(whitened.found).fit(chosen, centre=Calibration().steps_from(whitened.origin))
     own = [weighed[c - len(THETA)] for c in chosen]
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
-    model = Model(calibration=Calibration(), effects=effects).moved(cut(np.array(values, dtype=np.float64)))
+    model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
     part = _part(whitened.null, [*range(len(THETA)), *chosen])
     reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen))
     for _ in range(ROUNDS - 1):
@@ -94,8 +94,8 @@ def refine(
             break
         reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen))
     every = np.ones(len(segments), dtype=bool)
-    (model,) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
-    return replace(reached, model=model)
+    ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
+    return replace(reached, model=model, errors=errors)
 
 
 def finished(
@@ -105,19 +105,20 @@ def finished(
     models: Sequence[Model],
     chosen: Sequence[int],
     insides: Sequence[NDArray[np.bool_]],
-) -> list[Model]:
+) -> list[tuple[Model, tuple[float, ...]]]:
     """Models of the same columns after one linear step by all directions of the whitened misfit, each fitted to
-    some segments.
+    some segments, with the standard errors of that step.
 
     By its own few directions a fit follows effects far from where they are linear, but cannot tell some of them from
     what numerics leave; by all, it can.
     """
     every = errors_of(models, forecaster, segments)
-    made: list[Model] = []
+    made: list[tuple[Model, tuple[float, ...]]] = []
     for model, errors, inside in zip(models, every, insides, strict=True):
         fit = whitened.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
-        step = np.array([fit.of(column)[0] for column in (*range(len(THETA)), *chosen)])
-        made.append(model.moved(cut(step)) if np.isfinite(step).all() else model)
+        step, spread = np.array([fit.of(column) for column in (*range(len(THETA)), *chosen)]).T
+        moved = model.moved(cut(step)) if np.isfinite(step).all() else model
+        made.append((moved, tuple(float(error) for error in spread)))
     return made
 
 

@@ -22,12 +22,16 @@ Stage = Callable[[str, int, int], object]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Setting:
-    """An experiment made ready: in one frame, cut into segments, with the model that predicts them."""
+    """An experiment made ready: in one frame, cut into segments, with the model that predicts them.
+
+    Attributes:
+        calibration: of the base model that statistics are taken at: the nominal one, then the fitted one.
+    """
 
     experiment: Experiment
     segments: Segments
     forecaster: Forecaster
-    nominal: Calibration
+    calibration: Calibration
 
     @classmethod
     def of(cls, experiment: Experiment) -> Setting:
@@ -35,7 +39,7 @@ class Setting:
         turned = aligned(experiment)
         segments = Segments.of(turned.recordings)
         forecaster = Forecaster(specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler())
-        return cls(experiment=turned, segments=segments, forecaster=forecaster, nominal=Calibration())
+        return cls(experiment=turned, segments=segments, forecaster=forecaster, calibration=Calibration())
 
     @property
     def speeds(self) -> Floats:

@@ -46,16 +46,16 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
     """Null recordings over the priors of the cloth, of the winds of an experiment; those of one cloth hold as many
-    segments as the data."""
+    segments as the data, and are as noisy as the noisiest of its recordings."""
     first, segments = setting.experiment.recordings[0], setting.segments
     batches = [
         banks.prior_batch(
-            setting.experiment.specimen, markers=first.markers, rate=1 / segments.period, noise=first.noise,
+            setting.experiment.specimen, markers=first.markers, rate=1 / segments.period, noise=setting.design.noise,
             duration=segments.cut.lasting(banks.each(len(segments))),
             speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
             seed=child_seed(seed, "null", index),
         )
-        for index in range(math.ceil(nulls / banks.BATCH))
+        for index in range(math.ceil(nulls / banks.WINDS))
     ]  # fmt: skip
     done = 0
 
@@ -66,6 +66,6 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
 
     with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
         banks.build(Path(folder), batches, workers=workers, progress=count)
-        total = banks.BATCH * len(batches)
+        total = banks.WINDS * len(batches)
         words = f"{total} recordings of {len(batches)} meshes and methods, over the priors of the cloth"
         return banks.load(Path(folder), words=words)

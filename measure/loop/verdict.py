@@ -10,6 +10,7 @@ from typing import Any
 class Conclusion(StrEnum):
     """What became of the base model."""
 
+    UNTESTED = "cannot test"
     SUFFICIENT = "no effect needed"
     EFFECT = "effect"
     ONE_OF = "one of"
@@ -147,16 +148,18 @@ class NullTest:
         statistic: observed: how far the farthest column is from nulls' mean, in their standard deviations (see
             `measure.loop.reference`).
         null: the same of every group of simulated nulls.
-        p_value: chance of a null as large, with the interval that few kinds of numerics leave it (see
-            `measure.loop.tail_probability`).
+        p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.loop.conformal`, with an interval of
+            the share of all kinds that are, by how many were simulated.
+        kinds: of numerics among the nulls.
         level: at which it was judged.
-        critical: the statistic beyond which the base model is rejected; None where no null is rare enough for it.
+        critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
     """
 
     statistic: float
     null: list[float]
     p_value: Estimate
+    kinds: int
     level: float
     critical: float | None
     nulls: str

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.loop.columns import Calibration
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.statistics import Projection, Statistics
 
@@ -20,16 +21,18 @@ class WhitenedMisfit:
     what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
 
     Attributes:
-        found: statistics at the nominal model.
+        found: statistics of the base model.
         projection: their directions.
         null: the null model.
         speeds: (segment,) of the wind [m/s].
+        origin: calibration of the base model that the statistics are taken at.
     """
 
     found: Statistics
     projection: Projection
     null: NullModel
     speeds: Floats
+    origin: Calibration = field(default_factory=Calibration)
 
     def of(self, errors: Tensor) -> Evidence:
         """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""

@@ -9,12 +9,14 @@ import numpy as np
 
 from measure.loop.attribution import heterogeneous
 from measure.loop.columns import FieldColumn
+from measure.loop.conformal import kinds_needed
 from measure.loop.course import ALONG, LEFT, Variation
 from measure.loop.criteria import CRITERIA
 from measure.loop.field import Mode
 from measure.loop.forecast import Cut
 from measure.loop.lines import STROUHAL, Line
 from measure.loop.quantity import number, probability, with_error, with_level
+from measure.loop.refine import Refined
 from measure.loop.titles import readable, titles
 from measure.loop.verdict import Conclusion, Verdict
 from measure.observe.trajectory import Experiment
@@ -38,7 +40,13 @@ _AXES = ("along the wind", "across the wind", "up")
 
 def sentence(verdict: Verdict) -> str:
     """The verdict in words."""
-    test = f"p = {probability(verdict.test.p_value.value)} against {len(verdict.test.null)} groups of nulls"
+    test = f"p = {probability(verdict.test.p_value.value)} against nulls of {verdict.test.kinds} kinds of numerics"
+    if verdict.conclusion is Conclusion.UNTESTED:
+        return (
+            f"The base model cannot be tested at a level of {verdict.test.level:g}: by nulls of {verdict.test.kinds} "
+            f"kinds of numerics no p is below {probability(1 / (1 + verdict.test.kinds))}. At least "
+            f"{kinds_needed(verdict.test.level)} kinds are needed."
+        )
     if verdict.conclusion is Conclusion.SUFFICIENT:
         return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
     rejected = f"The base model is rejected ({test})."
@@ -63,7 +71,7 @@ def sentence(verdict: Verdict) -> str:
 def _incomplete(verdict: Verdict) -> str:
     """Why what is named is not enough."""
     for candidate in verdict.ranking:
-        if not candidate.why_not and heterogeneous(candidate):
+        if not candidate.why_not and heterogeneous(candidate, verdict.test.level):
             each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
             unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
             return (
@@ -71,6 +79,14 @@ def _incomplete(verdict: Verdict) -> str:
                 f"(p = {probability(candidate.heterogeneity)}): another dependence on the wind would fit better"
             )
     return "the errors that remain are larger than those of simulated nulls"
+
+
+def bounds(fitted: Refined) -> tuple[str, ...]:
+    """Which calibrated parameters are as small or large as the model holds; nothing where none is."""
+    ended = fitted.model.calibration.at_bounds
+    if not ended:
+        return ()
+    return (f"The fit ends at the bound of what the model holds in {' and '.join(ended)}: its interval says no more.",)
 
 
 def ratios(experiment: Experiment) -> tuple[str, ...]:

@@ -58,9 +58,8 @@ class Family:
         pool = alike if len(alike.noise) and len(np.unique(alike.experiment)) >= _LEAST else nulls
         shares: list[Floats] = []
         for kept in left_out_groups(nulls, pool, count, seed=seed):
-            clean = kept.outside.clean
             for chosen in kept.groups:
-                placed = replace(found, r=clean[chosen])
+                placed = replace(found, r=kept.outside.statistics.r[chosen])
                 shares.append(_shares(evidence(placed, kept.outside.speeds[chosen], kept.model), ()))
         result = np.array(shares)
         return cls(shares=result[:, :columns])

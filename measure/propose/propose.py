@@ -297,7 +297,7 @@ def _words(setting: Setting, column: EffectColumn, value: float, density: float)
     if column.term.field != MASS:
         return column.term.words if value >= 0 else f"the opposite of {column.term.words}"
     specimen = setting.experiment.specimen
-    cloth = setting.forecaster.system(setting.segments.select([0]), [setting.nominal])[0].cloth
+    cloth = setting.forecaster.system(setting.segments.select([0]), [setting.calibration])[0].cloth
     share = column.term.at.of(Flat(cloth=cloth))[:, 0, 0].double().numpy()
     added = value * density * specimen.material.density * float(specimen.mesh.vertex_areas @ share)
     return f"{column.term.words}: {1e3 * added:+.3g} g in all"

@@ -19,6 +19,7 @@ from measure.pages.render import render
 from measure.report import cloth, figures, motion, rows, sentences
 
 _TONES = {
+    Conclusion.UNTESTED: "open",
     Conclusion.SUFFICIENT: "settled",
     Conclusion.EFFECT: "settled",
     Conclusion.ONE_OF: "open",

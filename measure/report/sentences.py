@@ -15,6 +15,7 @@ def heading(verdict: Verdict) -> str:
     named = listed(titles(verdict))
     partly = f"the base model lacked {named}, and something more" if verdict.named else "something is still missing"
     return {
+        Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls for the level",
         Conclusion.SUFFICIENT: "No effect needed: the base model explains these recordings",
         Conclusion.EFFECT: f"The base model lacked {named}",
         Conclusion.ONE_OF: f"The base model lacked one of {named}: these recordings cannot tell which",
@@ -30,7 +31,7 @@ def listed(names: Sequence[str]) -> str:
 
 def after_label(verdict: Verdict) -> str:
     """What the columns "after" are of."""
-    if verdict.conclusion is Conclusion.SUFFICIENT:
+    if verdict.conclusion in (Conclusion.UNTESTED, Conclusion.SUFFICIENT):
         return "with an effect"
     if not verdict.named:
         return "with the corrective field"
@@ -44,22 +45,23 @@ def test_sentence(test: NullTest) -> str:
     null = [v for v in test.null if math.isfinite(v)]
     p = test.p_value
     says = "is rejected" if p.value <= test.level else "is not rejected"
+    if test.critical is None:
+        says = "cannot be tested"
     interval = f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}"
     return (
         f"The base model {says}: p = {probability(p.value)} {interval} at level {test.level:g}. {as_large(test)} of "
-        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}. Beyond the highest tenth "
-        "of the nulls, p follows from an exponential tail fitted to them; its interval is a bootstrap over kinds of "
-        "numerics."
+        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}. p counts the "
+        f"{test.kinds} kinds of numerics that the nulls are of, each by the share of its groups, and the data as one "
+        "more; the interval is that of the share of all kinds, by how many were simulated."
     )
 
 
 def test_remark(test: NullTest) -> str:
     """What limits the test; empty where nothing does."""
     if test.critical is None:
-        count = sum(map(math.isfinite, test.null))
         return (
-            f"With {count} nulls no p-value below {probability(1 / (1 + count))} is possible, so that the test could "
-            f"not have rejected the base model at level {test.level:g}."
+            f"With {test.kinds} kinds of numerics no p-value below {probability(1 / (1 + test.kinds))} is possible, so "
+            f"that the test could not have rejected the base model at level {test.level:g}."
         )
     if test.p_value.value > test.level:
         return "An effect that is too weak to show in these recordings may still act."

@@ -86,7 +86,7 @@ def comparison(*, share: float | None = 0.9, after: float = 1e-3, control: float
 def verdict(conclusion: Conclusion, *named: str, **options: Any) -> Verdict:
     return Verdict(
         conclusion=conclusion, named=named, words="", parameters=(),
-        test=NullTest(statistic=1.0, null=[], p_value=estimate(0.5), level=0.05, critical=None, nulls=""),
+        test=NullTest(statistic=1.0, null=[], p_value=estimate(0.5), kinds=40, level=0.05, critical=None, nulls=""),
         ranking=options.get("ranking", tuple(candidate(name) for name in named)),
         comparisons=options.get("comparisons", (comparison(),) if named else ()), residuals=(),
         apart=options.get("apart", estimate(1.0, 0.5) if named else None),

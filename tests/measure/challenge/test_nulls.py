@@ -79,5 +79,5 @@ def test_the_verb_builds_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     (tmp_path / "tiny.toml").write_text(TEN_SECONDS)
     arguments = ["bank", str(tmp_path / "made"), "--recipe", str(tmp_path / "tiny.toml"), "--seed", "5", "--kinds", "6"]
     result = CliRunner().invoke(challenge, [*arguments, "--workers", "2", "--json"], catch_exceptions=False)
-    assert json.loads(result.stdout)["recordings"] == 6 * banks.BATCH
+    assert json.loads(result.stdout)["recordings"] == 6 * banks.WINDS
     assert asked == [(tmp_path / "made", 6, 2)]

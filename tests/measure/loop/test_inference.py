@@ -17,7 +17,7 @@ from measure.loop.reference import GUSTS, NullBank
 from measure.loop.statistics import Statistics
 
 Floats = NDArray[np.float64]
-COLUMNS, KINDS, CLOTHS, WINDS, SEGMENTS = 8, 20, 2, 4, 4
+COLUMNS, KINDS, CLOTHS, WINDS, SEGMENTS = 8, 40, 1, 4, 4
 RECORDINGS = KINDS * CLOTHS * WINDS
 
 
@@ -46,12 +46,12 @@ class World:
     def nulls(self) -> Nulls:
         kinds = np.repeat(np.arange(KINDS), CLOTHS * WINDS)
         offsets = np.repeat(self.rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS, axis=0)
-        delta = np.concatenate([offsets, np.zeros((RECORDINGS, COLUMNS - len(THETA)))], axis=1)
+        delta = np.zeros((RECORDINGS, COLUMNS))  # statistics are taken at each one's own calibration
         speeds = self.rng.uniform(3, 8, RECORDINGS)
         shift = np.repeat(self.rng.normal(size=KINDS * CLOTHS), WINDS)
         own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
         return Nulls(
-            statistics=own, speeds=speeds[own.recording], offsets=offsets[own.recording], numerics=kinds[own.recording],
+            statistics=own, speeds=speeds[own.recording], calibration=offsets[own.recording], numerics=kinds[own.recording],
             noise=np.zeros(len(own.recording)), period=np.full(len(own.recording), 0.04),
             cloth=np.full(len(own.recording), "made"),
         )  # fmt: skip

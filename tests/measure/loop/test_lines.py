@@ -92,20 +92,6 @@ def test_a_larger_unit_is_no_more_prominent() -> None:
     np.testing.assert_allclose(prominence(1e3 * noise(1)), prominence(noise(1)), rtol=1e-9)
 
 
-def test_the_share_of_a_line_that_is_left(nulls: tuple[Lines, Floats]) -> None:
-    lines, standing = nulls
-    swung = noise(3) + swinging(1.33, 1.0)
-    line = lines.line(prominence(swung), centre=float(standing.mean()), width=float(standing.std()))
-    half = noise(3) + swinging(1.33, 0.5)
-    # A quarter of the line's power, and noise, of which 54 markers' mean has 1/54 of one marker's.
-    left = SPECTRUM.share_left(line, torch.as_tensor(swung), torch.as_tensor(half))
-    assert left == pytest.approx(0.25, rel=0.15)
-    assert SPECTRUM.share_left(line, torch.as_tensor(swung), torch.as_tensor(swung)) == 1.0
-    # What swings elsewhere is no part of it: noise is left.
-    other = noise(4) + swinging(2.4, 1.0)
-    assert SPECTRUM.share_left(line, torch.as_tensor(swung), torch.as_tensor(other)) < 0.15
-
-
 def test_frequencies_beyond_what_frames_show_are_left_out() -> None:
     found = prominence(noise(1))
     highest = 0.5 / PERIOD - 0.5

@@ -27,12 +27,11 @@ def drawn(rng: np.random.Generator) -> tuple[Nulls, Statistics]:
     square = np.tile(np.eye(DIRECTIONS), (count, 1, 1))
     shifts = rng.normal(size=(KINDS, DIRECTIONS)) * np.linspace(1, 0, DIRECTIONS)
     r = shifts[numerics] + rng.normal(size=(count, DIRECTIONS)) @ mixing.T
-    r[:, :3] += offsets
     own = Statistics(
         recording=recording, r=r, response=square, error=np.ones(count), marker_error=np.ones((count, 1))
     )  # fmt: skip
     nulls = Nulls(
-        statistics=own, speeds=rng.uniform(3, 6, count), offsets=offsets, numerics=numerics, noise=np.zeros(count),
+        statistics=own, speeds=rng.uniform(3, 6, count), calibration=offsets, numerics=numerics, noise=np.zeros(count),
         period=np.full(count, 0.04), cloth=np.full(count, "made"),
     )  # fmt: skip
     terms = np.tile(rng.normal(size=(DIRECTIONS, TERMS)), (4, 1, 1))

@@ -17,9 +17,10 @@ from tests.measure.report.verdicts import about, verdict
 
 def test_too_few_nulls_for_the_level_are_called_so() -> None:
     test = NullTest(
-        statistic=5.0, null=[1.0] * 19, p_value=about(0.05, 0.01), level=0.01, critical=None, nulls="few"
+        statistic=5.0, null=[1.0] * 38, p_value=about(0.05, 0.01), kinds=19, level=0.01, critical=None, nulls="few"
     )  # fmt: skip
-    assert "no p-value below 0.05" in sentences.test_remark(test)
+    assert "With 19 kinds of numerics no p-value below 0.05" in sentences.test_remark(test)
+    assert sentences.test_sentence(test).startswith("The base model cannot be tested: p = 0.05")
 
 
 def test_the_test_is_told_with_its_interval_and_how_many_nulls_reach_it() -> None:

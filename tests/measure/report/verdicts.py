@@ -152,6 +152,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
             statistic=statistic,
             null=null.tolist(),
             p_value=Estimate(value=p, low=0.5 * p, high=min(2.5 * p, 1.0), unit="1"),
+            kinds=199,
             level=0.01,
             critical=float(np.sort(null)[-2]),
             nulls="199 simulations at parameters drawn from the posterior, with half the step and a finer mesh.",
