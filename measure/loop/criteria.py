@@ -22,7 +22,7 @@ class Criteria:
     Attributes:
         level: of the global test, and of the same test of what a model with effects leaves: rejected at p ≤ level.
         interval: level of all intervals.
-        fewest_kinds: kinds of numerics below which no interval of 90 % can be given: 1 − 1/(kinds + 1).
+        fewest_kinds: kinds of numerics below which their spread cannot be told.
         simulated_kinds: kinds of numerics that are simulated at least where no bank is given. A level of 0.03 can be
             tested by 33; of 40, one at which a fifth of the groups are as far does not save the base model.
         alike_noise: difference of the markers' noise up to which nulls stand for the data [m]: it moves statistics
@@ -45,7 +45,7 @@ class Criteria:
 
     level: float = 0.03
     interval: float = 0.9
-    fewest_kinds: int = 9
+    fewest_kinds: int = 4
     simulated_kinds: int = 40
     alike_noise: float = 1.5e-3
     refitted: int = 2

@@ -41,7 +41,7 @@ class LeftOutKind:
 
 
 def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOutKind]:
-    """Groups like data, of each kind in turn: so many segments of recordings of one experiment, each choice once.
+    """Groups like data, of each kind in turn: so many segments of recordings of one experiment.
 
     Args:
         nulls: what the null models learn from.
@@ -55,7 +55,7 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
     for kind in np.unique(pool.numerics):
         outside = pool.select(pool.numerics == kind)
         recording = outside.statistics.recording
-        groups: dict[tuple[int, ...], NDArray[np.int64]] = {}
+        groups: list[NDArray[np.int64]] = []
         for index in range(outside.experiment.max() + 1):
             places = [np.flatnonzero(recording == r) for r in np.unique(recording[outside.experiment == index])]
             for _ in range(each):
@@ -65,10 +65,10 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
                         f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
                         fix="simulate longer nulls, or give shorter recordings",
                     )  # fmt: skip
-                groups.setdefault(tuple(sorted(chosen.tolist())), chosen)
+                groups.append(chosen)
         yield LeftOutKind(
             model=NullModel.fit(nulls.select(nulls.numerics != kind), outside.design), outside=outside,
-            groups=tuple(groups.values()),
+            groups=tuple(groups),
         )  # fmt: skip
 
 
@@ -119,12 +119,12 @@ class NullBank:
             noise: of the data's markers [m].
 
         Raises:
-            InputError: no experiment has that many segments, or too few have such noise.
+            InputError: no experiment has that many segments, or too few kinds have such noise.
         """
         plain, beside_gusts = _Groups(), _Groups()
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model)
-            for chosen in kept.groups:
+            for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
                 picked, own = evidence.select(chosen), float(kept.outside.noise[chosen[0]])
                 kind, nominal = int(kept.outside.numerics[chosen[0]]), -kept.outside.calibration[chosen[0]]
                 plain.add(picked, self.columns, own, kind, nominal)
@@ -262,17 +262,18 @@ class Reference:
         """
         found, noises, kinds = _Found.of(groups), np.array(groups.noises), np.array(groups.kinds)
         alike = np.abs(noises - noise) <= CRITERIA.alike_noise
-        if len(np.unique(kinds[alike])) < CRITERIA.fewest_kinds:
+        count, needed = len(np.unique(kinds[alike])), kinds_needed(1 - CRITERIA.interval)
+        if count < needed:
             raise InputError(
-                f"no nulls with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
-                fix="build one with such noise, or leave it out",
+                f"{count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
+                fix=f"build a bank of {needed} or more with such noise, or leave it out",
             )  # fmt: skip
         usual = _Usual.of(found.select(alike))
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
         for kind in np.unique(kinds):
             own = kinds == kind
             near = np.abs(noises - noises[own][0]) <= CRITERIA.alike_noise
-            if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds - 1:  # else no others have such noise
+            if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds:  # else no others have such noise
                 near &= ~own
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))

@@ -235,8 +235,11 @@ def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
     other = judged(null, reference, {"vertical-wind.inclination": (1.8, 0.8, 0.4)} | hem)
     assert same.conclusion is Conclusion.EFFECT
     assert other.conclusion is Conclusion.PARTLY
-    assert named(other) == ["vertical-wind.inclination"]
-    first, second = same.ranking[0].candidate.heterogeneity, other.ranking[0].candidate.heterogeneity
+    assert beside or named(other) == ["vertical-wind.inclination"]
+    first, second = (
+        next(w for w in found.ranking if w.candidate.effect == "vertical-wind").candidate.heterogeneity
+        for found in (same, other)
+    )
     assert first is not None
     assert second is not None
     assert second < 0.02 < first
@@ -319,10 +322,80 @@ def test_courses_of_the_data_alone_are_refused(null: NullModel, reference: Refer
         judge(seen(null, {}, course=pulses(0.1)), reference, level=0.02)
 
 
-def test_a_strength_beyond_all_expectation_is_not_named(null: NullModel, reference: Reference) -> None:
-    found = judged(null, reference, {"hem-mass.line_density": 6.0})
+def test_a_strength_that_an_effect_cannot_have_is_not_named(null: NullModel, reference: Reference) -> None:
+    """A hem does not make cloth lighter."""
+    found = judged(null, reference, {"hem-mass.line_density": -1.0})
     assert "hem-mass.line_density" not in named(found)
-    assert "not physical" in next(w for w in found.ranking if w.candidate.effect == "hem-mass").candidate.why_not
+    assert "no cloth has it" in next(w for w in found.ranking if w.candidate.effect == "hem-mass").candidate.why_not
+
+
+LIFT, HEM = names().index("lift.coefficient"), names().index("hem-mass.line_density")
+
+
+def predicting(evidence: Evidence, each: float, *, leftover: float = 0.5, seed: int = 0) -> Refit:
+    """A model that predicts every segment better than the base model by so much, and a deviation of 1."""
+    gained = each + stream(seed, "gains").normal(size=3 * SEGMENTS)
+    return Refit(coefficient=0.3, gains=gained, leftover=leftover, evidence=evidence)
+
+
+@pytest.mark.parametrize(
+    ("hem", "left", "said"),
+    [
+        (5.0, (0.5, 0.5), ["hem-mass.line_density", "lift.coefficient"]),
+        (3.0, (0.5, 0.5), ["lift.coefficient"]),  # a difference of 24 to a standard error of √24 = 4.9
+        (5.0, (0.01, 0.5), ["hem-mass.line_density"]),
+        (5.0, (0.5, 0.01), ["lift.coefficient"]),
+    ],
+)
+def test_what_is_named_is_the_confidence_set_less_what_fails_its_predictive_test(
+    null: NullModel, reference: Reference, hem: float, left: tuple[float, float], said: list[str]
+) -> None:
+    data, rest = seen(null, {"lift.coefficient": 1.0}), seen(null, {}, seed=3)
+    refits = {
+        LIFT: predicting(rest, 5.0, leftover=left[0]), HEM: predicting(rest, hem, leftover=left[1], seed=1),
+        **{column: None for column in range(len(THETA), len(THETA) + 18) if column not in (LIFT, HEM)},
+    }  # fmt: skip
+    found = judge(data, reference, level=0.02, refits=refits)
+    assert sorted(named(found)) == said
+    assert found.conclusion is (Conclusion.ONE_OF if len(said) > 1 else Conclusion.EFFECT)
+
+
+def test_where_the_base_model_predicts_as_well_nothing_is_named(null: NullModel, reference: Reference) -> None:
+    """However well an effect fits what rejects the base model."""
+    refits = {
+        column: Refit(coefficient=0.3, gains=1.0 - 2.0 * (np.arange(12) % 2), leftover=0.5, evidence=seen(null, {}, seed=3))
+        for column in range(len(THETA), len(THETA) + 18)
+    }  # fmt: skip
+    found = judge(seen(null, {}, line=10.0), reference, level=0.02, refits=refits)
+    assert (found.conclusion, found.named, found.confident) == (Conclusion.OUTSIDE, (), ())
+
+
+def test_a_cloth_that_diverges_is_no_model(null: NullModel, reference: Reference) -> None:
+    data = seen(null, {"lift.coefficient": 1.0})
+    assert named(judge(data, reference, level=0.02)) == ["lift.coefficient"]
+    assert "lift.coefficient" not in named(judge(data, reference, level=0.02, refits={LIFT: None}))
+
+
+def test_a_level_that_the_kinds_cannot_test_is_not_tested(null: NullModel, reference: Reference) -> None:
+    """By 50 kinds of numerics no p is below 1/51."""
+    data = seen(null, {"lift.coefficient": 1.0})
+    assert judge(data, reference, level=1 / 51 + 1e-9).conclusion is Conclusion.EFFECT
+    untested = judge(data, reference, level=0.019)
+    assert (untested.conclusion, untested.named) == (Conclusion.UNTESTED, ())
+
+
+def test_intervals_of_the_calibrated_parameters_hold_those_of_new_kinds() -> None:
+    """Of 90 %: by ten banks, 20 experiments each of their own kind, whose numerics move all directions."""
+    held = []
+    for seed in range(10):
+        bank = made(seed)
+        null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+        for place in range(20):
+            own = seen(null, {}, seed=1000 + place).fit(()).in_errors(range(len(THETA)))
+            held.append(np.abs(own) <= reference.reach)
+    share = np.mean(held, axis=0)
+    # 200 experiments against ten quantiles of 50 kinds each: a standard error of 0.02 and one of 0.013.
+    assert (np.abs(share - 0.9) < 3 * 0.025).all(), share
 
 
 def test_finalists_are_the_first_by_gain_and_by_statistic(null: NullModel, reference: Reference) -> None:
@@ -330,7 +403,8 @@ def test_finalists_are_the_first_by_gain_and_by_statistic(null: NullModel, refer
     chosen = finalists(found)
     assert chosen[0] == found.ranking[0].column
     assert GUST_COLUMN not in chosen
-    assert len(set(chosen)) == len(chosen) <= 4
+    assert set(found.confident) <= set(chosen)
+    assert len(set(chosen)) == len(chosen)
 
 
 def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Reference) -> None:

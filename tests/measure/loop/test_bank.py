@@ -40,11 +40,12 @@ def test_anchors_that_are_not_told_are_taken_from_the_recordings_of_each_cloth(b
         segments = Segments.of(recordings)
         segments = segments.select(np.flatnonzero(segments.recording // 2 == place))
         forecaster = Forecaster(specimen=own, markers=batch.markers, integrator=SplitEuler())
-        expected = statistics(forecaster, segments, [Calibration()] * len(segments), (LEAN,))
+        expected = statistics(forecaster, segments, [CLOTHS[place]] * len(segments), (LEAN,))
         found = nulls.select(nulls.statistics.recording // 2 == place)
         # Single precision, and a solver that stops for all members of a batch at once.
         np.testing.assert_allclose(found.statistics.r, expected.r, rtol=1e-3)
-        np.testing.assert_allclose(found.offsets, np.tile(CLOTHS[place].steps_from(Calibration()), (len(segments), 1)))
+        steps = CLOTHS[place].steps_from(Calibration())
+        np.testing.assert_allclose(found.calibration, np.tile(steps, (len(segments), 1)))
 
 
 def test_anchors_that_are_told_are_those_of_the_simulation(batch: NullBatch) -> None:

@@ -31,7 +31,7 @@ def test_a_step_is_within_what_is_expected_of_the_strength() -> None:
         assert least <= column.described.null + column.step <= most, column.name
 
 
-@given(density=st.floats(-0.5, 0.5), bending=st.floats(-1.5, 1.5), damping=st.floats(-0.3, 2.0))
+@given(density=st.floats(-0.5, 0.5), bending=st.floats(-1.5, 1.5), damping=st.floats(-2.0, 4.0))
 def test_steps_between_calibrations_undo_one_another(density: float, bending: float, damping: float) -> None:
     start = Calibration()
     moved = start.moved((density, bending, damping))
@@ -50,12 +50,19 @@ def test_a_calibration_scales_density_and_bending_and_sets_damping() -> None:
     assert material.damping == 1e-3
 
 
-def test_the_units_of_steps_are_natural_logarithms_and_5_ms() -> None:
-    moved = Calibration(damping=1e-3).moved((math.log(1.1), math.log(2.0), 1.0))
+def test_steps_are_natural_logarithms() -> None:
+    moved = Calibration(damping=1e-3).moved((math.log(1.1), math.log(2.0), math.log(30.0)))
     assert moved.density == pytest.approx(1.1)
     assert moved.bending == pytest.approx(2.0)
-    assert moved.damping == pytest.approx(6e-3)
+    assert moved.damping == pytest.approx(30e-3)
     assert len(THETA) == 3
+
+
+def test_a_calibration_at_its_bounds_says_so() -> None:
+    """Damping up to what cloth has, 30 ms and more, is none."""
+    assert Calibration(damping=60e-3).at_bounds == ()
+    far = Calibration().moved((20.0, 0.0, -20.0))
+    assert far.at_bounds == ("density", "damping")
 
 
 def test_a_field_mode_is_a_force_per_mass_along_its_axis() -> None:

@@ -1,4 +1,4 @@
-"""When a named effect has failed on unseen data, when its control is as good, and when it stands."""
+"""What is left out together, and how errors on unseen data are compared."""
 
 from __future__ import annotations
 
@@ -6,54 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from measure.loop.comparison import Trial, folds, paired, total_error
+from measure.loop.comparison import folds, paired, total_error
 from measure.loop.forecast import Segments
-from measure.loop.verdict import Comparison, Estimate
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 
 RNG = np.random.default_rng(1)
 NOISE = RNG.standard_normal(12)
 NOISE = (NOISE - NOISE.mean()) / NOISE.std(ddof=1)
-
-
-def around(mean: float) -> np.ndarray:
-    """Twelve segments of this mean and standard deviation 1: a standard error of the sum of √12."""
-    return mean + NOISE
-
-
-def trial(helped: float, apart: float | None) -> Trial:
-    one = Estimate(value=1.0, low=0.9, high=1.1, unit="m", level=0.9)
-    comparison = Comparison(
-        what="unseen", frames=1, before=one, after=one, reduction=one, floor=one, oracle=None, share=None, control=None,
-        control_name="",
-    )  # fmt: skip
-    return Trial(
-        comparisons=(comparison,), helped=around(helped), apart=None if apart is None else around(apart),
-        recording=np.zeros(12, dtype=np.int64),
-    )  # fmt: skip
-
-
-# Two standard errors of the sum of twelve are 2 √12 = 12 · 0.577.
-@pytest.mark.parametrize(
-    ("helped", "apart", "failed", "tied"),
-    [
-        (1.0, 0.6, False, False),
-        (1.0, 0.55, False, True),
-        (1.0, -0.55, False, True),
-        (1.0, -0.6, True, True),
-        (-0.1, 0.6, True, False),
-        (1.0, None, False, False),
-    ],
-)
-def test_two_standard_errors_decide(helped: float, apart: float | None, failed: bool, tied: bool) -> None:
-    found = trial(helped, apart)
-    assert (found.failed, found.tied) == (failed, tied)
-
-
-def test_errors_that_are_not_finite_have_failed() -> None:
-    helped = around(1.0)
-    helped[3] = np.nan
-    assert Trial(comparisons=trial(1.0, 1.0).comparisons, helped=helped).failed
 
 
 @pytest.mark.parametrize(("frames", "each", "late"), [(250, 4, 2), (202, 3, 1), (450, 8, 2), (500, 9, 3)])
@@ -83,11 +42,6 @@ def test_of_a_recording_with_one_segment_the_error_is_that_of_all() -> None:
     # Standard deviation √13 of 1, 3, 8 about 4; times √3.
     assert total_error(values, np.array([0, 0, 1])) == pytest.approx(np.sqrt(39), rel=1e-12)
     assert total_error(values[:1], np.array([0])) == np.inf
-
-
-def test_no_trial_neither_fails_nor_ties() -> None:
-    assert not Trial().failed
-    assert not Trial().tied
 
 
 def test_a_paired_reduction_is_the_difference_of_roots_with_students_interval() -> None:

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
+import pytest
 
-from measure.loop.columns import FieldColumn
+from measure.loop.columns import Calibration, FieldColumn
 from measure.loop.course import Variation
 from measure.loop.field import Mode
 from measure.loop.lines import Line
+from measure.loop.model import Model
+from measure.loop.refine import Refined
 from measure.loop.verdict import Conclusion
-from measure.loop.words import blowing, proposal, sentence, shedding
+from measure.loop.words import blowing, bounds, proposal, sentence, shedding
 from tests.measure.report.verdicts import verdict
 
 
@@ -53,3 +58,16 @@ def test_a_course_that_is_not_turbulence_is_said_in_shares_of_the_wind() -> None
     said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
     told = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
     assert told in said
+
+
+@pytest.mark.parametrize(("damping", "told"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")])
+def test_a_fit_that_ends_at_a_bound_says_so(damping: float, told: str) -> None:
+    ended = Model(calibration=Calibration().moved((0.0, 0.0, float(np.log(damping / 2.5e-3)))))
+    said = " ".join(bounds(cast(Refined, SimpleNamespace(model=ended))))
+    assert (told in said) if told else said == ""
+
+
+def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
+    few = verdict(Conclusion.SUFFICIENT)
+    untested = replace(few, conclusion=Conclusion.UNTESTED, test=replace(few.test, kinds=20, level=0.03))
+    assert "no p is below 0.048. At least 33 kinds are needed." in sentence(untested)
