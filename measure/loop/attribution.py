@@ -221,9 +221,7 @@ def _second(
         if not _leads(pairs[1 + place], pairs[0], evidence.recording):
             return None
         value, _ = evidence.fit(both).of(second.column)
-        constant = all(
-            _homogeneous_beside(evidence, both, w, level) for w in (first, second) if w.column in both
-        )
+        constant = all(_homogeneous_beside(evidence, both, w, level) for w in (first, second) if w.column in both)
         if _physical(_described(second), value) and constant and reference.p_left_by(evidence, names(), both) > level:
             return second
     return None

@@ -8,8 +8,9 @@ drawn from among those that groups of their kind have, then
 
 is at most α in a share α of experiments or fewer, whatever the distribution of the statistic within kinds and among
 them (conformal prediction with hierarchical data: Lee, Barber and Willett, arXiv:2306.06342; Dunn, Wasserman and
-Ramdas, J. Am. Stat. Assoc. 118:2491, 2023). Many groups of a kind count no more than one, and only make s_k smoother than the 0
-or 1 of a single draw. Nothing is extrapolated: p is never less than 1/(K + 1), and a level below that cannot be tested.
+Ramdas, J. Am. Stat. Assoc. 118:2491, 2023). Many groups of a kind count no more than one, and only make s_k smoother
+than the 0 or 1 of a single draw. Nothing is extrapolated: p is never less than 1/(K + 1), and a level below that cannot
+be tested.
 """
 
 from __future__ import annotations

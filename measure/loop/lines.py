@@ -9,7 +9,6 @@ shows alone is none that goes with the wind.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
 from measure.loop import bank as banks
+from measure.loop.nulls import NullBatch
 from measure.loop.reference import NullBank
 from measure.loop.setting import Setting, Stage
 
@@ -44,28 +45,33 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
         )  # fmt: skip
 
 
-def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
-    """Null recordings over the priors of the cloth, of the winds of an experiment; those of one cloth hold as many
-    segments as the data, and are as noisy as the noisiest of its recordings."""
-    first, segments = setting.experiment.recordings[0], setting.segments
-    batches = [
+def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
+    """Nulls over the priors of the cloth, of the winds of an experiment: a batch for each kind of numerics. Those of
+    one cloth hold as many segments as the data, and are as noisy as the noisiest of its recordings."""
+    segments = setting.segments
+    return [
         banks.prior_batch(
-            setting.experiment.specimen, markers=first.markers, rate=1 / segments.period, noise=setting.design.noise,
+            setting.experiment.specimen, markers=segments.markers, rate=1 / segments.period, noise=setting.design.noise,
             duration=segments.cut.lasting(banks.each(len(segments))),
             speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
             seed=child_seed(seed, "null", index),
         )
-        for index in range(math.ceil(nulls / banks.WINDS))
+        for index in range(kinds)
     ]  # fmt: skip
+
+
+def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
+    """A bank for one verdict, of `batches`."""
+    wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
     done = 0
 
     def count(more: int) -> None:
         nonlocal done
         done += more
-        stage("nulls", done, len(batches))
+        stage("nulls", done, len(wanted))
 
     with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
-        banks.build(Path(folder), batches, workers=workers, progress=count)
-        total = banks.WINDS * len(batches)
-        words = f"{total} recordings of {len(batches)} meshes and methods, over the priors of the cloth"
+        banks.build(Path(folder), wanted, workers=workers, progress=count)
+        total = banks.WINDS * len(wanted)
+        words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
         return banks.load(Path(folder), words=words)

@@ -7,6 +7,7 @@ from tests.validation.page import draw_page
 
 VALIDATIONS = {
     "arcsim": "tests.validation.arcsim",
+    "arcsim-jittered": "tests.validation.arcsim_jittered",
     "arcsim-loop": "tests.validation.arcsim_loop",
     "clip-information": "tests.validation.clip_information",
     "clock-recovery": "tests.validation.clock_recovery",

@@ -52,7 +52,9 @@ def test_p_is_uniform_where_groups_of_a_kind_are_alike(each: int) -> None:
 def test_groups_counted_as_independent_would_reject_too_often() -> None:
     """Ten groups of 39 kinds are no 390 nulls: beyond all of them is an event of one in 40."""
     rng, worlds = np.random.default_rng(3), 2000
-    beyond = sum(value > nulls.null.max() for nulls, value in (world(rng, each=(10,), within=0.0) for _ in range(worlds)))
+    beyond = sum(
+        value > nulls.null.max() for nulls, value in (world(rng, each=(10,), within=0.0) for _ in range(worlds))
+    )
     assert binomtest(beyond, worlds, 1 / 391, alternative="greater").pvalue < 1e-6
     assert binomtest(beyond, worlds, 1 / 40).pvalue > 1e-4
 
@@ -87,7 +89,9 @@ def test_beyond_the_critical_value_p_is_at_most_the_level(level: float) -> None:
 @pytest.mark.parametrize("reached", [0, 3, 20, 39])
 def test_the_interval_is_that_of_a_binomial_of_the_kinds(reached: int) -> None:
     """However many groups they make: at its ends, so many kinds or more, and so many or fewer, have a chance of 5 %."""
-    nulls = GroupedConformal(null=np.repeat(np.arange(39) < reached, 7).astype(float), kinds=np.repeat(np.arange(39), 7))
+    nulls = GroupedConformal(
+        null=np.repeat(np.arange(39) < reached, 7).astype(float), kinds=np.repeat(np.arange(39), 7)
+    )
     low, high = nulls.interval(1.0, level=0.9)
     assert low == 0 if reached == 0 else binom.sf(reached - 1, 39, low) == pytest.approx(0.05)
     assert high == 1 if reached == 39 else binom.cdf(reached, 39, high) == pytest.approx(0.05)
@@ -95,7 +99,9 @@ def test_the_interval_is_that_of_a_binomial_of_the_kinds(reached: int) -> None:
 
 def test_one_more_kind_is_within_the_quantile_as_often_as_it_says() -> None:
     rng, worlds = np.random.default_rng(8), 2000
-    inside = sum(value <= nulls.quantile(0.9) for nulls, value in (world(rng, each=(4,), within=0.0) for _ in range(worlds)))
+    inside = sum(
+        value <= nulls.quantile(0.9) for nulls, value in (world(rng, each=(4,), within=0.0) for _ in range(worlds))
+    )
     # 36 of 40 places.
     assert binomtest(inside, worlds, 0.9).pvalue > 1e-4
     assert GroupedConformal(null=np.arange(8.0), kinds=np.arange(8)).quantile(0.9) == math.inf

@@ -51,7 +51,8 @@ class World:
         shift = np.repeat(self.rng.normal(size=KINDS * CLOTHS), WINDS)
         own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
         return Nulls(
-            statistics=own, speeds=speeds[own.recording], calibration=offsets[own.recording], numerics=kinds[own.recording],
+            statistics=own, speeds=speeds[own.recording], calibration=offsets[own.recording],
+            numerics=kinds[own.recording],
             noise=np.zeros(len(own.recording)), period=np.full(len(own.recording), 0.04),
             cloth=np.full(len(own.recording), "made"),
         )  # fmt: skip

@@ -60,7 +60,9 @@ def test_a_course_that_is_not_turbulence_is_said_in_shares_of_the_wind() -> None
     assert told in said
 
 
-@pytest.mark.parametrize(("damping", "told"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")])
+@pytest.mark.parametrize(
+    ("damping", "told"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")]
+)
 def test_a_fit_that_ends_at_a_bound_says_so(damping: float, told: str) -> None:
     ended = Model(calibration=Calibration().moved((0.0, 0.0, float(np.log(damping / 2.5e-3)))))
     said = " ".join(bounds(cast(Refined, SimpleNamespace(model=ended))))

@@ -1,0 +1,108 @@
+"""The loop closed on four experiments of ArcSim whose undeclared effect is known, by two draws of nulls.
+
+Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure of the air × 1.6, a
+linear tangential drag, and an internal damping of 30 ms. A verdict is right if it names what acted, alone or as one of
+several, and names nothing where only a calibrated parameter differs. All four are judged by the same bank of nulls, and
+once more by one that was drawn anew: verdicts that differ between the two depend on the draw.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from measure.loop import bank as banks
+from measure.loop.close import Options, close_loop
+from measure.loop.criteria import CRITERIA
+from measure.loop.setting import Setting
+from measure.loop.supply import batches
+from measure.loop.verdict import Conclusion, Estimate, Verdict
+from measure.observe import Hold, Observation, Setup, from_arrays, observe
+from measure.observe.trajectory import Experiment, WindTrack
+from tests.validation.arcsim import RATE, folder
+from tests.validation.flags_runs import CAMEL
+
+WINDS = (3, 5, 7)
+DRAWS = (1, 2)
+_UNIT = 1e-4  # m, of the stored positions
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """What acted.
+
+    Attributes:
+        effect: name in the library; empty where none did.
+        parameters: calibrated ones that are not the nominal cloth's.
+    """
+
+    effect: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict[str, float])
+
+
+CASES = {
+    "null": Truth(),
+    "pressure-x1.6": Truth(effect="air-density"),
+    "tangential-linear-drag-0.4": Truth(effect="tangential-linear-drag"),
+    "internal-damping-30ms": Truth(parameters={"damping": 30e-3}),
+}
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Verdicts; what is missing where the reference runs are."""
+    runs = folder()
+    if runs is None or not (runs / "jittered").is_dir():
+        return {"missing": "no ArcSim runs in the reference data (set FLAGDATA_REFERENCE)"}
+    experiments = {name: _experiment(runs / "jittered", name) for name in CASES}
+    told: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
+    for draw in DRAWS:
+        nulls = out / f"arcsim-jittered-nulls-{seed}-{draw}"
+        wanted = batches(Setting.of(experiments["null"]), kinds=CRITERIA.simulated_kinds, seed=100 * seed + draw)
+        banks.build(nulls, wanted, workers=len(os.sched_getaffinity(0)))
+        told[f"draw {draw}"] = {
+            name: _told(close_loop(own, Options(bank=nulls, seed=seed)), CASES[name])
+            for name, own in experiments.items()
+        }
+    return told
+
+
+def _experiment(runs: Path, name: str) -> Experiment:
+    setup = Setup(material=CAMEL, pins=Hold.HOIST_CORNERS)
+    return observe([_recording(runs / f"{name}_w{wind}.npz", wind) for wind in WINDS], setup).experiment
+
+
+def _recording(path: Path, wind: int) -> Observation:
+    with np.load(path) as content:
+        positions, rest, faces = (content[part] for part in ("q", "rest", "faces"))
+    return from_arrays(
+        name=f"{wind} m-s", positions=_UNIT * positions.astype(np.float64), rest=rest.astype(np.float64),
+        faces=faces.astype(np.int64), rate=RATE, wind=WindTrack.constant((float(wind), 0.0, 0.0)),
+    )  # fmt: skip
+
+
+def _told(verdict: Verdict, truth: Truth) -> dict[str, Any]:
+    wanted = {"density": 1.0, "bending": 1.0, "damping": 2.5e-3} | dict(truth.parameters)
+    shown = {p.name: p.before if p.after is None else p.after for p in verdict.parameters}
+    return {
+        "said": verdict.conclusion.value, "named": list(verdict.named), "right": _right(verdict, truth),
+        "p": verdict.test.p_value.value, "p low": verdict.test.p_value.low, "p high": verdict.test.p_value.high,
+        "statistic": verdict.test.statistic, "kinds": verdict.test.kinds,
+        "parameters": {name: _interval(own, wanted[name]) for name, own in shown.items()},
+        "strengths": {c.effect: [c.strength.low, c.strength.value, c.strength.high] for c in verdict.ranking[:3]},
+        "words": verdict.words, "seconds": round(verdict.seconds),
+    }  # fmt: skip
+
+
+def _right(verdict: Verdict, truth: Truth) -> bool:
+    if not truth.effect:
+        return verdict.conclusion is Conclusion.SUFFICIENT
+    return verdict.conclusion in (Conclusion.EFFECT, Conclusion.ONE_OF) and truth.effect in verdict.named
+
+
+def _interval(found: Estimate, true: float) -> dict[str, Any]:
+    return {"low": found.low, "value": found.value, "high": found.high, "covers": found.low <= true <= found.high}
