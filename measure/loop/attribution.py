@@ -162,8 +162,6 @@ def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weig
 
 def _leads(one: Floats, other: Floats, recording: NDArray[np.int64]) -> bool:
     """Whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the difference."""
-    if not np.isfinite(other).all():
-        return True
     return bool((one - other).sum() > CRITERIA.lead * total_error(one - other, recording))
 
 

@@ -99,7 +99,7 @@ class Refit:
 
 
 def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Refit | None]:
-    """Column → what its model does; None where its cloth diverges.
+    """Column → what its model does; None where its cloth diverges, fitted to all recordings or without one.
 
     Args:
         workers: threads; each model is run in one.
@@ -118,8 +118,10 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, left(fitted), strict=True):
             gains[outside] = old - new
+        if not np.isfinite(gains).all():
+            return None
         return Refit(
-            coefficient=fitted.model.effects[0][1], gains=np.where(np.isfinite(gains), gains, -np.inf),
+            coefficient=fitted.model.effects[0][1], gains=gains,
             leftover=reference.p_left_by(evidence, names(), [column]), evidence=evidence,
         )  # fmt: skip
 

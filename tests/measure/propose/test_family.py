@@ -57,7 +57,7 @@ def test_nulls_of_numerics_never_seen_reach_the_level_as_often_as_it_says(level:
         others = nulls.select(~inside)
         for index in range(int(others.experiment.max()) + 1):
             chosen = np.flatnonzero(others.experiment == index)[:4]
-            own = evidence(replace(seen, r=others.clean[chosen]), others.speeds[chosen], model)
+            own = evidence(replace(seen, r=others.statistics.r[chosen]), others.speeds[chosen], model)
             largest = float(family.statistics(own)[pool].max())
             below.append(family.p_value(largest, pool) <= level)
     # 80 experiments, of which those of one kind are alike: three standard deviations of 40 independent ones.
