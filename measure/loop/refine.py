@@ -44,6 +44,7 @@ class Refined:
         errors: standard errors of its calibrated parameters and strengths, as Σ has them along all directions.
         statistics: at the model before the last step, `origin`, of all segments.
         origin: that model.
+        anchor: calibration by all directions, about which the prior of the null model is.
         null: the null model of its columns.
         speeds: (segment,) of the wind [m/s].
         stays: whether another round would hardly move it.
@@ -54,13 +55,14 @@ class Refined:
     errors: tuple[float, ...]
     statistics: Statistics
     origin: Model
+    anchor: Calibration
     null: NullModel
     speeds: Floats
     stays: bool
 
     def without(self, outside: NDArray[np.bool_]) -> Model:
         """The same model fitted to the other segments alone, one step from `origin`."""
-        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin)
+        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin, self.anchor)
         return self.origin.moved(cut(step))
 
 
@@ -74,7 +76,9 @@ def refine(
 ) -> Refined:
     """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on.
 
-    Every round uses the errors along the fitted columns alone, with their part of the null model.
+    Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would lead
+    the calibrated parameters astray by what numerics leave, so that their prior is there what all directions told
+    before.
 
     Args:
         weighed: the columns of the statistics, but for the calibrated parameters.
@@ -87,12 +91,14 @@ def refine(
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
-    part = _part(whitened.null, [*range(len(THETA)), *chosen])
-    reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen))
+    told = np.array([fit.of(place)[1] for place in range(len(THETA))])
+    part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=told)
+    anchor = model.calibration
+    reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen), anchor=anchor)
     for _ in range(ROUNDS - 1):
         if reached.stays:
             break
-        reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen))
+        reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen), anchor=anchor)
     every = np.ones(len(segments), dtype=bool)
     ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
     return replace(reached, model=model, errors=errors)
@@ -129,6 +135,8 @@ def _round(
     null: NullModel,
     speeds: Floats,
     chosen: tuple[int, ...],
+    *,
+    anchor: Calibration,
 ) -> Refined:
     for _ in range(_HALVINGS):
         found = _linearised(forecaster, segments, origin)
@@ -140,10 +148,10 @@ def _round(
             "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
             fix="look at the recordings' residuals: no model of the library is near them",
         )  # fmt: skip
-    step, errors = _step(found, null, speeds, origin)
+    step, errors = _step(found, null, speeds, origin, anchor)
     return Refined(
         model=origin.moved(cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
-        origin=origin, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < STAYS),
+        origin=origin, anchor=anchor, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < STAYS),
     )  # fmt: skip
 
 
@@ -177,10 +185,12 @@ def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:
     return ways[longer], taken[longer]
 
 
-def _step(found: Statistics, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
-    """Of generalised least squares from here, under the prior about the nominal calibration; with standard errors."""
+def _step(
+    found: Statistics, null: NullModel, speeds: Floats, model: Model, anchor: Calibration
+) -> tuple[Floats, Floats]:
+    """Of generalised least squares from here, under the prior about a calibration; with standard errors."""
     count = found.r.shape[1]
     chosen = range(len(THETA), count)
-    fit = Evidence.of(found, speeds, null).fit(chosen, centre=Calibration().steps_from(model.calibration))
+    fit = Evidence.of(found, speeds, null).fit(chosen, centre=anchor.steps_from(model.calibration))
     value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
     return np.array(value), np.array(error)

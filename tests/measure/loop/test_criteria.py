@@ -18,7 +18,7 @@ METHOD = {
     "artifacts": {"_FORMAT"},
     "attribution": {"GUST_COLUMN"},
     "bank": {"WINDS", "FILE_LIMIT", "_DENSITY", "_BENDING", "_DAMPING", "_STRETCHING"},
-    "close": {"_FLOOR_COPIES"},
+    "close": {"_FLOOR_COPIES", "_LOOKS"},
     "columns": {
         "_DENSITY",
         "_BENDING",

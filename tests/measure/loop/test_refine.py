@@ -48,7 +48,7 @@ def test_a_model_that_diverges_is_drawn_back(
     monkeypatch.setattr(refine, "_linearised", linearised)
     model = Model(calibration=FAR.calibration, effects=effects)
     found = refine._round(  # pyright: ignore[reportPrivateUsage]
-        *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects)
+        *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects), anchor=Calibration()
     )
     assert found.origin.calibration.density == pytest.approx(0.5**0.5)
     assert [strength for _, strength in found.origin.effects] == [strength / 2 for _, strength in effects]
@@ -59,7 +59,7 @@ def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(refine, "_linearised", lambda *_: lost)
     with pytest.raises(refine.DivergedError, match="does not stay one"):
         refine._round(  # pyright: ignore[reportPrivateUsage]
-            *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), ()
+            *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), (), anchor=Calibration()
         )
 
 
