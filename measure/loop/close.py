@@ -204,7 +204,7 @@ def _fits(setting: Setting, found: Statistics, projection: Projection, bank: Nul
 
 
 def _calibrated(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
-    """Statistics at the base model that all directions lead to: taken anew until a step is within its standard errors."""
+    """Statistics at the base model that all directions lead to, taken anew until a step is within its errors."""
     for _ in range(_LOOKS):
         whitened = fits.whitened
         fit = whitened.evidence(whitened.found).fit((), centre=Calibration().steps_from(setting.calibration))

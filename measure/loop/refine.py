@@ -76,8 +76,8 @@ def refine(
 ) -> Refined:
     """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on.
 
-    Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would lead
-    the calibrated parameters astray by what numerics leave, so that their prior is there what all directions told
+    Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would
+    lead the calibrated parameters astray by what numerics leave, so that their prior is there what all directions told
     before.
 
     Args:
