@@ -362,9 +362,7 @@ def test_what_is_named_is_the_confidence_set_less_what_fails_its_predictive_test
 
 def test_where_the_base_model_predicts_as_well_nothing_is_named(null: NullModel, reference: Reference) -> None:
     """However well an effect fits what rejects the base model."""
-    useless = Refit(
-        coefficient=0.3, gains=np.tile([1.0, -1.0], 6), leftover=0.5, evidence=seen(null, {}, seed=3)
-    )
+    useless = Refit(coefficient=0.3, gains=np.tile([1.0, -1.0], 6), leftover=0.5, evidence=seen(null, {}, seed=3))
     refits = dict.fromkeys(range(len(THETA), len(THETA) + 18), useless)
     found = judge(seen(null, {}, line=10.0), reference, level=0.02, refits=refits)
     assert (found.conclusion, found.named, found.confident) == (Conclusion.OUTSIDE, (), ())
