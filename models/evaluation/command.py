@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
 @click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")
 @click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
-              help="Range of the area weight that is known of all clips [kg/m²]; 0.10:0.17 is the paper's.")  # fmt: skip
+              help="Range of all clips' area weight, if it is known [kg/m²]; the paper's is 0.10:0.17.")  # fmt: skip
 @click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of draws and of the bootstrap.")
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
