@@ -73,10 +73,22 @@ class Options:
             "refine": self.refine, "area_weight": None if self.area_weight is None else list(self.area_weight),
         }  # fmt: skip
 
-    def known(self, sizes: Sizes) -> Known | None:
+    def known(self, sizes: Sizes, model: Estimator) -> Known | None:
         """What is known of the cloth, at each size considered, as that of a flag of the model's own size."""
         if self.area_weight is None:
             return None
+        target = next((target for target in model.targets if target.name == "density"), None)
+        if target is None:
+            raise UsageError(
+                f"the model {model.name!r} tells no area weight", where="--area-weight", fix="leave it out"
+            )
+        least, most = target.low * float(sizes.scale.max()), target.high * float(sizes.scale.min())
+        if not least * (1 - 1e-9) <= self.area_weight[0] < self.area_weight[1] <= most * (1 + 1e-9):
+            raise UsageError(
+                f"an area weight of {self.area_weight[0]:g} to {self.area_weight[1]:g} kg/m²; of a flag of this size the "
+                f"model knows {least:.3g} to {most:.3g}",
+                where="--area-weight", fix="give a range within that" + ("" if sizes.given else ", and --flag-size"),
+            )  # fmt: skip
         low, high = (np.full(len(sizes.scale), end) / sizes.scale ** POWERS["density"] for end in self.area_weight)
         return Known(name="density", low=low, high=high)
 
@@ -205,7 +217,7 @@ def measure(
         options.size, rate=film.rate, frames_rate=model.front_end.rate, draws=DRAWS,
         generator=stream(options.seed, "sizes"), trained=TRAINED[model.cloth],
     )  # fmt: skip
-    known = options.known(considered)
+    known = options.known(considered, model)
     layout = lay_out(
         frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
         last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
@@ -338,7 +350,11 @@ class _Answer:
             logits[..., own] = winds
             logits[..., cloth] = shared
             parts.append(scaled_back(self._values(logits).mean(axis=0), self.names, self.sizes.draws[stratum]))
-        return np.concatenate(parts)
+        draws = np.concatenate(parts)
+        if self.options.area_weight is not None:  # combining windows moves draws a little, some out of the range
+            column = self.names.index("density")
+            draws[:, column] = np.clip(draws[:, column], *self.options.area_weight)
+        return draws
 
     def window(self, one: _Seen, layout: Layout, p: float) -> WindowAnswer:
         parts = [
@@ -364,7 +380,7 @@ class _Answer:
     def prior_logits(self) -> NDArray[np.float64]:
         """(i, n, target) draws of the same as the model knows them, for each size of flag."""
         learner, shape = self.model.learners[0], self.sizes.draws.shape
-        known = self.options.known(self.sizes)
+        known = self.options.known(self.sizes, self.model)
         more = 1 if known is None else MORE
         generator = stream(self.options.seed, "prior")
         normal = generator.standard_normal((shape[0], shape[1] * more, len(self.names)))
