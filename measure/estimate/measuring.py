@@ -85,8 +85,8 @@ class Options:
         least, most = target.low * float(sizes.scale.max()), target.high * float(sizes.scale.min())
         if not least * (1 - 1e-9) <= self.area_weight[0] < self.area_weight[1] <= most * (1 + 1e-9):
             raise UsageError(
-                f"an area weight of {self.area_weight[0]:g} to {self.area_weight[1]:g} kg/m²; of a flag of this size the "
-                f"model knows {least:.3g} to {most:.3g}",
+                f"an area weight of {self.area_weight[0]:g} to {self.area_weight[1]:g} kg/m²; of a flag of this size "
+                f"the model knows {least:.3g} to {most:.3g}",
                 where="--area-weight", fix="give a range within that" + ("" if sizes.given else ", and --flag-size"),
             )  # fmt: skip
         low, high = (np.full(len(sizes.scale), end) / sizes.scale ** POWERS["density"] for end in self.area_weight)
