@@ -135,7 +135,7 @@ def data_of(model: Estimator) -> DataSpec:
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
               help="Where the films are that the model was trained on and validated by.")  # fmt: skip
 @click.option("--dataset", "datasets", multiple=True,
-              help="Name of the films' data set; several are possible; by default those it was trained on.")  # fmt: skip
+              help="Name of the films' data set; by default all that it was trained on.")  # fmt: skip
 @click.option("--at", metavar="REF", help="Version of the lake; by default its head.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Random seed of the distortions.")
 def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None, seed: int) -> None:
