@@ -4,6 +4,8 @@ Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, F
 FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how many evaluations each method has (50),
 FLAGDATA_REFINE_PEERS which optimisers (all, separated by commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped
 one), FLAGDATA_REFINE_CACHE a folder for evaluations, so that an interrupted run goes on. Without a lake it is left out.
+With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of the reference simulator (../shared/data/arcsim), filmed by our
+rasteriser: six runs, of two views each for 12 targets.
 Writes `refinement.md` beside the JSON.
 """
 
@@ -37,8 +39,10 @@ from models import estimator as models
 from models.estimator import Estimator
 from sim.assets import Assets
 from sim.render.prior import named
+from tests.validation.transfer import REFERENCE_RUNS, reference_clips
 
 LEVEL = 0.9
+ARCSIM = "arcsim"
 _RESAMPLES = 2000
 _OWN, _REGRESSION = "refine", "regression alone"
 
@@ -84,7 +88,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     scores: list[Score] = []
     stages: dict[str, list[float]] = {}
     own: list[Refinement] = []
-    for number, target in enumerate(_targets(Path(lake), space, at=at, count=count, seed=seed)):
+    if lake == ARCSIM:
+        targets = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
+    else:
+        targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
+    for number, target in enumerate(targets):
         found = refine(
             target, estimator, scene, cache=cache,
             settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
@@ -128,6 +136,17 @@ def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> lis
         recording = source.lake.artifact(str(pairs.table.recording[index]), at=at)
         found.append(of_recording(recording, pairs[index].clip[0].numpy(), otherwise=otherwise, space=space))
     return found
+
+
+def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
+    """Runs of the reference simulator, of as many views as there must be; how they were filmed is not told."""
+    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
+    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    clips = reference_clips(Path(data) / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
+    return [
+        Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "density": density})
+        for name, (film, wind, density) in list(clips)[:count]
+    ]
 
 
 def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, seed: int) -> Trace:
