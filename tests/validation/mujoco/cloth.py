@@ -40,14 +40,14 @@ class Air:
 
     Attributes:
         pressure: p |w_n| w_n along the normal [kg/m³].
-        slope: l |w_t| w_n along the normal [kg/m³].
+        lift: l w_n (|w| n − w_n w/|w|), across the relative wind [kg/m³].
         linear: c w_t [kg/(m² s)].
         quadratic: q |w_t| w_t [kg/m³].
         side: m |w| (vertical × w) [kg/m³].
     """
 
     pressure: float = 1.0
-    slope: float = 0.0
+    lift: float = 0.0
     linear: float = 0.0
     quadratic: float = 0.0
     side: float = 0.0

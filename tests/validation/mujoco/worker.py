@@ -8,10 +8,10 @@ sail. The wind's force is therefore applied to the vertices at each step, as a g
 
 On a face of rest area a with deformed unit normal n, w = wind − face velocity, w_n = w·n, w_t = w − w_n n, it is
 
-    a [(p |w_n| + l |w_t|) w_n n + c w_t + q |w_t| w_t + m |w| (z × w)],
+    a [p |w_n| w_n n + l w_n (|w| n − w_n w/|w|) + c w_t + q |w_t| w_t + m |w| (z × w)],
 
-a third on each corner: pressure p, slope-dependent pressure l, linear and quadratic tangential drag c and q, and m
-across the wind, about the vertical z, as a spinning body has it (Magnus).
+a third on each corner: pressure p, lift l of a plate in attached flow, linear and quadratic tangential drag c and q,
+and m across the wind, about the vertical z, as a spinning body has it (Magnus).
 
 What it cannot do: stiffness is isotropic and constant, where measured cloth is orthotropic and stiffens with strain;
 attachments are rigid; there is no contact of the cloth with itself and no air that moves with the cloth. Forces of the
@@ -59,22 +59,27 @@ def model_of(job, settings):
 
 def push(position, velocity, wind, faces, areas, air):
     """(vertex, 3) force of the wind [N]."""
-    corners = position[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    relative = wind - velocity[faces].mean(axis=1)
+    first, second, third = position[faces[:, 0]], position[faces[:, 1]], position[faces[:, 2]]
+    normal = across_both(second - first, third - first)
+    normal /= np.maximum(np.sqrt((normal * normal).sum(axis=1, keepdims=True)), np.finfo(float).tiny)
+    relative = wind - (velocity[faces[:, 0]] + velocity[faces[:, 1]] + velocity[faces[:, 2]]) / 3
     across = (relative * normal).sum(axis=1, keepdims=True)
     along = relative - across * normal
-    slip = np.linalg.norm(along, axis=1, keepdims=True)
-    force = (air["pressure"] * np.abs(across) + air["slope"] * slip) * across * normal
+    slip = np.sqrt((along * along).sum(axis=1, keepdims=True))
+    speed = np.maximum(np.sqrt((relative * relative).sum(axis=1, keepdims=True)), np.finfo(float).tiny)
+    force = air["pressure"] * np.abs(across) * across * normal
+    force += air["lift"] * across * (speed * normal - across / speed * relative)
     force += (air["linear"] + air["quadratic"] * slip) * along
-    force += air["side"] * np.linalg.norm(relative, axis=1, keepdims=True) * np.cross([0.0, 0.0, 1.0], relative)
+    force[:, 0] -= air["side"] * speed[:, 0] * relative[:, 1]
+    force[:, 1] += air["side"] * speed[:, 0] * relative[:, 0]
     third = areas[:, None] / 3 * force
-    total = np.zeros_like(position)
-    for corner in range(3):
-        for axis in range(3):
-            total[:, axis] += np.bincount(faces[:, corner], third[:, axis], len(position))
-    return total
+    corners = faces.T.ravel()
+    return np.stack([np.bincount(corners, np.tile(part, 3), len(position)) for part in third.T], axis=1)
+
+
+def across_both(a, b):
+    """Vector products of rows."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
 
 def fly(job, settings):
