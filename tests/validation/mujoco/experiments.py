@@ -24,9 +24,9 @@ from sim.mesh import Diagonals, grid
 from tests.validation.mujoco.cloth import Air, Floats, Integrator, Method, Sheet, Wind, fly
 
 WIDTH, HEIGHT = 1.5, 1.0  # m
-COLUMNS, ROWS = 24, 16
+COLUMNS, ROWS = 20, 14
 SEEN = 2
-"""Every so many-th vertex in both directions is a marker: 13 × 9 of 25 × 17."""
+"""Every so many-th vertex in both directions is a marker: 11 × 8 of 21 × 15."""
 RATE, DURATION, SETTLE = 25.0, 8.4, 3.0  # Hz, s, s: four segments of 2 s of each recording
 NOISE = 1e-3  # m
 SPEEDS = (2.5, 7.5)  # m/s; one wind from each third
