@@ -74,7 +74,7 @@ class HeldCloth:
 
     @property
     def apart(self) -> Share:
-        """Pairs of repeats that are told apart at `LEVEL`; pairs share recordings, so that the bounds are too narrow."""
+        """Pairs of repeats that are told apart at `LEVEL`; they share recordings, so that the bounds are too narrow."""
         return Share.of(pair.p <= LEVEL for pair in self.pairs)
 
     @property
@@ -140,7 +140,7 @@ def _parts(left: Sequence[Floats]) -> dict[str, float]:
 
 
 def _extents(swings: Sequence[Swing], left: Sequence[Floats]) -> dict[str, tuple[float, float]]:
-    """Distances of the upper corners, and of the ends of the nodes' columns, over the frames in which the tool moves."""
+    """Distances of the upper corners, and of the ends of the nodes' columns, over frames in which the tool moves."""
     tracked, modelled = [], []
     for swing, error in zip(swings, left, strict=True):
         moving = np.linalg.norm(np.gradient(swing.tool, axis=0), axis=1) > 1e-3
