@@ -3,10 +3,12 @@
 From the instant at which the tool moves, recordings are cut into segments. A segment's errors along each sensitivity of
 the model, and their size, are its features. The programme is the same, so that without a difference between two repeats
 the features of a pair of segments may be swapped: the test flips the signs of their differences, all of the 2ⁿ ways.
+Pairs share recordings, so that how many of them are told apart is judged by repeats whose segments were shuffled.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -35,6 +37,15 @@ def features(swing: Swing, model: Linear, lag: float) -> Floats:
         spread = (weight[own] * error[own] ** 2).sum() / weight[own].sum()
         rows.append(np.append(along, np.log(spread) / 2))
     return np.array(rows)
+
+
+def shuffled(repeats: Sequence[Floats], rng: np.random.Generator) -> list[Floats]:
+    """Repeats of one programme whose features (segment, feature) have changed places, segment by segment: what they
+    might have been, if nothing told them apart. All are cut to the shortest."""
+    count = min(len(own) for own in repeats)
+    stacked = np.stack([own[:count] for own in repeats])
+    order = rng.permuted(np.tile(np.arange(len(repeats)), (count, 1)), axis=1).T
+    return list(stacked[order, np.arange(count)])
 
 
 def tail_probability(first: Floats, second: Floats, scale: Floats) -> float:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.rng import stream
 from measure.cases.held.calibrate import Linear, at_bounds, calibrated, linear
 from measure.cases.held.model import Cloth, Parameters, errors, predicted, rigid
 from measure.cases.held.reading import Floats, Swing, read_all
-from measure.cases.held.repeats import features, tail_probability
+from measure.cases.held.repeats import features, shuffled, tail_probability
 from measure.challenge.rates import Share
 from sim.material import Material
 
@@ -20,6 +21,8 @@ LEVEL = 0.05
 """Of each pair of repeats."""
 MOVED = 0.06
 """By which one of a pair's stamps are moved for the control [s]: less than a frame of the camera."""
+SHUFFLES = 200
+"""Of the repeats' segments, for how many pairs are told apart by chance."""
 _START = 0.3  # s of lag that the calibration starts from
 
 
@@ -58,6 +61,7 @@ class HeldCloth:
         median: of the held-out errors after [m].
         extents: width and height in motion, tracked and predicted [m], held out.
         pairs: of repeats.
+        p_pairs: chance of so many pairs at `LEVEL`, or more, if nothing told repeats apart.
     """
 
     fitted: tuple[str, ...]
@@ -71,6 +75,7 @@ class HeldCloth:
     median: float
     extents: Mapping[str, tuple[float, float]]
     pairs: tuple[Pair, ...]
+    p_pairs: float
 
     @property
     def apart(self) -> Share:
@@ -83,8 +88,11 @@ class HeldCloth:
         return Share.of(pair.p_moved <= LEVEL for pair in self.pairs)
 
 
-def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: Sequence[str]) -> HeldCloth:
+def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: Sequence[str], seed: int) -> HeldCloth:
     """Calibrate on the repeats of some programmes, predict those of others, and compare repeats.
+
+    Args:
+        seed: of the shuffled repeats.
 
     Raises:
         FlagdataError: recordings that cannot be read.
@@ -98,23 +106,30 @@ def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: 
         "nominal, stamps at their word": Parameters(), "nominal, with the lag": Parameters(lag=found.lag),
         "calibrated": found,
     }  # fmt: skip
-    last = predicted(cloth, unseen, [found] * len(unseen))
-    left = [errors(swing, model, found.lag) for swing, model in zip(unseen, last, strict=True)]
+    of_known, left = _left(cloth, known, found), _left(cloth, unseen, found)
+    usual = np.nanmean(np.concatenate(of_known), axis=0)
+    corrected = "calibrated, less the nodes' mean errors on the fitted programmes"
+    pairs, chance = _pairs(cloth, swings, found, seed)
     return HeldCloth(
         fitted=tuple(fitted), held_out=tuple(held_out), size=(cloth.width, cloth.height), parameters=found,
-        bounds=at_bounds(found), of_fitted=_compared(cloth, known, models, found.lag),
-        of_held_out=_compared(cloth, unseen, models, found.lag), parts=_parts(left),
+        bounds=at_bounds(found), parts=_parts(left), pairs=pairs, p_pairs=chance, extents=_extents(unseen, left),
+        of_fitted=_compared(cloth, known, models, found.lag) | {corrected: _error([e - usual for e in of_known])},
+        of_held_out=_compared(cloth, unseen, models, found.lag) | {corrected: _error([e - usual for e in left])},
         median=float(np.nanmedian(np.concatenate([np.linalg.norm(e, axis=2).ravel() for e in left]))),
-        extents=_extents(unseen, left), pairs=_pairs(cloth, swings, found),
     )  # fmt: skip
+
+
+def _left(cloth: Cloth, swings: Sequence[Swing], at: Parameters) -> list[Floats]:
+    """(frame, node, 3) errors on each recording [m]."""
+    runs = predicted(cloth, swings, [at] * len(swings))
+    return [errors(swing, run, at.lag) for swing, run in zip(swings, runs, strict=True)]
 
 
 def _compared(cloth: Cloth, swings: Sequence[Swing], models: Mapping[str, Parameters], lag: float) -> dict[str, Error]:
     """Error by model; a board that hangs from the tool stands for no model at all."""
     made = {"a rigid board, with the lag": _error([rigid(cloth, swing, lag) for swing in swings])}
     for name, own in models.items():
-        runs = predicted(cloth, swings, [own] * len(swings))
-        made[name] = _error([errors(swing, run, own.lag) for swing, run in zip(swings, runs, strict=True)])
+        made[name] = _error(_left(cloth, swings, own))
     return made
 
 
@@ -156,13 +171,16 @@ def _extents(swings: Sequence[Swing], left: Sequence[Floats]) -> dict[str, tuple
     }
 
 
-def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], at: Parameters) -> tuple[Pair, ...]:
+def _pairs(
+    cloth: Cloth, swings: Mapping[str, Sequence[Swing]], at: Parameters, seed: int
+) -> tuple[tuple[Pair, ...], float]:
+    """All pairs of repeats, and the chance of as many told apart if the repeats' segments may change places."""
     every = [swing for own in swings.values() for swing in own]
     beside = dict(zip((swing.name for swing in every), linear(cloth, every, at), strict=True))
     known = {swing.name: features(swing, beside[swing.name], at.lag) for swing in every}
     moved = {swing.name: features(swing, _later(beside[swing.name]), at.lag) for swing in every}
     scale = np.concatenate(list(known.values())).std(axis=0)
-    return tuple(
+    pairs = tuple(
         Pair(
             first=a.name, second=b.name, p=tail_probability(known[a.name], known[b.name], scale),
             p_moved=tail_probability(known[a.name], moved[b.name], scale),
@@ -170,6 +188,13 @@ def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], at: Parameters) 
         for own in swings.values()
         for a, b in combinations(own, 2)
     )  # fmt: skip
+    count, rng = sum(pair.p <= LEVEL for pair in pairs), stream(seed, "held", "shuffles")
+    as_many = 0
+    for _ in range(SHUFFLES):
+        mixed = [shuffled([known[swing.name] for swing in own], rng) for own in swings.values()]
+        found = sum(tail_probability(a, b, scale) <= LEVEL for own in mixed for a, b in combinations(own, 2))
+        as_many += found >= count
+    return pairs, (1 + as_many) / (1 + SHUFFLES)
 
 
 def _later(beside: Linear) -> Linear:

@@ -13,7 +13,7 @@ from flagdata.errors import InputError, NotFoundError
 from measure.cases.held.calibrate import calibrated, linear
 from measure.cases.held.model import Cloth, Parameters, errors, predicted, rigid
 from measure.cases.held.reading import Floats, Swing, names, read
-from measure.cases.held.repeats import features, tail_probability
+from measure.cases.held.repeats import features, shuffled, tail_probability
 from sim.material import named
 
 SIDE, SIZE = 3, 0.3
@@ -125,6 +125,17 @@ def test_repeats_that_differ_by_noise_have_uniform_p_and_a_moved_one_does_not() 
     moved = np.array([tail_probability(a, b + np.array([3.0, 0, 0, 0, 0]), scale) for a, b in pairs])
     assert (moved <= 0.1).mean() > 0.9
     assert tail_probability(pairs[0][0], pairs[0][0], scale) == 1.0
+
+
+def test_shuffled_repeats_keep_every_segment_and_lose_their_differences() -> None:
+    repeats: list[Floats] = [np.full((7, 2), float(k)) for k in range(5)]
+    mixed = shuffled([*repeats[:4], np.concatenate([repeats[4], repeats[4]])], np.random.default_rng(3))
+    assert [own.shape for own in mixed] == [(7, 2)] * 5
+    for segment in range(7):
+        assert sorted(float(own[segment, 0]) for own in mixed) == [0.0, 1.0, 2.0, 3.0, 4.0]
+    # 35 draws from 0 to 4 have means of 7 within 2 ± 4 · 1.41/√7.
+    assert all(abs(own[:, 0].mean() - 2.0) < 2.2 for own in mixed)
+    assert len({own[:, 0].tobytes() for own in mixed}) == 5
 
 
 def test_features_show_a_camera_that_is_late_as_a_lag() -> None:
