@@ -51,8 +51,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     with TemporaryDirectory(prefix="flagdata-foreign-") as temporary:
         folder = Path(os.environ.get("FLAGDATA_FOREIGN_FOLDER", temporary))
         rows = [_row(truth, folder, python, seed) for truth in truths]
-    found = {**_summary(rows), "kinds": _number("KINDS", _KINDS), "experiments": rows}
-    (out / "validate-foreign.md").write_text(_page(found), encoding="utf-8")
+    found = {**summary(rows), "kinds": _number("KINDS", _KINDS), "experiments": rows}
+    (out / "validate-foreign.md").write_text(page(found), encoding="utf-8")
     return found
 
 
@@ -109,7 +109,7 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
         "p_interval": [verdict.test.p_value.low, verdict.test.p_value.high], "level": verdict.test.level,
         "parameters": {name: _interval(of[name], true[name]) for name in _COVERED},
         "E_red": [comparison.share for comparison in verdict.comparisons], "seconds": round(verdict.seconds),
-        "grade": _grade(truth, verdict), "criteria": verdict.provenance["criteria"]["hash"],
+        "grade": grade(truth, verdict), "criteria": verdict.provenance["criteria"]["hash"],
     }  # fmt: skip
     ours = [c for c in verdict.ranking if c.effect == undeclared.effect and c.effect in verdict.named]
     if ours:
@@ -117,7 +117,7 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
     return row
 
 
-def _grade(truth: Truth, verdict: Verdict) -> str:
+def grade(truth: Truth, verdict: Verdict) -> str:
     """right: the effect alone, or none where none acts; class: another of its class; among: one of several; wrong."""
     effect, outside = truth.undeclared.effect, truth.undeclared is not NOTHING and truth.undeclared.damping is None
     said, named = verdict.conclusion, verdict.named
@@ -136,7 +136,7 @@ def _interval(found: Estimate, true: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Shares with Clopper–Pearson bounds of 90 %, so that each bound is one-sided at 95 %."""
     judged = [row for row in rows if "said" in row]
     nulls = [row for row in judged if row["acted"] == NOTHING.title]
@@ -156,7 +156,7 @@ def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _page(found: Mapping[str, Any]) -> str:
+def page(found: Mapping[str, Any]) -> str:
     lines = [
         "# Verdicts on experiments that MuJoCo simulated", "",
         "| share | value | of | 90 % bounds |", "|---|---|---|---|",
