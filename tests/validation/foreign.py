@@ -27,7 +27,7 @@ from measure.challenge.rates import Share
 from measure.loop import bank as banks
 from measure.loop.close import Options, close_loop
 from measure.loop.forecast import Segments
-from measure.loop.verdict import Conclusion, Estimate, Verdict
+from measure.loop.verdict import Conclusion, Estimate
 from measure.observe import Observed
 from measure.observe.recipe import load, read
 from tests.validation.mujoco import environment
@@ -109,7 +109,7 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
         "p_interval": [verdict.test.p_value.low, verdict.test.p_value.high], "level": verdict.test.level,
         "parameters": {name: _interval(of[name], true[name]) for name in _COVERED},
         "E_red": [comparison.share for comparison in verdict.comparisons], "seconds": round(verdict.seconds),
-        "grade": grade(truth, verdict), "criteria": verdict.provenance["criteria"]["hash"],
+        "grade": grade(truth, verdict.conclusion, verdict.named), "criteria": verdict.provenance["criteria"]["hash"],
     }  # fmt: skip
     ours = [c for c in verdict.ranking if c.effect == undeclared.effect and c.effect in verdict.named]
     if ours:
@@ -117,10 +117,9 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
     return row
 
 
-def grade(truth: Truth, verdict: Verdict) -> str:
+def grade(truth: Truth, said: Conclusion, named: Sequence[str]) -> str:
     """right: the effect alone, or none where none acts; class: another of its class; among: one of several; wrong."""
     effect, outside = truth.undeclared.effect, truth.undeclared is not NOTHING and truth.undeclared.damping is None
-    said, named = verdict.conclusion, verdict.named
     if not effect:
         right = {Conclusion.OUTSIDE, Conclusion.PARTLY} if outside else {Conclusion.SUFFICIENT}
         return "right" if said in right else "wrong"
@@ -144,7 +143,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     intervals = [row["parameters"] for row in judged]
     return {
         "refused": len(rows) - len(judged),
-        "false_rejections": Share.of(row["said"] != Conclusion.SUFFICIENT for row in nulls).as_dict(),
+        "false_rejections": Share.of(row["p"] <= row["level"] for row in nulls).as_dict(),
         "p_of_nulls": sorted(row["p"] for row in nulls),
         "right": Share.of(row["grade"] == "right" for row in acting).as_dict(),
         "right_or_among": Share.of(row["grade"] in ("right", "among") for row in acting).as_dict(),

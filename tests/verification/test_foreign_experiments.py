@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from measure.loop.verdict import Conclusion, Estimate, NullTest, Parameter, Verdict
+from measure.loop.verdict import Conclusion
 from measure.observe.recipe import parse
 from sim.cloth import Cloth
 from sim.effects.hem_mass import HemMass
@@ -73,16 +73,6 @@ def test_a_hem_weighs_its_line_density_times_the_circumference() -> None:
     np.testing.assert_allclose(truth.sheet.added, mass.numpy() - plain, atol=1e-12)
 
 
-def _verdict(conclusion: Conclusion, *named: str) -> Verdict:
-    one = Estimate(value=1.0, low=0.9, high=1.1, unit="1")
-    return Verdict(
-        conclusion=conclusion, named=named, words="",
-        test=NullTest(statistic=1.0, null=[], p_value=one, level=0.03, critical=None, nulls=""),
-        parameters=(Parameter(name="density", before=one, after=None, shift=None),), ranking=(), comparisons=(),
-        residuals=(),
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("acted", "conclusion", "named", "expected"),
     [
@@ -104,12 +94,12 @@ def test_verdicts_are_graded_by_what_acted(
     acted: str, conclusion: Conclusion, named: tuple[str, ...], expected: str
 ) -> None:
     truth = draw("one", UNDECLARED[acted] if acted else NOTHING, seed=1)
-    assert foreign.grade(truth, _verdict(conclusion, *named)) == expected
+    assert foreign.grade(truth, conclusion, named) == expected
 
 
 def test_the_summary_counts_nulls_and_effects_apart() -> None:
-    rows = [_row(TRUTHS[k], "no effect needed" if k else "effect", grade="right" if k else "wrong") for k in range(4)]
-    rows += [_row(draw("p", UNDECLARED["pressure"], seed=1), "effect", grade="right"), {**rows[0], "refused": "short"}]
+    rows = [_row(TRUTHS[k], 0.5 if k else 0.01, grade="right" if k else "wrong") for k in range(4)]
+    rows += [_row(draw("p", UNDECLARED["pressure"], seed=1), 0.01, grade="right"), {**rows[0], "refused": "short"}]
     rows[-1].pop("said")
     found = foreign.summary(rows)
     assert (found["false_rejections"]["hits"], found["false_rejections"]["count"]) == (1, 4)
@@ -120,9 +110,10 @@ def test_the_summary_counts_nulls_and_effects_apart() -> None:
     assert "refused: short" in text
 
 
-def _row(truth: Truth, said: str, *, grade: str) -> dict[str, object]:
+def _row(truth: Truth, p: float, *, grade: str) -> dict[str, object]:
     covered = MappingProxyType({name: {"covers": True} for name in ("density", "bending", "damping")})
     return {
         "name": truth.name, "acted": truth.undeclared.title, "factors": dict(truth.factors), "damping": truth.damping,
-        "method": "Euler", "said": said, "named": [], "p": 0.5, "grade": grade, "parameters": covered,
+        "method": "Euler", "said": "as it may be", "named": [], "p": p, "level": 0.03, "grade": grade,
+        "parameters": covered,
     }  # fmt: skip
