@@ -58,8 +58,14 @@ _SPREAD = frozenset(
         "status", "skew", "skewness", "kurt", "kurtosis", "windgust", "wgust", "gustspeed", "windgustdir", "windrun",
         "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples", "percentile", "trend",
         "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast", "threshold",
+        "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr", "setpoint",
+        "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
     }
 )  # fmt: skip
+_AXES = frozenset(
+    {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down", "radial"}
+)
+"""Words of a component of the wind along an axis of the Earth, which is no speed of wind."""
 _MEAN = frozenset({"avg", "average", "mean", "ave", "av", "moy", "mittel", "mittelwert", "media", "medio", "smp"})
 _PLAIN = frozenset(
     {
@@ -158,6 +164,8 @@ def understand(name: str, stated: str = "") -> Heading:
         excluded = known & _OTHER - {"vertical"} if quantity == "wind_z" else known & _OTHER
         if "wind" in quantity and excluded:
             quantity, sure = "", False
+    if quantity.endswith("wind_speed") and known & _AXES:
+        quantity, sure = "", False
     left = list(words)
     for word in used:
         left.remove(word)

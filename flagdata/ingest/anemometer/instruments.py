@@ -329,6 +329,9 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out"
         )
         return None
+    if heading.unit is None and float(known.max()) <= 36 and bool(np.all(known % 1 == 0)) and len(np.unique(known)) > 3:
+        found.remarks.append(f"column {heading.name!r} may be in degrees or in tens of degrees: left out")
+        return None
     if heading.unit is None and float(np.abs(known).max()) <= 6.3:
         found.remarks.append(f"column {heading.name!r} may be in degrees or radians: left out")
         return None
