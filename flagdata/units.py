@@ -32,6 +32,12 @@ class Unit:
         return (np.asarray(value, dtype=np.float64) - self.offset) / self.scale
 
 
+_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
+_WORDS = {"NORTH": "N", "EAST": "E", "SOUTH": "S", "WEST": "W"}
+POINTS: dict[str, float] = {name: number * 22.5 for number, name in enumerate(_ROSE)}
+"""Points of the compass → degrees from north; a column of them has the unit "points"."""
+POINTS |= {word: POINTS[name] for word, name in _WORDS.items()}
+
 UNITS: dict[str, Unit] = {
     "m/s": Unit(si="m/s", scale=1.0),
     "km/h": Unit(si="m/s", scale=1 / 3.6),
@@ -43,6 +49,7 @@ UNITS: dict[str, Unit] = {
     "ft/min": Unit(si="m/s", scale=0.3048 / 60),
     "rad": Unit(si="rad", scale=1.0),
     "deg": Unit(si="rad", scale=math.pi / 180),
+    "points": Unit(si="rad", scale=math.pi / 180),
     "10 deg": Unit(si="rad", scale=math.pi / 18),
     "K": Unit(si="K", scale=1.0),
     "degC": Unit(si="K", scale=1.0, offset=273.15),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from flagdata.ingest.anemometer import unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
-from flagdata.ingest.anemometer.layout import Layout
-from flagdata.units import spelled, unit
+from flagdata.ingest.anemometer.layout import Layout, cell_kind
+from flagdata.units import POINTS, spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -101,7 +101,10 @@ def find_winds(
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        if float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
+        if heading.quantity.endswith("direction") and (degrees := _points(layout.column(index))) is not None:
+            found.values[index] = degrees
+            found.headings[index] = replace(heading, unit="points")
+        elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
@@ -112,6 +115,14 @@ def find_winds(
     _doubt_headings(found, winds)
     _check_gusts(found, winds)
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+
+
+def _points(cells: Sequence[str]) -> NDArray[np.float64] | None:
+    """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
+    filled = [cell for cell in cells if cell_kind(cell) != "missing"]
+    if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):
+        return None
+    return np.array([POINTS.get(cell.upper(), np.nan) for cell in cells])
 
 
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
@@ -337,6 +348,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         return None
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"
+    if heading.unit == "points":
+        return channel, Column(index=index, unit="points", told="as points of the compass, 22.5° apart")
     told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
     return channel, Column(index=index, unit=heading.unit or "deg", told=told)
 

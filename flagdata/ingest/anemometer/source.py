@@ -120,7 +120,7 @@ class TextFile:
 
 @dataclass(frozen=True, kw_only=True)
 class TableText(TextFile):
-    """What is no table of text, made one: a workbook's sheet, or JSON, as lines of comma-separated text.
+    """What is no table of text, made one: a workbook's sheet, JSON, labelled lines, as lines of comma-separated text.
 
     Attributes:
         text: one line a row.
@@ -195,7 +195,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             where=where,
             fix="split it, or give read_log wider limits",
         )
-    from flagdata.ingest.anemometer import excel, json_text  # both make a TextFile: they import this module
+    from flagdata.ingest.anemometer import excel, restated  # both make a TextFile: they import this module
 
     if excel.is_workbook(path, head):
         return excel.open_sheet(path, limits=limits)
@@ -216,9 +216,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         raise InputError(
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
-    text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
-    table = json_text.as_table(text) if json_text.is_json(text.head()) else None
-    return table or text
+    return restated.restate(TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings)))
 
 
 def _looks_utf16(head: bytes) -> bool:

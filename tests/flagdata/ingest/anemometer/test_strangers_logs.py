@@ -1,7 +1,8 @@
-"""Tables as public services and makers write them: none is wrong in silence, most are right with what they leave out."""
+"""Tables as public services and makers write them: none is wrong in silence, most are right with what is asked for."""
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Callable
 from pathlib import Path
 
@@ -88,3 +89,152 @@ def test_a_fast_count_may_be_of_microseconds(log_file: Write) -> None:
     error = refusal(log_file(f"timestamp,wind speed (m/s)\n{rows}"))
     assert "ms of a slow logger, or us of a fast one" in error.what
     assert "elapsed-us" in error.fix
+
+
+def test_directions_written_as_points_of_the_compass_are_read(read: Read) -> None:
+    points = ["N", "ENE", "S", "NNW", "calm", "W", "W", "W", "W", "W", "W", "W"]
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,{point},4.{at}\n" for at, point in enumerate(points))
+    log = read(f"time,wind_dir,wind speed (m/s)\n{rows}")
+    told = np.degrees(log.series.channels["wind_direction"])
+    assert told[:4].tolist() == pytest.approx([0.0, 67.5, 180.0, 337.5])
+    assert np.isnan(told[4])
+    assert any("points of the compass" in reason for reason in log.reasons)
+
+
+EXPEDITION = """!Boat,Utc,BSP,AWA,AWS,TWA,TWS,TWD,Lat,Lon
+!boat,0,1,2,3,4,5,6,48,49
+!v12.5.1
+0,45658.5,48,43.1,49,5.6
+0,45658.5,1,6.81,2,-31.5,3,10.0,4,-40.0,5,8.0
+0,45658.500011574074,2,30.0,3,20.0,48,43.1001
+0,45658.500023148148,48,43.1002
+"""
+
+
+def test_expeditions_pairs_of_channel_and_value_are_rows_of_wind(read: Read) -> None:
+    """45658.5 days after 1899-12-30 is noon of 2025-01-01, as in any spreadsheet."""
+    log = read(EXPEDITION, unit="kn")
+    assert first_instant(log) == "2025-01-01T12:00:00"
+    assert log.series.channels["apparent_wind_speed"].tolist() == pytest.approx([10 * 1852 / 3600, 20 * 1852 / 3600])
+    assert np.degrees(log.series.channels["apparent_wind_direction"]).tolist() == pytest.approx([328.5, 30.0])
+    assert "wind_speed" not in log.series.channels
+
+
+def test_expeditions_steps_since_1601_are_utc(read: Read) -> None:
+    """116444736000000000 steps of 100 ns after 1601 is 1970-01-01; the rows are two seconds apart."""
+    first = 116_444_736_000_000_000 + 1_735_732_800 * 10_000_000
+    text = EXPEDITION.replace("45658.500011574074", str(first + 20_000_000)).replace("45658.500023148148", str(first))
+    log = read(text.replace("45658.5,", f"{first},"), unit="kn")
+    assert first_instant(log) == "2025-01-01T12:00:00"
+    assert np.diff(log.series.time).tolist() == [2 * 10**9]
+
+
+def test_the_unit_of_expeditions_speeds_is_asked_for(log_file: Write) -> None:
+    assert "--unit" in refusal(log_file(EXPEDITION)).fix
+
+
+METARS = """202307010025 METAR EHAM 010025Z 23008KT 9999 FEW020 18/12 Q1013 NOSIG=
+202307010055 METAR EHAM 010055Z VRB02KT CAVOK 18/12 Q1013=
+202307010125 METAR EHAM 010125Z AUTO 00000KT CAVOK 18/12 Q1013=
+202307010155 METAR EHAM 010155Z 24012G25KT 9999 18/12 Q1013=
+"""
+
+
+def test_metar_reports_after_their_stamp_are_a_log(read: Read) -> None:
+    log = read(METARS)
+    assert first_instant(log) == "2023-07-01T00:25:00"
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([n * 1852 / 3600 for n in (8, 2, 0, 12)])
+    told = np.degrees(log.series.channels["wind_direction"])
+    assert told[[0, 3]].tolist() == pytest.approx([230.0, 240.0])
+    assert np.isnan(told[1:3]).all()  # a variable wind and a calm one have no direction
+
+
+def test_metar_reports_whose_month_nothing_tells_are_refused(log_file: Write) -> None:
+    bare = "".join(line[13:] + "\n" for line in METARS.splitlines())
+    assert refusal(log_file(bare)).fix
+
+
+def test_noaas_cells_of_several_values_are_taken_apart(read: Read) -> None:
+    cells = ["230,5,N,0046,5", "999,9,V,0015,5", "240,5,N,9999,9", "250,3,N,0061,7", "999,9,C,0000,5"]
+    rows = "".join(f'"725030","2023-07-01T0{at}:51:00","7","{cell}","+0111,5"\n' for at, cell in enumerate(cells))
+    log = read(f'"STATION","DATE","SOURCE","WND","TMP"\n{rows}')
+    assert first_instant(log) == "2023-07-01T00:51:00"
+    speed, away = log.series.channels["wind_speed"], np.degrees(log.series.channels["wind_direction"])
+    assert speed[[0, 1, 4]].tolist() == pytest.approx([4.6, 1.5, 0.0])
+    assert np.isnan(speed[2:4]).all()
+    assert away[[0, 2]].tolist() == pytest.approx([230.0, 240.0])
+    assert np.isnan(away[[1, 3, 4]]).all()
+    assert log.series.channels["air_temperature"][0] == pytest.approx(284.25)
+
+
+def test_lines_that_name_each_number_are_a_table(read: Read) -> None:
+    rows = "".join(
+        f"2023-07-01 12:00:{at:02d}.250 -> Wind Speed: {4 + at / 10:.2f} m/s, Direction: {230 + at}\r\n"
+        for at in range(12)
+    )
+    log = read(rows, zone="UTC")
+    assert first_instant(log) == "2023-07-01T12:00:00"
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([4.0, 4.1])
+    assert np.degrees(log.series.channels["wind_direction"][:2]).tolist() == pytest.approx([230.0, 231.0])
+
+
+def test_labelled_components_are_a_sonics_and_their_unit_is_asked_for(log_file: Write) -> None:
+    rows = "".join(
+        f" 23:11:13:17:39:{at:02d}.316 SN150 SN151 U -00.9{at % 10} V 00.21 T  19.78 Battery% 100\n" for at in range(12)
+    )
+    path = log_file(rows)
+    assert "--unit" in refusal(path).fix
+    log = read_log(path, WindOptions(unit="m/s", zone="UTC", date_order="ymd"))
+    assert first_instant(log) == "2023-11-13T17:39:00"
+    assert log.series.channels["wind_x"][:2].tolist() == pytest.approx([-0.90, -0.91])
+    assert log.series.channels["wind_y"][0] == pytest.approx(0.21)
+
+
+def test_labelled_lines_without_a_wind_are_not_taken(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01 12:00:{at:02d} Temperature: {20 + at} C, Battery: 12\n" for at in range(12))
+    with pytest.raises(FlagdataError):
+        read_log(log_file(rows), WindOptions(zone="UTC"))
+
+
+def frames(form: str) -> str:
+    """PGN 130306 (01FD02 in the identifier) of device 35: 4.00 m/s and more from 1.0 rad to the right of the bow."""
+    lines = []
+    for at in range(12):
+        data = bytes([at, *(400 + at).to_bytes(2, "little"), *(10_000).to_bytes(2, "little"), 2, 255, 255])
+        lines.append(form.format(at=at, plain=data.hex().upper(), spaced=data.hex(" ").upper()))
+    return "".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("form", "options"),
+    [
+        ("(1688212800.{at:06d}) can0 09FD0223#{plain}\n", {}),
+        ("12:00:00.{at:03d} R 09FD0223 {spaced}\r\n", {"date": dt.date(2023, 7, 1)}),
+    ],
+    ids=["candump", "gateway"],
+)
+def test_frames_of_nmea_2000_are_read(read: Read, form: str, options: dict[str, object]) -> None:
+    log = read(frames(form), platform="fixed", **options)
+    assert first_instant(log) == "2023-07-01T12:00:00"
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([4.00, 4.01])
+    assert log.series.channels["apparent_wind_direction"][0] == pytest.approx(1.0)
+
+
+def test_a_gateways_frames_pass_midnight(read: Read) -> None:
+    text = frames("23:59:59.{at:03d} R 09FD0223 {spaced}\n") + frames("00:00:01.{at:03d} R 09FD0223 {spaced}\n")
+    log = read(text, platform="fixed", date=dt.date(2023, 7, 1))
+    assert first_instant(log) == "2023-07-01T23:59:59"
+    assert int(log.series.time[-1] - log.series.time[0]) == 2_011_000_000
+
+
+def test_the_day_of_a_gateways_frames_is_asked_for(log_file: Write) -> None:
+    assert "--date" in refusal(log_file(frames("12:00:00.{at:03d} R 09FD0223 {spaced}\n"))).fix
+
+
+@pytest.mark.parametrize("between", [";", ";nmea0183;", ";A;", ",NMEA0183,,"])
+def test_names_between_a_stamp_and_a_sentence_are_passed_over(read: Read, between: str) -> None:
+    sentences = ["$WIMWV,065.0,R,004.2,M,A*25", "$WIMWV,066.0,R,004.3,M,A*27"]
+    text = "".join(f"{1688212800000 + at}{between}{sentence}\n" for at, sentence in enumerate(sentences))
+    log = read(text, platform="fixed")
+    assert first_instant(log) == "2023-07-01T12:00:00"
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([4.2, 4.3])
