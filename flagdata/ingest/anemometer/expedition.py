@@ -41,7 +41,7 @@ def as_table(source: TextFile) -> TableText | None:
     numbers = _channels(source.head()) or {}
     names = [name for name in _WANTED if name in numbers]
     other = 0
-    where = dict.fromkeys(_PLACE, "")
+    where: dict[str, str] = {}
 
     def rows() -> Iterator[list[str]]:
         nonlocal other
@@ -57,7 +57,8 @@ def as_table(source: TextFile) -> TableText | None:
                     continue
                 where.update({name: values[numbers[name]] for name in _PLACE if values.get(numbers.get(name, ""))})
                 if any(values.get(numbers[name], "") for name in _SPEEDS if name in numbers):
-                    yield [stamp, *(where.get(name, values.get(numbers[name], "")).strip() for name in names)]
+                    told = {name: values.get(numbers[name], "").strip() for name in names} | where
+                    yield [stamp, *(told[name] for name in names)]
 
     kept = list(rows())
     heads = [f"{name} [deg]" if name in _ANGLES else name for name in names]

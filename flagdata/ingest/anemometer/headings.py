@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer.languages import in_english
 from flagdata.schema import CHANNELS
 from flagdata.timebase import zone
 from flagdata.units import UNITS, spelled
@@ -36,7 +37,8 @@ _DIRECTION = frozenset(
     {
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
         "dd", "vane", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
-        "retning", "vindretning", "riktning", "wdr", "wdire", "deg", "winddeg", "azimuth", "bearing",
+        "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire", "deg", "winddeg", "azimuth",
+        "bearing",
     }
 )  # fmt: skip
 _OTHER = frozenset(
@@ -63,7 +65,7 @@ _SPREAD = frozenset(
     }
 )  # fmt: skip
 _AXES = frozenset(
-    {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down", "radial"}
+    {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down"}
 )
 """Words of a component of the wind along an axis of the Earth, which is no speed of wind."""
 _MEAN = frozenset({"avg", "average", "mean", "ave", "av", "moy", "mittel", "mittelwert", "media", "medio", "smp"})
@@ -145,7 +147,7 @@ class Heading:
 @lru_cache(maxsize=4096)
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
-    text = name[:120].strip().strip('"').strip()
+    text = in_english(name[:120].strip().strip('"').strip())
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
     rest, unit = _unit(text, stated)
     height = _height(rest)
@@ -191,7 +193,7 @@ def interest(name: str) -> int:
 
 def names_time(name: str) -> bool:
     """Whether a heading names a time or a date."""
-    words = set(_words(name))
+    words = set(words_of(name))
     known = {
         "time", "timestamp", "date", "datetime", "datum", "uhrzeit", "zeit", "zeitstempel", "fecha", "hora", "heure",
         "horodatage", "stamp", "epoch", "unixtime", "unix", "millis", "milliseconds", "seconds", "elapsed", "ts",
@@ -229,7 +231,7 @@ def _is_zone(name: str) -> bool:
 
 def words_of(name: str) -> list[str]:
     """Words of a heading, lower-case."""
-    return _words(name)
+    return _words(in_english(name))
 
 
 def _words(text: str) -> list[str]:

@@ -261,13 +261,25 @@ def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
     for index in order:
         heading = found.headings[index]
         same = next((other for other in kept if _same(found, index, other)), None)
-        if same is None:
+        if same is None and _marks_quality(found, index, indices):
+            found.remarks.append(f"column {found.name(index)!r} holds marks of another column of its name: left out")
+        elif same is None:
             kept.append(index)
         else:
             found.remarks.append(
                 f"column {heading.name!r} is {found.layout.names[same]!r} again, averaged or in another unit"
             )
     return sorted(kept)
+
+
+def _marks_quality(found: _Found, index: int, indices: Sequence[int]) -> bool:
+    """Whether a column holds one or two whole numbers, where another of the same name holds more."""
+    name = found.layout.names[index]
+    kinds = {
+        i: np.unique(found.values[i][np.isfinite(found.values[i])]) for i in indices if found.layout.names[i] == name
+    }
+    own = kinds[index]
+    return len(own) <= 2 and bool(np.all(own % 1 == 0)) and any(len(other) > 2 for other in kinds.values())
 
 
 def _same(found: _Found, index: int, other: int) -> bool:
@@ -316,7 +328,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     )
     lone = candidates if len(candidates) == 1 else []
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
-    chosen = sorted(exact, key=lambda i: found.headings[i].unit is None) or near[:1] or lone or plain
+    exact.sort(key=lambda i: (found.headings[i].unit == "points", found.headings[i].unit is None))
+    chosen = exact or near[:1] or lone or plain
     if not chosen:
         if candidates:
             names = ", ".join(repr(found.layout.names[i]) for i in candidates)

@@ -51,6 +51,11 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"TOB1", "a Campbell TOB1 binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
     (0, b'"TOB', "a Campbell binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
 )
+_ENCODINGS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("gb18030", ("风速", "风向")), ("cp932", ("風速", "風向")), ("big5", ("風速", "風向")), ("cp949", ("풍속", "풍향")),
+    ("cp1251", ("ветр",)), ("cp1250", ("prędkość", "větru")),
+)  # fmt: skip
+"""Encodings that are tried where a file is no UTF-8, and words that show the right one."""
 _BOMS: tuple[tuple[bytes, str], ...] = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -270,6 +275,10 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                     f"not valid {codec}: {error.__class__.__name__}",
                     where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. --encoding cp1252",
                 ) from None  # fmt: skip
+            told = _by_words(path)
+            if told is not None:
+                text = f"not valid UTF-8, read as {told}, in which its headings are words of wind"
+                return told, (Finding(kind="encoding-assumed", severity=Severity.NOTE, what=text),)
             return "latin-1", (
                 Finding(
                     kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
@@ -278,6 +287,21 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                 ),
             )  # fmt: skip
     return codec or "utf-8", ()
+
+
+def _by_words(path: Path) -> str | None:
+    """The encoding in which the beginning of a file holds words of wind of the language it is used for."""
+    with opened(path) as stream:
+        head = stream.read(HEAD)
+    head = head[: head.rfind(b"\n") + 1] or head
+    for codec, words in _ENCODINGS:
+        try:
+            text = head.decode(codec)
+        except UnicodeDecodeError:
+            continue
+        if any(word in text.lower() for word in words):
+            return codec
+    return None
 
 
 def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Finding, ...]]:

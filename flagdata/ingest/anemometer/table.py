@@ -229,7 +229,7 @@ def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
 
 def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str) -> list[str]:
     """Points of the compass as degrees; calm air and what else is no point have no direction."""
-    texts = [text or "" for text in cells.to_pylist()] if isinstance(cells, pa.StringArray) else cells
+    texts: list[str] = [str(text) for text in cells]
     degrees = (POINTS.get(text.strip().upper()) for text in texts)
     return ["" if value is None else f"{value:g}".replace(".", decimal) for value in degrees]
 

@@ -36,7 +36,9 @@ _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
 )
-_CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$")
+_CLOCK = re.compile(
+    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
+)
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
@@ -197,7 +199,7 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         found, _ = parse_with_bare_dates(texts, form + zoned)
         if _fits(found):
             return _choice(layout, columns, form + zoned, found, 2.0)
-    if re.search("[A-Za-z]{3}", shape):
+    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT)$", "", shape)):
         if cell_kind(texts[0]) != "stamp":
             return None
         return _with_month_names(layout, columns, texts, zoned)
@@ -296,7 +298,10 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
             if not _part_at(names, columns, at, part):
                 break
             chosen, form, at = [*chosen, at], f"{form} {part[0]}", at + 1
-        if "%H" not in form:
+        if form == "%Y %m %d" and at < len(names) and _share(_CLOCK, [cell for cell in columns[at] if cell]):
+            clock = next((c for c in _CLOCKS if _fits(counted.parse([cell for cell in columns[at] if cell], c))), None)
+            chosen, form = [*chosen, at], f"{form} {clock}" if clock else form
+        if "%H" not in form and "%I" not in form:
             continue
         texts = [" ".join(cells) for cells in zip(*(columns[i] for i in chosen), strict=True)]
         found, _ = parse_with_bare_dates(texts, form)

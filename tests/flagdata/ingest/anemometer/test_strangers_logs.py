@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable
+from functools import reduce
+from operator import xor
 from pathlib import Path
 
 import numpy as np
@@ -238,3 +240,79 @@ def test_names_between_a_stamp_and_a_sentence_are_passed_over(read: Read, betwee
     log = read(text, platform="fixed")
     assert first_instant(log) == "2023-07-01T12:00:00"
     assert log.series.channels["wind_speed"].tolist() == pytest.approx([4.2, 4.3])
+
+
+def with_checksum(sentence: str) -> str:
+    return f"${sentence}*{reduce(xor, sentence.encode()):02X}\n"
+
+
+def stream(*sentences: str) -> str:
+    clock = [f"GPZDA,1200{at:02d},01,07,2023,00,00" for at in range(12)]
+    return "".join(with_checksum(text) for mark in clock for text in (mark, *sentences))
+
+
+def test_relative_wind_of_older_instruments_is_read(read: Read) -> None:
+    """45° to port of the bow at 12.6 kn is 6.48 m/s from 315°."""
+    log = read(stream("IIVWR,045.0,L,12.6,N,,M,,K"))
+    assert log.series.channels["apparent_wind_speed"][0] == pytest.approx(12.6 * 1852 / 3600)
+    assert np.degrees(log.series.channels["apparent_wind_direction"][0]) == pytest.approx(315.0)
+    assert "wind_speed" not in log.series.channels
+
+
+def test_the_composite_of_a_weather_station_is_wind_over_ground(read: Read) -> None:
+    log = read(stream("WIMDA,29.9,I,1.01,B,21.1,C,,C,55.1,,12.1,C,231.0,T,229.0,M,8.2,N,4.2,M"))
+    assert log.series.channels["wind_speed"][0] == pytest.approx(4.2)
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(231.0)
+
+
+def test_older_sentences_beside_newer_ones_of_the_same_wind_are_not_read_again(read: Read) -> None:
+    log = read(stream("IIMWV,315.0,R,6.5,M,A", "IIVWR,045.0,L,12.6,N,6.5,M,23.3,K"))
+    assert len(log.series.time) == 12
+
+
+@pytest.mark.parametrize(
+    ("heading", "codec"),
+    [
+        ("时间,风速(m/s),风向(°),最大风速(m/s)", "gb18030"),
+        ("日時,風速(m/s),風向(°),最大瞬間風速(m/s)", "cp932"),
+        ("일시,풍속(m/s),풍향(deg),최대풍속(m/s)", "cp949"),
+        ("Время,Скорость ветра м/с,Направление ветра град,Порыв м/с", "cp1251"),
+        ("Godzina,Prędkość wiatru [m/s],Kierunek wiatru [°],Poryw [m/s]", "utf-8"),
+    ],
+)
+def test_headings_in_other_languages_and_their_encodings_are_understood(
+    log_file: Callable[[bytes], Path], heading: str, codec: str
+) -> None:
+    rows = "".join(f"2023/07/01 12:00:{at:02d},{4 + at / 10:.1f},{230 + at},{6 + at / 10:.1f}\n" for at in range(12))
+    log = read_log(log_file(f"{heading}\n{rows}".encode(codec)), WindOptions(zone="UTC"))
+    assert first_instant(log) == "2023-07-01T12:00:00"
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([4.0, 4.1])
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(230.0)
+
+
+def test_marks_of_quality_under_a_repeated_heading_are_no_wind(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,4.{at},8,8\n" for at in range(9))
+    path = log_file(f"time,wind speed (m/s),wind speed (m/s),wind speed (m/s)\n{rows}")
+    assert anemometers(path) == ()
+    assert read_log(path).series.channels["wind_speed"][1] == pytest.approx(4.1)
+
+
+def test_year_month_and_day_in_columns_beside_a_clock_are_one_stamp(read: Read) -> None:
+    rows = "".join(f"Kaisaniemi,2023,6,30,23:{50 + at},4.{at},{230 + at}\n" for at in range(10))
+    rows += "Kaisaniemi,2023,7,3,00:00,5.0,231\n"
+    log = read(f"Station,Year,Month,Day,Time [UTC],Average wind speed [m/s],Wind direction [°]\n{rows}")
+    assert first_instant(log) == "2023-06-30T23:50:00"
+    assert str(np.datetime64(int(log.series.time[-1]), "ns"))[:16] == "2023-07-03T00:00"
+
+
+def test_clocks_of_four_digits_and_a_zone_are_read(read: Read) -> None:
+    rows = "".join(f"2023/07/13;{at:02d}00 UTC;{230 + at};4,{at % 10}\n" for at in range(12))
+    log = read(f"Data;Hora UTC;VENTO, DIREÇÃO HORARIA (gr) (° (gr));VENTO, VELOCIDADE HORARIA (m/s)\n{rows}")
+    assert first_instant(log) == "2023-07-13T00:00:00"
+    assert log.series.channels["wind_speed"][1] == pytest.approx(4.1)
+
+
+def test_degrees_go_before_points_of_the_compass_beside_them(read: Read) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,4.{at},{231 + at},SW\n" for at in range(9))
+    log = read(f"time,Speed (m/s),Dir,Dir\n{rows}")
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(231.0)
