@@ -46,8 +46,8 @@ class Series:
         strange, count = int(verdict.strange.sum()), len(self.measured.windows)
         compared = self.beside.window
         known = (
-            f"The model {self.measured.model!r} was trained on simulated flags; this one is drawn by plain formulas, which "
-            "move faster in stronger wind, but not as cloth does. So its readings can follow the wind, not meet it."
+            f"The model {self.measured.model!r} was trained on simulated flags; this one is drawn by plain formulas, "
+            "and moves faster in stronger wind, but not as cloth does: its readings can follow the wind, not meet it."
         )
         if compared is not None:
             known += (

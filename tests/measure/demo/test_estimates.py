@@ -17,9 +17,9 @@ def series(wind: list[float], logged: list[float], *, refused: bool = False) -> 
     agreement = Agreement(
         count=len(wind), bias=float(off.mean()), rmse=float(np.sqrt((off**2).mean())), interval=(1.0, 2.0), covered=0.5
     )
-    values = np.array(wind)
+    values = np.array(wind, dtype=np.float64)
     beside = Beside(
-        time=np.arange(len(wind), dtype=float), wind=values, low=values - 1, high=values + 1, p=np.ones(len(wind)),
+        time=np.arange(len(wind), dtype=float), wind=values, low=values - 1.0, high=values + 1.0, p=np.ones(len(wind)),
         logged=np.array(logged), minute=np.array(logged), window=agreement,
     )  # fmt: skip
     verdict = SimpleNamespace(strange=np.array([True, *[False] * (len(wind) - 1)]), refused=refused, false_alarm=0.05)
