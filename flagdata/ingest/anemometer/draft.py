@@ -307,6 +307,7 @@ def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
     for channel, column in (wind.columns if wind is not None else {}).items():
         lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
         lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
+        lines += ['convention = "to"'] if column.towards else []
         suffix = layout.suffixes[column.index]
         lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
     own = wind.columns.values() if wind is not None else ()

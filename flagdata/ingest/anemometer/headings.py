@@ -23,6 +23,9 @@ _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
+_TOWARDS = re.compile(
+    r"\btowards?\b|\bblowing to\b|\bto dir|\bgoing to\b|\bdir(?:ection)? to\s*(?:[\[(]|$)", re.IGNORECASE
+)
 _PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
 _WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
 _SPEED = frozenset(
@@ -61,6 +64,7 @@ _SPREAD = frozenset(
         "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples", "percentile", "trend",
         "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast", "threshold",
         "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr", "setpoint",
+        "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
         "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
     }
 )  # fmt: skip
@@ -130,6 +134,8 @@ class Heading:
         height: above ground [m].
         label: words that tell instruments apart, lower-case.
         magnetic: of a direction, whether it is from magnetic north.
+        towards: of a direction, whether the wind blows to it.
+        strange: what stands in brackets where a unit does, but spells none that is known; "" where nothing does.
     """
 
     name: str
@@ -142,6 +148,8 @@ class Heading:
     height: float | None
     label: tuple[str, ...]
     magnetic: bool = False
+    towards: bool = False
+    strange: str = ""
 
 
 @lru_cache(maxsize=4096)
@@ -175,7 +183,8 @@ def understand(name: str, stated: str = "") -> Heading:
     return Heading(
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
-        magnetic=bool(known & {"mag", "magnetic"}),
+        magnetic=bool(known & {"mag", "magnetic"}), towards=bool(_TOWARDS.search(text.replace("_", " "))),
+        strange=_strange(text) if unit is None else "",
     )  # fmt: skip
 
 
@@ -245,6 +254,12 @@ def _words(text: str) -> list[str]:
             parts = [part.lower() for part in _CAMEL.findall(word)]
             found.extend(parts)
     return found
+
+
+def _strange(text: str) -> str:
+    """What stands in brackets at the end of a heading as a unit does, such as "gon" or "V"."""
+    found = re.search(r"[\[(<{]\s*([^\W\d_]{1,4})\s*[\])>}]\s*$", text)
+    return found[1] if found is not None and "°" not in text else ""
 
 
 def _height(text: str) -> float | None:

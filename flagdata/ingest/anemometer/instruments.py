@@ -34,11 +34,19 @@ _UNREADABLE = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """A column for a channel: its index, its unit (`None` where nothing tells it), and how the unit is known."""
+    """A column for a channel.
+
+    Attributes:
+        index: of the column.
+        unit: as `flagdata.units` spells it; `None` where nothing tells it.
+        told: how the unit is known.
+        towards: of a direction, whether the wind blows to it.
+    """
 
     index: int
     unit: str | None
     told: str
+    towards: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -340,6 +348,13 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     known = value[np.isfinite(value)]
     if heading.unit is not None and not fits(channel, heading.unit):
         return None
+    if heading.strange:
+        found.remarks.append(
+            f"column {heading.name!r} is in {heading.strange!r}, which is no unit that is known: left out"
+        )
+        return None
+    if heading.unit == "gon":
+        return channel, Column(index=index, unit="gon", told="in gon by its heading", towards=heading.towards)
     if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
         found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
         return None
@@ -362,9 +377,11 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"
     if heading.unit == "points":
-        return channel, Column(index=index, unit="points", told="as points of the compass, 22.5° apart")
+        told = "as points of the compass, 22.5° apart"
+        return channel, Column(index=index, unit="points", told=told, towards=heading.towards)
     told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
-    return channel, Column(index=index, unit=heading.unit or "deg", told=told)
+    told = f"{told}, to which the wind blows" if heading.towards else told
+    return channel, Column(index=index, unit=heading.unit or "deg", told=told, towards=heading.towards)
 
 
 def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:

@@ -313,6 +313,12 @@ def read_table(
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         cells = column.value(order)  # NaN where a cell is no number
+        if name in DOUBTED:
+            coded = unitcheck.nines(cells)
+            found = unitcheck.coded(name, cells, coded, line)
+            state = np.where(coded, np.uint8(Cell.MISSING), state)
+            cells = np.where(coded, np.nan, cells)
+            findings.extend(found)
         value = in_si(cells, layout)
         if name in DOUBTED:
             span = float(time.max() - time.min()) / NANOSECONDS

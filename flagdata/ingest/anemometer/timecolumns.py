@@ -44,6 +44,7 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
     ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31),
@@ -298,9 +299,13 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
             if not _part_at(names, columns, at, part):
                 break
             chosen, form, at = [*chosen, at], f"{form} {part[0]}", at + 1
-        if form == "%Y %m %d" and at < len(names) and _share(_CLOCK, [cell for cell in columns[at] if cell]):
-            clock = next((c for c in _CLOCKS if _fits(counted.parse([cell for cell in columns[at] if cell], c))), None)
-            chosen, form = [*chosen, at], f"{form} {clock}" if clock else form
+        clock = [cell for cell in columns[at] if cell] if at < len(names) else []
+        beside = names[at] if at < len(names) else ""
+        if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and _share(_DIGITS, clock):
+            chosen, form = [*chosen, at], f"{form} %H%M"
+        elif form == "%Y %m %d" and clock and _share(_CLOCK, clock):
+            known = next((found for found in _CLOCKS if _fits(counted.parse(clock, found))), None)
+            chosen, form = [*chosen, at], f"{form} {known}" if known else form
         if "%H" not in form and "%I" not in form:
             continue
         texts = [" ".join(cells) for cells in zip(*(columns[i] for i in chosen), strict=True)]
@@ -333,6 +338,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
+    if set(words) & _PARTS_OF_DATES:
+        return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
         for form, low, high in (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
@@ -366,6 +373,7 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-min", frozenset({"minutes", "mins", "minute"})),
     ("elapsed-s", frozenset({"s", "sec", "secs", "second", "seconds"})),
 )
+_PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
 _SLOW = 5000.0
 """Steps of a count from which it is as likely of microseconds as of milliseconds."""
 _SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0}

@@ -316,3 +316,66 @@ def test_degrees_go_before_points_of_the_compass_beside_them(read: Read) -> None
     rows = "".join(f"2023-07-01T00:00:{at:02d}Z,4.{at},{231 + at},SW\n" for at in range(9))
     log = read(f"time,Speed (m/s),Dir,Dir\n{rows}")
     assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(231.0)
+
+
+def timed(heading: str, cells: list[str]) -> str:
+    return f"time,{heading}\n" + "".join(
+        f"2023-07-13T{at // 3600:02d}:{at // 60 % 60:02d}:{at % 60:02d}Z,{cell}\n" for at, cell in enumerate(cells)
+    )
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["wind_to_direction (deg)", "Wind direction towards (deg)", "Wind dir (deg) blowing to", "Wind direction to"],
+)
+def test_a_direction_to_which_the_wind_blows_is_turned(read: Read, name: str) -> None:
+    log = read(timed(f"wind speed (m/s),{name}", [f"4.{at},{50 + at}" for at in range(10)]))
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(230.0)
+
+
+@pytest.mark.parametrize("name", ["Wind direction (0 to 360 deg)", "Wind direction, 0 to 360 (deg)"])
+def test_the_word_to_alone_turns_no_direction(read: Read, name: str) -> None:
+    log = read(timed(f"wind speed (m/s),{name}", [f"4.{at},{50 + at}" for at in range(10)]))
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(50.0)
+
+
+def test_directions_in_gon_are_scaled_and_those_in_unknown_units_left_out(read: Read) -> None:
+    cells = [f"4.{at},{200 + at}" for at in range(10)]
+    log = read(timed("wind speed (m/s),wind direction (gon)", cells))
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(180.0)
+    log = read(timed("wind speed (m/s),wind direction (cnt)", cells))
+    assert "wind_direction" not in log.series.channels
+    assert "'cnt'" in " ".join(finding.what for finding in log.findings)
+
+
+def test_what_a_model_predicts_is_no_anemometer(log_file: Write) -> None:
+    path = log_file(timed("wind speed (m/s),wind speed predicted (m/s)", [f"4.{at},5.{at}" for at in range(10)]))
+    assert anemometers(path) == ()
+
+
+@pytest.mark.parametrize("clock", ["59", "0059"])
+def test_a_clock_written_as_a_number_may_lack_its_zeros(read: Read, clock: str) -> None:
+    text = "Year,DOY,HHMM,WS (m/s)\n"
+    text += "".join(f"2023,194,{at},4.{at % 10}\n" for at in range(50, 59))
+    text += f"2023,194,{clock},5.0\n2023,194,100,5.1\n2023,194,1230,5.2\n"
+    log = read(text, zone="UTC")
+    told = [str(np.datetime64(int(ns), "ns"))[11:16] for ns in log.series.time[-3:]]
+    assert told == ["00:59", "01:00", "12:30"]
+
+
+def test_parts_of_a_date_count_from_no_start(log_file: Write) -> None:
+    rows = "".join(f"2023-07-13,{12 + at / 60:.4f},4.{at % 10}\n" for at in range(20))
+    assert "elapsed" not in refusal(log_file(f"date,hour,WS (m/s)\n{rows}")).fix
+
+
+def test_nines_far_above_all_other_speeds_are_a_code_even_late_in_a_log(read: Read) -> None:
+    cells = [f"{3 + at % 7}.{at % 10}" for at in range(2000)]
+    cells[1500] = "99.0"
+    log = read(timed("wind speed (m/s)", cells))
+    assert np.isnan(log.series.channels["wind_speed"][1500])
+    assert [finding.count for finding in log.findings if finding.kind == "code-for-missing"] == [1]
+
+
+def test_nines_among_speeds_like_them_are_speeds(read: Read) -> None:
+    log = read(timed("wind speed (km/h)", [f"{90 + at}.0" for at in range(20)]))
+    assert np.isfinite(log.series.channels["wind_speed"]).all()
