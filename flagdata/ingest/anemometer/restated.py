@@ -13,10 +13,10 @@ from importlib import import_module
 from typing import Protocol
 
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 KINDS = (
-    "flagdata.ingest.anemometer.json_text",
     "flagdata.ingest.anemometer.expedition",
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.global_hourly",
@@ -38,18 +38,27 @@ class Kind(Protocol):
         ...
 
 
-def restate(source: TextFile) -> TextFile:
+def restate(source: TextFile, recipe: Recipe | None = None) -> TextFile:
     """The file as a table where it is of a known kind, else as it is.
 
-    Raises:
-        LimitError: more columns than are read.
+    Args:
+        recipe: that the user names; one whose columns are not those of the table describes the lines as they are.
     """
     lines = source.head(LOOKED_AT)
     for name in KINDS:
         kind: Kind = import_module(name)  # type: ignore[assignment]
         if kind.matches(lines):
-            return kind.as_table(source) or source
+            stated = kind.as_table(source)
+            return source if stated is None or not _describes(recipe, stated) else stated
     return source
+
+
+def _describes(recipe: Recipe | None, stated: TableText) -> bool:
+    """Whether a recipe names columns of a table; no recipe leaves the table to be understood."""
+    if recipe is None:
+        return True
+    names = next(csv.reader(stated.head(1)))
+    return all(column in names for column in (*recipe.time.columns, *(c.column for c in recipe.channels.values())))
 
 
 def table(

@@ -200,7 +200,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             where=where,
             fix="split it, or give read_log wider limits",
         )
-    from flagdata.ingest.anemometer import excel, restated  # both make a TextFile: they import this module
+    from flagdata.ingest.anemometer import excel, json_text  # both make a TextFile: they import this module
 
     if excel.is_workbook(path, head):
         return excel.open_sheet(path, limits=limits)
@@ -221,7 +221,9 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         raise InputError(
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
-    return restated.restate(TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings)))
+    text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
+    table = json_text.as_table(text) if json_text.matches(text.head()) else None
+    return table or text
 
 
 def _looks_utf16(head: bytes) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.ingest.anemometer import WindOptions, anemometers, read_log, sniff
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -379,3 +379,26 @@ def test_nines_far_above_all_other_speeds_are_a_code_even_late_in_a_log(read: Re
 def test_nines_among_speeds_like_them_are_speeds(read: Read) -> None:
     log = read(timed("wind speed (km/h)", [f"{90 + at}.0" for at in range(20)]))
     assert np.isfinite(log.series.channels["wind_speed"]).all()
+
+
+LABELLED = "".join(
+    f"2023-07-13T12:00:{at:02d}Z Wind Speed: {4 + at / 10:.1f} m/s Direction: {230 + at}\n" for at in range(12)
+)
+
+
+def test_a_recipe_that_describes_labelled_lines_as_they_are_holds(log_file: Write, tmp_path: Path) -> None:
+    recipe = tmp_path / "own.toml"
+    recipe.write_text(
+        'name = "own"\nabout = "own"\nsource = "own"\n[file]\ndelimiter = "space"\nheader = 0\n[time]\ncolumns = [1]\nformat = "iso"\n'
+        '[channels.wind_speed]\ncolumn = 4\nunit = "m/s"\n[sensor]\nname = "own"\n'
+    )
+    log = read_log(log_file(LABELLED), WindOptions(recipe=str(recipe)))
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([4.0, 4.1])
+
+
+def test_the_recipe_that_is_drafted_of_labelled_lines_reads_them(log_file: Write, tmp_path: Path) -> None:
+    path, recipe = log_file(LABELLED), tmp_path / "drafted.toml"
+    recipe.write_text(sniff(path)[0].draft or "")
+    log = read_log(path, WindOptions(recipe=str(recipe)))
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([4.0, 4.1])
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(230.0)
