@@ -27,6 +27,8 @@ _SITES = frozenset(
         "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
     }
 )  # fmt: skip
+_NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
+"""Words beside which a heading is still that of a site."""
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 _UNREADABLE = 0.1
@@ -196,17 +198,36 @@ def _otherwise(name: str, stated: str, told: str) -> str:
 
 
 def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
-    """The column that tells sites apart whose rows share their stamps, and the sites in the first rows."""
-    if len(set(stamps)) == len(stamps):
-        return None
+    """The column that tells sites apart, and the sites in the first rows; `None` where all rows are of one.
+
+    Its heading is that of a site; or the rows of different sites share their stamps.
+    """
+    shared = len(set(stamps)) < len(stamps)
     for index, name in enumerate(layout.names):
-        if index in time or not set(words_of(name)) & _SITES or understand(name).quantity:
+        words = set(words_of(name))
+        if index in time or not words & _SITES or understand(name).quantity:
             continue
         cells = layout.column(index)
         kinds = sorted({cell for cell in cells if cell})
-        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
-        if 2 <= len(kinds) <= 50 and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+        if not 2 <= len(kinds) <= 50:
+            continue
+        if words <= _SITES | _NUMBERED and len(cells) >= 3 * len(kinds):
             return index, tuple(kinds)
+        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
+        if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+            return index, tuple(kinds)
+    return None
+
+
+def site_of_all(layout: Layout, *, time: Sequence[int]) -> tuple[int, str] | None:
+    """The column with a site's heading and the one site that the first rows hold; `None` where there is none."""
+    for index, name in enumerate(layout.names):
+        words = set(words_of(name))
+        if index in time or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
+            continue
+        kinds = set(layout.column(index))
+        if len(kinds) == 1 and (site := next(iter(kinds))):
+            return index, site
     return None
 
 
@@ -344,6 +365,9 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             found.remarks.append(f"none of the directions {names} is surely that of {found.name(speed)!r}: left out")
         return None
     index = next((i for i in chosen if not found.headings[i].magnetic), chosen[0])
+    angles = [i for i in candidates if found.headings[i].unit != "points" and not found.headings[i].magnetic]
+    if found.headings[index].unit == "points" and len(angles) == 1:
+        index = angles[0]  # the same in degrees
     heading, value = found.headings[index], found.values[index]
     known = value[np.isfinite(value)]
     if heading.unit is not None and not fits(channel, heading.unit):

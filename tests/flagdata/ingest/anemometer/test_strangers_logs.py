@@ -389,7 +389,8 @@ LABELLED = "".join(
 def test_a_recipe_that_describes_labelled_lines_as_they_are_holds(log_file: Write, tmp_path: Path) -> None:
     recipe = tmp_path / "own.toml"
     recipe.write_text(
-        'name = "own"\nabout = "own"\nsource = "own"\n[file]\ndelimiter = "space"\nheader = 0\n[time]\ncolumns = [1]\nformat = "iso"\n'
+        'name = "own"\nabout = "own"\nsource = "own"\n'
+        '[file]\ndelimiter = "space"\nheader = 0\n[time]\ncolumns = [1]\nformat = "iso"\n'
         '[channels.wind_speed]\ncolumn = 4\nunit = "m/s"\n[sensor]\nname = "own"\n'
     )
     log = read_log(log_file(LABELLED), WindOptions(recipe=str(recipe)))
@@ -402,3 +403,31 @@ def test_the_recipe_that_is_drafted_of_labelled_lines_reads_them(log_file: Write
     log = read_log(path, WindOptions(recipe=str(recipe)))
     assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([4.0, 4.1])
     assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(230.0)
+
+
+@pytest.mark.parametrize("names", [("DAL", "AUS"), ("3002", "3003")])
+def test_sites_that_take_turns_with_stamps_of_their_own_are_told_apart(log_file: Write, names: tuple[str, str]) -> None:
+    rows = "".join(
+        f"{name},2026-09-20 00:{at:02d}:{second:02d}Z,{180 + at},{first + at % 3}.5\n"
+        for at in range(20) for name, second, first in zip(names, (3, 8), (4, 9), strict=True)
+    )  # fmt: skip
+    path = log_file(f"station,valid,drct,ws (m/s)\n{rows}")
+    assert set(anemometers(path)) == set(names)
+    speed = read_log(path, WindOptions(wind=names[1])).series.channels["wind_speed"]
+    assert speed.tolist() == pytest.approx([9.5 + at % 3 for at in range(20)])
+
+
+def test_a_site_that_appears_late_in_a_table_of_another_is_flagged(read: Read) -> None:
+    rows = "".join(f"DAL,2026-09-20T{at // 60:02d}:{at % 60:02d}:00Z,{4 + at % 3}.{at % 10}\n" for at in range(1440))
+    rows += "".join(f"AUS,2026-09-21T00:0{at}:00Z,9.{at}\n" for at in range(5))
+    log = read(f"station,valid,ws (m/s)\n{rows}")
+    told = [finding for finding in log.findings if finding.kind == "sensor-fault"]
+    assert [finding.count for finding in told] == [5]
+    assert "site" in told[0].what
+
+
+def test_degrees_called_otherwise_go_before_points_of_the_compass(read: Read) -> None:
+    log = read(
+        timed("winddirectiondegrees,winddirection,wind speed (m/s)", [f"{190 + at},S,4.{at}" for at in range(9)])
+    )
+    assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(190.0)
