@@ -16,6 +16,7 @@ BLENDER := $(CURDIR)/$(BLENDER_VENV)/bin/python
 # MuJoCo, a second foreign simulator that `python -m tests.validation foreign` takes recordings from.
 MUJOCO_VENV := .venv-mujoco
 MUJOCO_STAMP := $(MUJOCO_VENV)/.installed
+MUJOCO := $(CURDIR)/$(MUJOCO_VENV)/bin/python
 
 # The oldest dependencies that pyproject.toml admits.
 OLDEST_VENV := .venv-oldest
@@ -30,11 +31,11 @@ SYSTEM := python3.11-venv g++ git libegl1 libgl1 libice6 libsm6 libx11-6 libxcb1
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
 
-test: lint $(BLENDER_STAMP)
-	FLAGDATA_BLENDER=$(BLENDER) $(BIN)/python -m pytest -n 2 --dist loadfile
+test: lint $(BLENDER_STAMP) $(MUJOCO_STAMP)
+	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP)
-	FLAGDATA_BLENDER=$(BLENDER) $(OLDEST_VENV)/bin/python -m pytest -n 2 --dist loadfile
+test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP) $(MUJOCO_STAMP)
+	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(OLDEST_VENV)/bin/python -m pytest -n 2 --dist loadfile
 
 blender: $(BLENDER_STAMP)
 
