@@ -312,11 +312,12 @@ def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
         suffix = layout.suffixes[column.index]
         lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
     own = wind.columns.values() if wind is not None else ()
-    for column in dict.fromkeys(other for one in own for other in _beside(layout, one)):
+    units = list(dict.fromkeys(other for one in own for other in _beside(layout, one)))
+    for column in units:
         text = next(row[column].strip() for row in layout.rows if row[column].strip())
         lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
         lines += ['about = "unit"']
-    site = site_of_all(layout, time=time.columns) if time is not None else None
+    site = site_of_all(layout, apart={*time.columns, *units}) if time is not None else None
     if site is not None and own:
         lines += ["", "[[check]]", f"column = {_reference(layout, site[0])}", f"values = [{_quoted(site[1])}]"]
         lines += ['about = "site"']

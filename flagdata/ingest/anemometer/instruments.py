@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -219,11 +219,15 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
     return None
 
 
-def site_of_all(layout: Layout, *, time: Sequence[int]) -> tuple[int, str] | None:
-    """The column with a site's heading and the one site that the first rows hold; `None` where there is none."""
+def site_of_all(layout: Layout, *, apart: Collection[int]) -> tuple[int, str] | None:
+    """The column with a site's heading and the one site that the first rows hold; `None` where there is none.
+
+    Args:
+        apart: columns of the time or of units, which are none.
+    """
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
-        if index in time or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
+        if index in apart or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
             continue
         kinds = set(layout.column(index))
         if len(kinds) == 1 and (site := next(iter(kinds))):
