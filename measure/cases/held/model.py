@@ -124,7 +124,7 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
     ]  # fmt: skip
     system, state = assemble(scenes)
     last = max(float(swing.tool_times[-1]) for swing in swings)
-    times = np.arange(math.ceil(last / PERIOD) + 1) * PERIOD
+    times = np.arange(math.ceil(last / PERIOD) + 1, dtype=np.float64) * PERIOD
     tracks = np.stack([_track(cloth, swing, times) for swing in swings], axis=-1)
     motion = AnchorTracks(start=0.0, period=PERIOD, samples=torch.as_tensor(tracks, dtype=state.position.dtype))
     system = replace(system, motion=motion)
