@@ -20,12 +20,12 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
-from measure.challenge.rates import Share
 from measure.gate.gate import Gate
 from measure.gate.judgement import CONFIDENCE, FALSE_ALARM, Judgement, judge
 from measure.gate.nearest import nearest
 from measure.gate.prepare import FilmsOf, calibrated, data_of
 from measure.gate.storage import read
+from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
 from tests.validation.gate_clips import KINDS, made, seed_of
 

@@ -14,7 +14,7 @@ from measure.cases.held.calibrate import Linear, at_bounds, calibrated, linear
 from measure.cases.held.model import Cloth, Parameters, errors, predicted, rigid
 from measure.cases.held.reading import Floats, Swing, read_all
 from measure.cases.held.repeats import features, shuffled, tail_probability
-from measure.challenge.rates import Share
+from measure.shares import Share
 from sim.material import Material
 
 LEVEL = 0.05
