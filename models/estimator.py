@@ -144,14 +144,11 @@ class Estimator:
             known: the range that a quantity of each clip is known to lie in; None if nothing is known.
         """
         embeddings = self.embeddings(inputs)
-        scaling = self.learners[0].scaling
         if known is None:
             logits = self.logits(embeddings, seed=seed, draws=draws)
         else:
-            logits, _ = restricted(
-                self.logits(embeddings, seed=seed, draws=draws * MORE), scaling, known, draws=draws
-            )  # fmt: skip
-        values = scaling.values(logits)
+            logits, _ = self.logits_within(embeddings, known, seed=seed, draws=draws)
+        values = self.learners[0].scaling.values(logits)
         told = embeddings[0].cpu().numpy().astype(np.float32)
         return Estimates(
             targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
@@ -184,6 +181,17 @@ class Estimator:
         logits = torch.cat(found, dim=1)
         centre = logits.mean(dim=1, keepdim=True)
         return centre + (logits - centre) * self.widening.to(logits)
+
+    def logits_within(
+        self, embeddings: Sequence[Tensor], known: Known, *, seed: int, draws: int
+    ) -> tuple[Tensor, NDArray[np.float64]]:  # fmt: skip
+        """As `logits`, where a quantity is known, and (n,) the share of the distribution that lies there.
+
+        Raises:
+            InputError: see `models.restriction.restricted`.
+        """
+        many = self.logits(embeddings, seed=seed, draws=draws * MORE)
+        return restricted(many, self.learners[0].scaling, known, draws=draws)
 
 
 def load(folder: Path) -> Estimator:

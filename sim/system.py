@@ -309,13 +309,16 @@ class System:
 
     def targets(self, time: float) -> Tensor:
         """(held, 3, batch) where the handles are at a time [m]."""
-        moved = self.anchors + self.offset(time)[:, None]
+        return self._targets(time, self.offset(time))
+
+    def _targets(self, time: float, offset: Tensor) -> Tensor:
+        moved = self.anchors + offset[:, None]
         return moved if self.motion is None else moved + self.motion.displacement(time)
 
     def drive(self, start: float, end: float) -> Drive:
         """Wind and handles between two times [s], taken as linear."""
         offset = (self.offset(start), self.offset(end))
-        first, last = self.targets(start), self.targets(end)
+        first, last = self._targets(start, offset[0]), self._targets(end, offset[1])
         return Drive(
             wind=(self.wind.velocity(start), self.wind.velocity(end)),
             targets=(first, last),

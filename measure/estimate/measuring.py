@@ -263,8 +263,7 @@ def _look(window: Window, model: Estimator, gate: Gate, *, seed: int, known: Kno
     if known is None:
         logits = model.logits(embeddings, seed=own, draws=DRAWS)[:, :DRAWS]
     else:
-        many = model.logits(embeddings, seed=own, draws=DRAWS * MORE)
-        logits, shares = restricted(many, model.learners[0].scaling, known, draws=DRAWS)
+        logits, shares = model.logits_within(embeddings, known, seed=own, draws=DRAWS)
         within = float(shares.mean())
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
     reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from flagdata.ingest.anemometer.headings import understand
-from flagdata.ingest.anemometer.restated import table
+from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 from flagdata.units import spelled
 
@@ -48,20 +48,14 @@ def as_table(source: TextFile) -> TableText | None:
     if heading is None or any(guess.score >= SURE and not guess.doubts for guess in recognise(source)):
         return None
     words, names = heading
-    other = 0
 
-    def rows() -> Iterator[list[str]]:
-        nonlocal other
-        for _, lines in source.blocks():
-            for line in lines:
-                cut = _cut(line)
-                if cut is not None and cut[0] == words:
-                    yield [cut[1], *cut[2]]
-                elif line.strip():
-                    other += 1
+    def row(line: str) -> list[str] | None:
+        cut = _cut(line)
+        return [cut[1], *cut[2]] if cut is not None and cut[0] == words else None
 
+    found, other = rows_of(source, row)
     return table(
-        source, ["time", *names], list(rows()), kind="labelled-lines", what="lines that name each number",
+        source, ["time", *names], found, kind="labelled-lines", what="lines that name each number",
         left_out=other,
     )  # fmt: skip
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.restated import table
+from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 _STAMP = re.compile(
@@ -39,19 +39,7 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The wind of each report."""
-    other = 0
-
-    def rows() -> Iterator[list[str]]:
-        nonlocal other
-        for _, lines in source.blocks():
-            for line in lines:
-                row = _row(line)
-                if row is not None:
-                    yield row
-                elif line.strip():
-                    other += 1
-
-    found = list(rows())
+    found, other = rows_of(source, _row)
     units = {row[-1] for row in found}
     unit = next(iter(units)) if len(units) == 1 else ""
     names = ["time [UTC]", "station", f"wind speed [{unit}]", "wind direction [deg]", f"gust [{unit}]"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Protocol
 
@@ -59,6 +59,20 @@ def _describes(recipe: Recipe | None, stated: TableText) -> bool:
         return True
     names = next(csv.reader(stated.head(1)))
     return all(column in names for column in (*recipe.time.columns, *(c.column for c in recipe.channels.values())))
+
+
+def rows_of(source: TextFile, row: Callable[[str], list[str] | None]) -> tuple[list[list[str]], int]:
+    """The cells of each line that `row` knows, and how many lines with something in them it does not."""
+    found: list[list[str]] = []
+    other = 0
+    for _, lines in source.blocks():
+        for line in lines:
+            cells = row(line)
+            if cells is not None:
+                found.append(cells)
+            elif line.strip():
+                other += 1
+    return found, other
 
 
 def table(
