@@ -13,6 +13,11 @@ BLENDER_VENV := .venv-blender
 BLENDER_STAMP := $(BLENDER_VENV)/.installed
 BLENDER := $(CURDIR)/$(BLENDER_VENV)/bin/python
 
+# MuJoCo, a second foreign simulator that `python -m tests.validation foreign` takes recordings from.
+MUJOCO_VENV := .venv-mujoco
+MUJOCO_STAMP := $(MUJOCO_VENV)/.installed
+MUJOCO := $(CURDIR)/$(MUJOCO_VENV)/bin/python
+
 # The oldest dependencies that pyproject.toml admits.
 OLDEST_VENV := .venv-oldest
 OLDEST_STAMP := $(OLDEST_VENV)/.installed
@@ -21,18 +26,20 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 SYSTEM := python3.11-venv g++ git libegl1 libgl1 libice6 libsm6 libx11-6 libxcb1 libxext6 libxfixes3 libxi6 \
   libxkbcommon0 libxrender1
 
-.PHONY: demo test test-oldest blender system lint docs bench validate clean
+.PHONY: demo test test-oldest blender mujoco system lint docs bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
 
-test: lint $(BLENDER_STAMP)
-	FLAGDATA_BLENDER=$(BLENDER) $(BIN)/python -m pytest -n 2 --dist loadfile
+test: lint $(BLENDER_STAMP) $(MUJOCO_STAMP)
+	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP)
-	FLAGDATA_BLENDER=$(BLENDER) $(OLDEST_VENV)/bin/python -m pytest -n 2 --dist loadfile
+test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP) $(MUJOCO_STAMP)
+	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(OLDEST_VENV)/bin/python -m pytest -n 2 --dist loadfile
 
 blender: $(BLENDER_STAMP)
+
+mujoco: $(MUJOCO_STAMP)
 
 system:
 	$(SUDO) apt-get install --yes --no-install-recommends $(SYSTEM)
@@ -63,6 +70,10 @@ $(BLENDER_STAMP): sim/blender/environment.py | $(STAMP)
 	$(BIN)/flagdata blender-setup --folder $(BLENDER_VENV)
 	touch $@
 
+$(MUJOCO_STAMP): tests/validation/mujoco/environment.py | $(STAMP)
+	$(BIN)/python -m tests.validation.mujoco.environment $(MUJOCO_VENV)
+	touch $@
+
 # An environment (its folder, its constraints) with the package and what its tests need.
 define environment
 $(PYTHON) -m venv $(1)
@@ -73,4 +84,4 @@ touch $(1)/.installed
 endef
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info

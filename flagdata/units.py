@@ -32,6 +32,12 @@ class Unit:
         return (np.asarray(value, dtype=np.float64) - self.offset) / self.scale
 
 
+_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
+_WORDS = {"NORTH": "N", "EAST": "E", "SOUTH": "S", "WEST": "W"}
+POINTS: dict[str, float] = {name: number * 22.5 for number, name in enumerate(_ROSE)}
+"""Points of the compass → degrees from north; a column of them has the unit "points"."""
+POINTS |= {word: POINTS[name] for word, name in _WORDS.items()}
+
 UNITS: dict[str, Unit] = {
     "m/s": Unit(si="m/s", scale=1.0),
     "km/h": Unit(si="m/s", scale=1 / 3.6),
@@ -43,6 +49,9 @@ UNITS: dict[str, Unit] = {
     "ft/min": Unit(si="m/s", scale=0.3048 / 60),
     "rad": Unit(si="rad", scale=1.0),
     "deg": Unit(si="rad", scale=math.pi / 180),
+    "points": Unit(si="rad", scale=math.pi / 180),
+    "gon": Unit(si="rad", scale=math.pi / 200),
+    "10 deg": Unit(si="rad", scale=math.pi / 18),
     "K": Unit(si="K", scale=1.0),
     "degC": Unit(si="K", scale=1.0, offset=273.15),
     "degF": Unit(si="K", scale=5 / 9, offset=273.15 - 32 * 5 / 9),
@@ -78,6 +87,8 @@ SPELLINGS: dict[str, str] = {
     "degtrue": "deg", "deg_from_north": "deg", "degreesfromnorth": "deg",
     "degreestrue": "deg", "°true": "deg", "degn": "deg", "degreesn": "deg", "°n": "deg", "arcdegrees": "deg",
     "compassdegrees": "deg", "angulardegrees": "deg", "grad": "deg", "grados": "deg", "radian": "rad", "radians": "rad",
+    "gons": "gon", "gradian": "gon", "gradians": "gon", "10sdeg": "10 deg", "10deg": "10 deg",
+    "10'sdeg": "10 deg", "10°": "10 deg", "tensofdegrees": "10 deg", "tensofdeg": "10 deg",
     "°c": "degC", "℃": "degC", "c": "degC", "celsius": "degC", "celcius": "degC", "degc": "degC", "deg_c": "degC",
     "degreesc": "degC", "degreec": "degC", "degreescelsius": "degC", "degreecelsius": "degC", "degcelsius": "degC",
     "°f": "degF", "℉": "degF", "f": "degF", "fahrenheit": "degF", "degf": "degF", "deg_f": "degF",

@@ -22,6 +22,7 @@ from models.crops import Cropping
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss, build
 from models.outliers import Familiarity
+from models.restriction import MORE, Known, restricted
 from models.storage import WEIGHTS, read_card, read_tensors
 from models.targets import Cloth, Target
 
@@ -132,15 +133,22 @@ class Estimator:
         return torch.cat([self.front_end(clip[None].to(self.device)) for clip in cut])
 
     @torch.no_grad()
-    def estimate(self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS) -> Estimates:
+    def estimate(
+        self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Known | None = None
+    ) -> Estimates:  # fmt: skip
         """What is said of inputs (n, *shape), see `inputs`.
 
         Args:
             seed: of the draws; the same inputs and seed give the same draws.
             draws: of each clip's distribution, shared among the learners.
+            known: the range that a quantity of each clip is known to lie in; None if nothing is known.
         """
         embeddings = self.embeddings(inputs)
-        values = self.learners[0].scaling.values(self.logits(embeddings, seed=seed, draws=draws))
+        if known is None:
+            logits = self.logits(embeddings, seed=seed, draws=draws)
+        else:
+            logits, _ = self.logits_within(embeddings, known, seed=seed, draws=draws)
+        values = self.learners[0].scaling.values(logits)
         told = embeddings[0].cpu().numpy().astype(np.float32)
         return Estimates(
             targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
@@ -173,6 +181,17 @@ class Estimator:
         logits = torch.cat(found, dim=1)
         centre = logits.mean(dim=1, keepdim=True)
         return centre + (logits - centre) * self.widening.to(logits)
+
+    def logits_within(
+        self, embeddings: Sequence[Tensor], known: Known, *, seed: int, draws: int
+    ) -> tuple[Tensor, NDArray[np.float64]]:  # fmt: skip
+        """As `logits`, where a quantity is known, and (n,) the share of the distribution that lies there.
+
+        Raises:
+            InputError: see `models.restriction.restricted`.
+        """
+        many = self.logits(embeddings, seed=seed, draws=draws * MORE)
+        return restricted(many, self.learners[0].scaling, known, draws=draws)
 
 
 def load(folder: Path) -> Estimator:

@@ -1,11 +1,12 @@
 """What networks are to tell of a clip: physical parameters, their ranges, and how they become numbers to learn.
 
-Each target lies in a range, for flags that of the search space of Runia et al. 2020 (table 1). What networks learn is
-the logit of its place in that range, widened by 1 % so that the ends stay finite: a distribution over it has no mass
-outside of what was simulated, and a uniform prior becomes a logistic one.
+Each target lies in a range, for flags that of the search space of Runia et al. 2020 (table 1), or a wider one of flags
+of any fabric. What networks learn is the logit of its place in that range, widened by 1 % so that the ends stay finite:
+a distribution over it has no mass outside of what was simulated, and a uniform prior becomes a logistic one.
 
 A quantity has one name in all tables ("density"), whatever cloth it is of; the range is that of one kind of cloth. A
-recipe therefore names targets by the keys of `TARGETS`: "density" is a flag's, "cloth_density" a hanging cloth's.
+recipe therefore names targets by the keys of `TARGETS`: "density" is a flag's in the paper's range, "fabric_density" a
+flag's of any fabric, "cloth_density" a hanging cloth's.
 """
 
 from __future__ import annotations
@@ -76,6 +77,19 @@ _OF_FLAGS = {
 Ponte Roma's entries, the bending scale has mean -3.93 and standard deviation 0.10, the anisotropy 0.15 and 0.25; the
 ranges reach at least 6 of them either way."""
 
+_OF_FLAGS_OF_ANY_FABRIC = {
+    "fabric_density": Target(
+        name="density", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3
+    ),
+    "fabric_bending": Target(
+        name="bending_scale", unit="log10(N·m)", low=-5.2, high=-2.9,
+        about="mean of the logarithms of the 15 bending coefficients",
+    ),
+}  # fmt: skip
+"""Flags of the scene `flag-fabrics`: area weights from spinnaker cloth to denim, and a factor of 0.125 to 4 of all
+bending coefficients together, which moves the bending scale's mean from -4.8 to -3.3; the ranges reach 4 of its
+standard deviations beyond either."""
+
 _BENDING = 15
 _ROW = 5
 
@@ -93,7 +107,7 @@ _OF_HANGING_CLOTH = {
 0.113 to 0.324 kg/m² times 0.7 to 1.4, bending scales of -4.76 to -3.78 and 0.30 either way. Its anisotropy is the
 material's own, one of ten values, and no target."""
 
-TARGETS = {**_OF_FLAGS, **_OF_HANGING_CLOTH}
+TARGETS = {**_OF_FLAGS, **_OF_FLAGS_OF_ANY_FABRIC, **_OF_HANGING_CLOTH}
 """By the names that recipes know them by."""
 
 

@@ -66,6 +66,14 @@ class Springs:
     share: float
 
 
+class AnchorMotion(Protocol):
+    """Anchors that move one by one, as they were seen to."""
+
+    def displacement(self, time: float) -> Tensor:
+        """(held, 3, batch) from where the system has the anchors [m], at a time [s]."""
+        ...
+
+
 class Tie(Protocol):
     """Springs beside the handles, damped as those are. Where it loosens handles it makes up the difference to them."""
 
@@ -149,6 +157,7 @@ class System:
         handles: how the cloth is held.
         held: (held,) the handles' vertices.
         anchors: (held, 3, batch) where they are tied at zero offset [m].
+        motion: of each anchor beside that of all handles; None for none. Ties do not follow it.
         effects: what else acts.
         flows: what makes the wind differ from place to place, applied in order.
         loads: air that moves with the cloth.
@@ -165,6 +174,7 @@ class System:
     handles: Handles
     held: Tensor
     anchors: Tensor
+    motion: AnchorMotion | None = None
     effects: tuple[Effect, ...] = ()
     flows: tuple[Flow, ...] = ()
     loads: tuple[Load, ...] = ()
@@ -172,6 +182,13 @@ class System:
     frictions: tuple[Friction, ...] = ()
     contact: Contact | None = None
     limits: StrainLimits | None = None
+
+    def __post_init__(self) -> None:
+        if self.motion is not None and self.ties:
+            raise UsageError(
+                "ties beside handles whose anchors move one by one", where="system",
+                fix="leave out the effects that loosen or add attachments, or move all handles together",
+            )  # fmt: skip
 
     @cached_property
     def free(self) -> Tensor:
@@ -292,12 +309,16 @@ class System:
 
     def targets(self, time: float) -> Tensor:
         """(held, 3, batch) where the handles are at a time [m]."""
-        return self.anchors + self.offset(time)[:, None]
+        return self._targets(time, self.offset(time))
+
+    def _targets(self, time: float, offset: Tensor) -> Tensor:
+        moved = self.anchors + offset[:, None]
+        return moved if self.motion is None else moved + self.motion.displacement(time)
 
     def drive(self, start: float, end: float) -> Drive:
         """Wind and handles between two times [s], taken as linear."""
         offset = (self.offset(start), self.offset(end))
-        first, last = (self.anchors + moved[:, None] for moved in offset)
+        first, last = self._targets(start, offset[0]), self._targets(end, offset[1])
         return Drive(
             wind=(self.wind.velocity(start), self.wind.velocity(end)),
             targets=(first, last),

@@ -33,9 +33,10 @@ from measure.challenge.folder import ChallengeFolder
 from measure.challenge.key import opened
 from measure.challenge.oracle import Oracle
 from measure.challenge.outcome import Outcome
-from measure.challenge.rates import Power, Share
+from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
 from measure.loop.verdict import Conclusion
+from measure.shares import Share
 
 ENOUGH = 2.0
 """Times the half-detection strength, from where identification is graded."""

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from flagdata.lake import Artifact
 from measure.estimate import pictures
 from measure.estimate.dependence import of_model
@@ -42,10 +44,17 @@ class Series:
         """What is to be thought of it, in words."""
         verdict = self.measured.verdict
         strange, count = int(verdict.strange.sum()), len(self.measured.windows)
-        compared = self.beside.of_minute
-        known = f"The model {self.measured.model!r} was trained on simulated flags."
+        compared = self.beside.window
+        known = (
+            f"The model {self.measured.model!r} was trained on simulated flags; this one is drawn by plain formulas, "
+            "and moves faster in stronger wind, but not as cloth does: its readings can follow the wind, not meet it."
+        )
         if compared is not None:
-            known += f" It differs from the anemometer's minute means by {compared.rmse:.1f} m/s (root mean square)."
+            known += (
+                f" Beside the anemometer over the same windows they are {_apart(compared.bias)} (root mean square "
+                f"{compared.rmse:.1f} m/s [{compared.interval[0]:.1f}, {compared.interval[1]:.1f}] 90 %, "
+                f"n = {compared.count} windows){_together(self.beside)}."
+            )
         unlike = f"{strange} of {count} windows are unlike what the model was trained on"
         if verdict.refused:
             return (
@@ -53,6 +62,21 @@ class Series:
                 "hollow is not to be relied on."
             )
         return f"{known} {unlike} (expected of familiar films: {verdict.false_alarm:.0%})."
+
+
+def _apart(bias: float) -> str:
+    """In words, how far readings lie from the reference in the mean [m/s]."""
+    return f"{abs(bias):.1f} m/s {'too high' if bias > 0 else 'too low'} in the mean"
+
+
+def _together(beside: Beside) -> str:
+    """In words, how the readings and the reference of their windows rise and fall together."""
+    if beside.logged is None:
+        return ""
+    both = np.isfinite(beside.wind) & np.isfinite(beside.logged)
+    if both.sum() < 3 or not np.ptp(beside.wind[both]) or not np.ptp(beside.logged[both]):
+        return ""
+    return f", their correlation {np.corrcoef(beside.wind[both], beside.logged[both])[0, 1]:.2f}"
 
 
 def read(path: Path, recording: Artifact) -> Series:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.commands.durations import DURATION
+from flagdata.commands.ranges import RANGE
 from flagdata.console import document, json_option, progress, say
 from flagdata.errors import ConflictError, RefusedError, UsageError
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 @click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
 @click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0; "
               "of a hanging cloth its width and height.")  # fmt: skip
+@click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
+              help="Range in which the area weight is known to lie [kg/m²], as in 0.12:0.15.")  # fmt: skip
 @click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
               help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
 @click.option("--crop", metavar="X,Y,W,H", help="Region of the flag [px]; by default the largest centred square.")
@@ -65,6 +68,7 @@ def measure(
     source: str | None,
     query: str | None,
     flag_size: str | None,
+    area_weight: tuple[float, float] | None,
     step: float | None,
     crop: str | None,
     first: float | None,
@@ -119,7 +123,7 @@ def measure(
     reading = Reading(crop=box, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
         size=None if flag_size is None else parse_size(flag_size), step=step, first=first, last=last, level=level,
-        false_alarm=false_alarm, seed=seed, refine=refine,
+        false_alarm=false_alarm, seed=seed, refine=refine, area_weight=area_weight,
     )  # fmt: skip
     lake = None if lake_path is None else Lake.open(lake_path)
     seen = at if at is not None else branch

@@ -180,7 +180,7 @@ def main(name: str, lake_path: Path, at: str | None, side: str, out: Path) -> No
 
     model = load(out / name)
     recipe: Any = model.card["recipe"]
-    spec = DataSpec(dataset=recipe["data"]["dataset"])
+    spec = DataSpec.of_identity(recipe["data"])
     split = ExplicitSplit(where={part: spec.where(part) for part in {"train", side}})
     pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=split)
     with progress(len(set(pairs.table.seed.tolist())), label="windows", unit="film") as advance:

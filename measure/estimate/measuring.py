@@ -22,9 +22,12 @@ from measure.estimate.similarity import POWERS, TRAINED, FlagSize, Sizes, scaled
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
 from models.estimator import Estimator
 from models.learner import Loss
+from models.restriction import MORE, Known, restricted
 
 DRAWS = 400
 """Of each window's posterior, for each size of flag."""
+CONTRADICTION = 0.002
+"""Share of the model's draws within the area weight that was stated, below which a warning is due: of 400 not one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +42,7 @@ class Options:
         false_alarm: rate of the gate.
         seed: of all draws.
         refine: simulated clips of a refinement; None for none.
+        area_weight: range in which the cloth's area weight is known to lie [kg/m²]; None if nothing is known of it.
 
     Raises:
         UsageError: a refinement of a flag whose size is not known.
@@ -52,6 +56,7 @@ class Options:
     false_alarm: float = 0.05
     seed: int = 0
     refine: int | None = None
+    area_weight: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.refine is not None and self.size is None:
@@ -65,8 +70,27 @@ class Options:
         return {
             "flag_size": None if self.size is None else [self.size.length, self.size.height], "step": self.step,
             "first": self.first, "last": self.last, "level": self.level, "false_alarm": self.false_alarm,
-            "refine": self.refine,
+            "refine": self.refine, "area_weight": None if self.area_weight is None else list(self.area_weight),
         }  # fmt: skip
+
+    def known(self, sizes: Sizes, model: Estimator) -> Known | None:
+        """What is known of the cloth, at each size considered, as that of a flag of the model's own size."""
+        if self.area_weight is None:
+            return None
+        target = next((target for target in model.targets if target.name == "density"), None)
+        if target is None:
+            raise UsageError(
+                f"the model {model.name!r} tells no area weight", where="--area-weight", fix="leave it out"
+            )
+        least, most = target.low * float(sizes.scale.max()), target.high * float(sizes.scale.min())
+        if not least * (1 - 1e-9) <= self.area_weight[0] < self.area_weight[1] <= most * (1 + 1e-9):
+            raise UsageError(
+                f"an area weight of {self.area_weight[0]:g} to {self.area_weight[1]:g} kg/m²; of a flag of this size "
+                f"the model knows {least:.3g} to {most:.3g}",
+                where="--area-weight", fix="give a range within that" + ("" if sizes.given else ", and --flag-size"),
+            )  # fmt: skip
+        low, high = (np.full(len(sizes.scale), end) / sizes.scale ** POWERS["density"] for end in self.area_weight)
+        return Known(name="density", low=low, high=high)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,12 +183,14 @@ class Measurement:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Seen:
-    """A window as the model sees it: logits (i, n, target), its first network's summaries (i, dimension), reasons."""
+    """A window as the model sees it: logits (i, n, target), its first network's summaries (i, dimension), reasons, and
+    the share of the model's draws that lay where the area weight is known to lie (1 if nothing is known)."""
 
     start: float
     logits: NDArray[np.float64]
     summaries: NDArray[np.float32]
     reasons: tuple[list[Reason], ...]
+    within: float
 
 
 def measure(
@@ -191,6 +217,7 @@ def measure(
         options.size, rate=film.rate, frames_rate=model.front_end.rate, draws=DRAWS,
         generator=stream(options.seed, "sizes"), trained=TRAINED[model.cloth],
     )  # fmt: skip
+    known = options.known(considered, model)
     layout = lay_out(
         frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
         last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
@@ -202,7 +229,7 @@ def measure(
     for window in cut(film.frames(layout.first - margin, layout.last + margin), layout):
         if clip is None:
             clip = window.clips[len(window.clips) // 2]
-        seen.append(_look(window, model, gate, seed=options.seed))
+        seen.append(_look(window, model, gate, seed=options.seed, known=known))
         worst, repeats = max(worst, window.worst), repeats + window.repeats
         if advance is not None:
             advance(layout.count, 1)
@@ -230,12 +257,19 @@ def measure(
 
 
 @torch.no_grad()
-def _look(window: Window, model: Estimator, gate: Gate, *, seed: int) -> _Seen:
+def _look(window: Window, model: Estimator, gate: Gate, *, seed: int, known: Known | None) -> _Seen:
     embeddings = model.embeddings(model.inputs(window.clips))
-    logits = model.logits(embeddings, seed=child_seed(seed, "window", window.index), draws=DRAWS)[:, :DRAWS]
+    own, within = child_seed(seed, "window", window.index), 1.0
+    if known is None:
+        logits = model.logits(embeddings, seed=own, draws=DRAWS)[:, :DRAWS]
+    else:
+        logits, shares = model.logits_within(embeddings, known, seed=own, draws=DRAWS)
+        within = float(shares.mean())
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
     reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
-    return _Seen(start=window.start, logits=logits.double().cpu().numpy(), summaries=summaries, reasons=reasons)
+    return _Seen(
+        start=window.start, logits=logits.double().cpu().numpy(), summaries=summaries, reasons=reasons, within=within
+    )
 
 
 def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
@@ -256,6 +290,16 @@ def _about_windows(
     seen: Sequence[_Seen], judged: Verdict, used: Sequence[int], dependence: Dependence
 ) -> list[Finding]:
     found = []
+    within = float(np.median([one.within for one in seen]))
+    if within < CONTRADICTION:
+        found.append(
+            Finding(
+                kind="area-weight-contradicted", severity=Severity.WARNING, value=within,
+                what=f"the model gave the area weight that was stated a probability of {within:.2g} only: either it is "
+                "wrong, or the flag's size is, or the model errs on this film",
+                fix="check --area-weight and --flag-size",
+            )
+        )  # fmt: skip
     strange = int(judged.strange.sum())
     if strange and not judged.refused:
         found.append(
@@ -291,21 +335,25 @@ class _Answer:
 
     def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> NDArray[np.float64]:
         """(n, target) draws of all windows together."""
-        learner = self.model.learners[0]
         own = [place for place, name in enumerate(self.names) if name in OWN]
         cloth = [place for place, name in enumerate(self.names) if name not in OWN]
         parts = []
         for stratum in range(len(self.sizes.scale)):
+            prior = self.prior_logits[stratum]
             winds, shared = combined(
-                np.stack([one.logits[stratum] for one in seen]), names=self.names,
-                centre=learner.centre.double().cpu().numpy(), spread=learner.spread.double().cpu().numpy(),
-                dependence=dependence, generator=stream(self.options.seed, "combine", stratum),
+                np.stack([one.logits[stratum] for one in seen]), names=self.names, centre=prior.mean(axis=0),
+                spread=prior.std(axis=0), dependence=dependence,
+                generator=stream(self.options.seed, "combine", stratum),
             )  # fmt: skip
             logits = np.empty((*winds.shape[:2], len(self.names)))
             logits[..., own] = winds
             logits[..., cloth] = shared
             parts.append(scaled_back(self._values(logits).mean(axis=0), self.names, self.sizes.draws[stratum]))
-        return np.concatenate(parts)
+        draws = np.concatenate(parts)
+        if self.options.area_weight is not None:  # combining windows moves draws a little, some out of the range
+            column = self.names.index("density")
+            draws[:, column] = np.clip(draws[:, column], *self.options.area_weight)
+        return draws
 
     def window(self, one: _Seen, layout: Layout, p: float) -> WindowAnswer:
         parts = [
@@ -321,13 +369,24 @@ class _Answer:
 
     @cached_property
     def prior(self) -> NDArray[np.float64]:
-        """(n, target) draws of what the model assumes of a flag of these sizes."""
-        learner = self.model.learners[0]
-        s = self.sizes.draws.ravel()
+        """(n, target) draws of what is assumed of a flag of these sizes."""
+        logits = self.prior_logits
+        return scaled_back(
+            self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel()
+        )  # fmt: skip
+
+    @cached_property
+    def prior_logits(self) -> NDArray[np.float64]:
+        """(i, n, target) draws of the same as the model knows them, for each size of flag."""
+        learner, shape = self.model.learners[0], self.sizes.draws.shape
+        known = self.options.known(self.sizes, self.model)
+        more = 1 if known is None else MORE
         generator = stream(self.options.seed, "prior")
-        normal = generator.standard_normal((len(s), len(self.names)))
+        normal = generator.standard_normal((shape[0], shape[1] * more, len(self.names)))
         logits = learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
-        return scaled_back(self._values(logits), self.names, s)
+        if known is None:
+            return logits
+        return restricted(torch.from_numpy(logits), learner.scaling, known, draws=shape[1])[0].numpy()
 
     @cached_property
     def assumed(self) -> NDArray[np.float64]:
@@ -336,7 +395,10 @@ class _Answer:
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
         low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
         even = np.array([name in POWERS for name in self.names])[:, None]
-        return np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
+        found = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
+        if self.options.area_weight is not None:
+            found[self.names.index("density")] = self.options.area_weight
+        return found
 
     def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()

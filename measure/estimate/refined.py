@@ -42,8 +42,13 @@ def refined(
         )  # fmt: skip
     clip = Clip(name=measured.film, frames=measured.clip, recording=None if cropped else subject.artifact)
     options = measured.options
-    found = run([clip], model, budget=budget, seed=options.seed, level=options.level, cache=cache)
-    return scaled(found, float(measured.sizes.scale[0]))
+    s = float(measured.sizes.scale[0])
+    known = options.area_weight
+    found = run(
+        [clip], model, budget=budget, seed=options.seed, level=options.level, cache=cache,
+        area_weight=None if known is None else (known[0] / s, known[1] / s),
+    )  # fmt: skip
+    return scaled(found, s)
 
 
 def scaled(found: Refinement, s: float) -> Refinement:

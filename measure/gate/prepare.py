@@ -7,7 +7,9 @@ validation-side films alone, one of each simulation, decide where the gate refus
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -21,6 +23,7 @@ from measure.gate.distortions import DISTORTIONS, Film
 from measure.gate.features import Features, features_of
 from measure.gate.gate import Gate
 from models.estimator import SHIPPED, Estimator, load
+from models.training.recipe import DataSpec
 
 PLAIN, DISTORTED = 360, 30
 """Training-side films that are taken as they are, and others of which every distortion is made."""
@@ -79,29 +82,37 @@ def calibrated(
 
 
 class FilmsOf(Sequence[Film]):
-    """One film of each simulation of one side of a data set, read when asked for.
+    """One film of each simulation of one side of data sets, in a random order that is always the same, read when asked
+    for.
 
     Args:
         lake_path: of the lake.
-        dataset, side: name of the data set, and "train", "validation" or "test".
+        data: the data sets.
+        side: "train", "validation" or "test".
         at: ref of the lake; None for its head.
+
+    Raises:
+        InputError: there are none.
     """
 
-    def __init__(self, lake_path: Path, dataset: str, side: str, *, at: str | None = None) -> None:
+    def __init__(self, lake_path: Path, data: DataSpec, side: str, *, at: str | None = None) -> None:
         import flagdata
 
         self._lake = flagdata.open(lake_path).lake
         rows = self._lake.rows(
-            f"kind = 'recording' and name like '{dataset}-{side}-%'", columns=["name", "seed", "object"], at=at
+            f"kind = 'recording' and {data.where(side)}", columns=["name", "seed", "object"], at=at
         ).to_pylist()
         if not rows:
             raise InputError(
-                f"no films {dataset}-{side}-…", where=str(lake_path), fix=f"build them: flagdata build {dataset}"
-            )
+                f"no films of the {side} side of {', '.join(data.datasets)}", where=str(lake_path),
+                fix=f"build them: flagdata build {data.datasets[0]}",
+            )  # fmt: skip
         firsts: dict[int, tuple[str, str]] = {}
         for row in sorted(rows, key=lambda row: row["name"]):
             firsts.setdefault(row["seed"], (row["name"], row["object"]))
-        self.names, self._objects = zip(*firsts.values(), strict=True)
+        found = list(firsts.values())
+        order = stream(0, "films", side).permutation(len(found)).tolist()
+        self.names, self._objects = zip(*(found[place] for place in order), strict=True)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -113,20 +124,28 @@ class FilmsOf(Sequence[Film]):
         return record.frames(0, record.frame_count)
 
 
+def data_of(model: Estimator) -> DataSpec:
+    """The data sets that a model was trained on, all of their simulations."""
+    recipe: Any = model.card["recipe"]
+    return replace(DataSpec.of_identity(recipe["data"]), sequences=None)
+
+
 @click.command()
 @click.argument("model", type=click.Path(path_type=Path), default=SHIPPED / "wave")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
               help="Where the films are that the model was trained on and validated by.")  # fmt: skip
-@click.option("--dataset", default="flagsim-wide", show_default=True, help="Name of the films' data set.")
+@click.option("--dataset", "datasets", multiple=True,
+              help="Name of the films' data set; by default all that it was trained on.")  # fmt: skip
 @click.option("--at", metavar="REF", help="Version of the lake; by default its head.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Random seed of the distortions.")
-def main(model: Path, lake_path: Path, dataset: str, at: str | None, seed: int) -> None:
+def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None, seed: int) -> None:
     """Calibrate the gate of the model in the folder MODEL and store it there."""
     from measure.gate.storage import write
 
     torch.set_num_threads(1)
     loaded = load(model)
-    training, validation = (FilmsOf(lake_path, dataset, side, at=at) for side in ("train", "validation"))
+    data = DataSpec(datasets=datasets) if datasets else data_of(loaded)
+    training, validation = (FilmsOf(lake_path, data, side, at=at) for side in ("train", "validation"))
     with progress(len(validation) + PLAIN + DISTORTED * len(DISTORTIONS), label="measure", unit="clip") as advance:
         gate = calibrated(loaded, training, validation, seed=seed, advance=advance)
     say(f"{len(gate.calibration)} calibration clips; stored in {write(model, gate, loaded)}")

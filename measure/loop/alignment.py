@@ -29,6 +29,7 @@ def aligned(experiment: Experiment) -> Experiment:
     recordings = tuple(
         replace(
             recording, positions=(recording.positions - base) @ turn.T,
+            attachments=None if recording.attachments is None else (recording.attachments - base) @ turn.T,
             wind=replace(recording.wind, velocity=recording.wind.velocity @ turn.T),
         )
         for recording, turn in zip(experiment.recordings, turns, strict=True)

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
 from measure.loop import bank as banks
 from measure.loop import supply
@@ -105,11 +105,17 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
         stage: told of progress.
 
     Raises:
-        InputError: recordings that cannot be used: see `measure.observe.checks` for what is looked at before.
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose
+            attachments move.
     """
     began = time.perf_counter()
     torch.set_num_threads(1)
     tell = stage or (lambda what, done, total: None)
+    if experiment.carried:
+        raise InputError(
+            "a verdict on a cloth whose attachments move: null experiments of such cloths are not simulated",
+            where="close-loop", fix="hold the cloth still, or compare forecasts (measure.loop.forecast) yourself",
+        )  # fmt: skip
     setting = Setting.of(experiment)
     tell("sensitivities", 0, 1)
     found, projection = _looked_at(setting)

@@ -33,6 +33,7 @@ from measure.loop.columns import (
 )
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from sim.anchors import AnchorTracks
 from sim.handles import Handles
 from sim.integrate.joint_batch import JointBatch
 from sim.integrate.split import SplitEuler
@@ -108,6 +109,7 @@ class Segment:
         noise: of a coordinate [m].
         anchors: (held, 3) where its cloth is tied [m]; None where the specimen says it.
         seen: (frame, marker) whether each position was tracked; None where all were.
+        attachments: (frame, held, 3) where its cloth is held, if that moves [m].
     """
 
     recording: int
@@ -117,6 +119,7 @@ class Segment:
     noise: float
     anchors: Floats | None = None
     seen: NDArray[np.bool_] | None = None
+    attachments: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,6 +162,7 @@ class Segments:
                 )  # fmt: skip
             frames = recording.positions[:: cut.stride]
             seen = None if recording.seen is None else recording.seen[:: cut.stride]
+            held = None if recording.attachments is None else recording.attachments[:: cut.stride]
             if not cut.enough:
                 needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
@@ -172,6 +176,8 @@ class Segments:
                         recording=index, start=begin * period, wind=recording.wind, noise=recording.noise,
                         positions=frames[begin : begin + span],
                         seen=None if seen is None else seen[begin : begin + span],
+                        attachments=None if held is None else held[begin : begin + span],
+                        anchors=None if held is None else held[begin],
                     )
                 )  # fmt: skip
         return cls(items=tuple(items), markers=first.markers, cut=cut)
@@ -316,7 +322,15 @@ class Forecaster:
         ]  # fmt: skip
         system, state = assemble(scenes, dtype=self.dtype, device=self.device)
         wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
-        return replace(system, wind=wind), state
+        return replace(system, wind=wind, motion=self._motion(segments)), state
+
+    def _motion(self, segments: Segments) -> AnchorTracks | None:
+        """Of the attachments of every segment, from where they are in its first frame; None where they stand still."""
+        tracks = [item.attachments for item in segments.items if item.attachments is not None]
+        if not tracks:
+            return None
+        moved = np.stack([own - own[0] for own in tracks], axis=-1)
+        return AnchorTracks(start=0.0, period=segments.period, samples=self._real(moved))
 
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
         """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -15,6 +16,7 @@ from measure.observe.anchors import anchors_of
 from measure.observe.checks import attachment, frames, inertia, shape, surroundings
 from measure.observe.common import at_same_points, at_same_rate
 from measure.observe.gaps import fill_positions
+from measure.observe.interpolation import onto
 from measure.observe.observation import Known, Observation
 from measure.observe.pins import hold
 from measure.observe.setup import Hold, Setup
@@ -50,10 +52,14 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     recordings, moved = at_same_points(at_rate, mesh.rest)
     known = [seen.known for seen in prepared]
     mesh, held = hold(mesh, _pins(known, setup, low))
+    seats = mesh.rest[list(held)]
+    if setup.carried:
+        recordings = tuple(
+            replace(r, attachments=np.einsum("sm,fmi->fsi", onto(r.markers, seats), r.positions)) for r in recordings
+        )
     specimen = Specimen(
         mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known, held=held,
-        anchors=anchors_of(recordings, mesh.rest[list(held)]), anchors_told=False,
-        stiffness=_agreed([k.stiffness for k in known], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins"),
+        anchors=anchors_of(recordings, seats), anchors_told=False, stiffness=_stiffness(known, setup),
         gravity=(
             _agreed([k.gravity for k in known], None, GRAVITY, "gravity")
             if setup.gravity is None else (0.0, 0.0, -setup.gravity)
@@ -117,7 +123,8 @@ def _noise(seen: Observation) -> float:
 
 
 def _checked(experiment: Experiment) -> tuple[Finding, ...]:
-    """Of the cloth on its pins, in its wind.
+    """Of the cloth on its pins, in its wind. Whether pins stand still, and whether the motion about them is that of
+    the wind's moment, is not asked where they are carried.
 
     Raises:
         InputError: pins, wind, axes or rate that cannot be those of the recording.
@@ -126,17 +133,26 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
     found: list[Finding] = []
     for recording in experiment.recordings:
         surroundings.check_overlap(recording)
-        found += attachment.check_pins(recording, specimen)
-        found += attachment.beside_pins(recording, specimen)
+        if not experiment.carried:
+            found += attachment.check_pins(recording, specimen)
+            found += attachment.beside_pins(recording, specimen)
         surroundings.check_up(recording, specimen)
         found += surroundings.check_direction(recording, specimen)
         found += surroundings.check_sides(recording)
         surroundings.check_accelerations(recording, specimen)
         found += surroundings.check_strength(recording, specimen)
-        if specimen.mass_known:
+        if specimen.mass_known and not experiment.carried:
             found += inertia.check_inertia(recording, specimen)
-    attachment.check_places(experiment.recordings, specimen)
+    if not experiment.carried:
+        attachment.check_places(experiment.recordings, specimen)
     return tuple(found)
+
+
+def _stiffness(known: Sequence[Known], setup: Setup) -> float:
+    """Of the pins [N/m]; those that are carried hold rigidly."""
+    if setup.carried:
+        return math.inf
+    return _agreed([k.stiffness for k in known], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins")
 
 
 def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats, tuple[Finding, ...]]:

@@ -183,7 +183,7 @@ def _setup(top: Table, folder: Path) -> Setup:
         corners = outline(shape.rest, shape.faces, where=str(folder / mesh))
     vertices = flat.whole("vertices", VERTICES, least=16)
     flat.done()
-    pins, stiffness = _pins(top.table("pins"))
+    pins, stiffness, carried = _pins(top.table("pins"))
     stuff = top.table("material")
     mass_known = not stuff.flag("mass-unknown")
     air = top.table("air")
@@ -196,12 +196,13 @@ def _setup(top: Table, folder: Path) -> Setup:
         )
     air.done()
     return Setup(
-        material=_material(stuff, folder), mass_known=mass_known, outline=corners, pins=pins, stiffness=stiffness,
-        gravity=gravity, air=force, vertices=vertices,
+        material=_material(stuff, folder), mass_known=mass_known, outline=corners, pins=pins, carried=carried,
+        stiffness=stiffness, gravity=gravity, air=force, vertices=vertices,
     )  # fmt: skip
 
 
-def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, float | None]:
+def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, float | None, bool]:
+    """Where they are, their stiffness, and whether they move."""
     points = tuple((u, v) for u, v in table.points("points"))
     at = table.choice("at", Hold.HOIST_CORNERS) if "at" in table else None
     if points and at is not None:
@@ -210,8 +211,11 @@ def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, 
     stiffness = table.number("stiffness", 0.0, above=0.0) if "stiffness" in table else None
     if rigid and stiffness is not None:
         raise UsageError("both rigid and a stiffness are given", where=table.where, fix="keep one of them")
+    carried = table.flag("carried")
+    if carried and stiffness is not None:
+        raise UsageError("pins that are carried hold rigidly", where=table.where, fix="leave the stiffness out")
     table.done()
-    return at or points or None, math.inf if rigid else stiffness
+    return at or points or None, math.inf if rigid else stiffness, carried
 
 
 def _material(table: Table, folder: Path) -> Material | None:

@@ -36,6 +36,8 @@ class Setup:
             is found is a ratio to it.
         outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
         pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
+        carried: whether the attachments move: the cloth is held by hands or by a robot. They then go where the markers
+            at the pins go, or where the nearest markers say that the pins are, and hold rigidly.
         stiffness: of each attachment on each axis [N/m]; infinite for rigid.
         gravity: magnitude [m/s²]; it acts along −z.
         air: the base model's force.
@@ -49,6 +51,7 @@ class Setup:
     mass_known: bool = True
     outline: NDArray[np.float64] | None = None
     pins: Hold | tuple[tuple[float, float], ...] | None = None
+    carried: bool = False
     stiffness: float | None = None
     gravity: float | None = None
     air: AirForce | None = None
@@ -63,6 +66,8 @@ class Setup:
             raise self._wrong(f"pins {self.pins!r}", "give a name, or finite (u, v) in metres")
         if self.stiffness is not None and not self.stiffness > 0:
             raise self._wrong(f"a stiffness of {self.stiffness!r}", "give N/m, or infinity for rigid pins")
+        if self.carried and self.stiffness not in (None, math.inf):
+            raise self._wrong("a stiffness of pins that are carried", "leave it out: they hold rigidly")
         if self.gravity is not None and not (math.isfinite(self.gravity) and self.gravity >= 0):
             raise self._wrong(f"a gravity of {self.gravity!r}", "give m/s², downward")
         if self.vertices < 16:

@@ -108,6 +108,7 @@ class Trajectory:
         source: identity of the artifact it was read from; empty where there is none.
         seen: (frame, marker) whether each position was tracked, where gaps are filled; None where all were. What is
             filled starts a prediction, and is never compared with one.
+        attachments: (frame, held, 3) where the cloth is held, if that moves [m]; None where it is held still.
 
     Raises:
         InputError: shapes that disagree, a rate or noise that makes no sense, infinite positions.
@@ -121,6 +122,7 @@ class Trajectory:
     noise: float = 0.0
     source: str = ""
     seen: NDArray[np.bool_] | None = None
+    attachments: Floats | None = None
 
     def __post_init__(self) -> None:
         markers, positions = _frozen(self.markers), _frozen(self.positions)
@@ -141,6 +143,14 @@ class Trajectory:
                 f"a mask of shape {self.seen.shape} with positions of shape {positions.shape}", where=where,
                 fix="give (frame, marker)",
             )  # fmt: skip
+        if self.attachments is not None:
+            held = _frozen(self.attachments)
+            if held.ndim != 3 or held.shape[::2] != (len(positions), 3) or not np.isfinite(held).all():
+                raise InputError(
+                    f"attachments of shape {held.shape}, or not finite, with positions of shape {positions.shape}",
+                    where=where, fix="give (frame, held, 3), in metres, without gaps",
+                )  # fmt: skip
+            object.__setattr__(self, "attachments", held)
         object.__setattr__(self, "markers", markers)
         object.__setattr__(self, "positions", positions)
 
@@ -194,11 +204,16 @@ class Experiment:
     """One cloth in one or more recordings.
 
     Raises:
-        InputError: no recording, two of one name, or markers beyond the cloth.
+        InputError: no recording, two of one name, attachments that are not the cloth's, or markers beyond the cloth.
     """
 
     specimen: Specimen
     recordings: tuple[Trajectory, ...]
+
+    @property
+    def carried(self) -> bool:
+        """Whether the attachments move."""
+        return any(recording.attachments is not None for recording in self.recordings)
 
     def __post_init__(self) -> None:
         names = [r.name for r in self.recordings]
@@ -206,6 +221,12 @@ class Experiment:
             raise InputError(f"recordings {names!r}", where="experiment", fix="give one or more, each its own name")
         rest = self.specimen.mesh.rest
         slack = 1e-3 * float(np.ptp(rest, axis=0).max())
+        held = {None if r.attachments is None else r.attachments.shape[1] for r in self.recordings}
+        if held not in ({None}, {len(self.specimen.held)}):
+            raise InputError(
+                "recordings with and without attachments that move, or with others than the cloth's",
+                where="experiment", fix="give the tracks of all attachments in all recordings, or none",
+            )  # fmt: skip
         for recording in self.recordings:
             beyond = (recording.markers < rest.min(axis=0) - slack) | (recording.markers > rest.max(axis=0) + slack)
             if beyond.any():

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.console import progress
+from flagdata.errors import InputError
 from flagdata.lake import Artifact
+from flagdata.tables import Range
 from measure.refine.procedure import Settings, refine
 from measure.refine.refinement import Refinement
 from measure.refine.space import Space
@@ -20,9 +22,10 @@ from models.estimator import Estimator
 from sim.assets import Assets
 from sim.render.prior import named
 from sim.run import load
+from sim.run.recipe import Recipe
 
-SCENE = "flag-wide"
-"""Recipe whose ranges are the prior: that of the data set on which models are trained."""
+SCENES = {"density": "flag-wide", "fabric_density": "flag-fabrics"}
+"""Recipes whose ranges are the prior, by the area weight that a model tells: those of the data it was trained on."""
 RENDERS = "flags"
 """Prior of ζ, where a target's own is not known."""
 
@@ -43,9 +46,25 @@ class Clip:
     recording: Artifact | None = None
 
 
+def scene_of(estimator: Estimator) -> Recipe:
+    """The recipe whose ranges are the prior of what a model tells.
+
+    Raises:
+        InputError: a model of another kind of cloth.
+    """
+    names = estimator.learners[0].scaling.names
+    found = [scene for target, scene in SCENES.items() if target in names]
+    if not found:
+        raise InputError(
+            f"the model tells {', '.join(names) or 'nothing'}, and no area weight of a flag",
+            where=f"model {estimator.name!r}", fix="take the model of flags that comes with the package",
+        )  # fmt: skip
+    return load(found[0])
+
+
 def run(
     clips: Sequence[Clip], estimator: Estimator, *, budget: int, seed: int, level: float, cache: Path | None = None,
-    view: View | None = None,
+    view: View | None = None, area_weight: tuple[float, float] | None = None,
 ) -> Refinement:  # fmt: skip
     """Refine clips of one flag, with a progress bar.
 
@@ -54,11 +73,15 @@ def run(
         cache: folder for evaluations, so that an interrupted run goes on.
         view: how all were filmed, where that is known; None takes what their recordings state, and otherwise draws ζ
             anew for each simulated clip.
+        area_weight: range in which it is known to lie, of a flag of 1.5 m [kg/m²]; None for the scene's.
 
     Raises:
         InputError: see `measure.refine.procedure.refine`.
     """
-    recipe = load(SCENE)
+    recipe = scene_of(estimator)
+    if area_weight is not None:
+        density = Range(low=area_weight[0], high=area_weight[1])
+        recipe = replace(recipe, material=replace(recipe.material, density=density))
     space = Space.of(recipe)
     otherwise = view or DrawnView(prior=named(RENDERS), assets=Assets())
     targets = [

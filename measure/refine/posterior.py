@@ -25,10 +25,10 @@ from measure.refine.start import TOLD, logits
 CLOTHS, WINDS, DRAWS = 2000, 121, 4000
 
 
-def regressors(reported: NDArray[np.float64]) -> NDArray[np.float64]:
+def regressors(reported: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
     """What the metamodel is linear in, of reported quantities (n, 5):
     logits, nonlinearity, and the wind's logit squared: (n, 6)."""
-    told = logits(reported[:, : len(TOLD)])
+    told = logits(reported[:, : len(TOLD)], space)
     return np.concatenate([told, reported[:, len(TOLD) :], np.square(told[:, :1])], axis=1)
 
 
@@ -68,7 +68,7 @@ def posterior(
     step = (high - low) / winds
     grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
     own = space.reported(prior)
-    found = np.stack([_likelihood(model, own, grid, y) for model, y in zip(models, observed, strict=True)])
+    found = np.stack([_likelihood(model, own, grid, y, space) for model, y in zip(models, observed, strict=True)])
     marginal = logsumexp(found, axis=2).sum(axis=0)
     weight = np.exp(marginal - logsumexp(marginal))
     rng = stream(seed, "posterior", "draws")
@@ -88,12 +88,16 @@ def posterior(
 
 
 def _likelihood(
-    model: Metamodel, own: NDArray[np.float64], grid: NDArray[np.floating], observed: NDArray[np.float64]
+    model: Metamodel,
+    own: NDArray[np.float64],
+    grid: NDArray[np.floating],
+    observed: NDArray[np.float64],
+    space: Space,
 ) -> NDArray[np.float64]:
     """(cloth, wind) logarithm of the density of what was observed."""
     rows = np.repeat(own, len(grid), axis=0)
     rows[:, 0] = np.tile(grid, len(own))
-    return model.log_density(regressors(rows), observed).reshape(len(own), len(grid))
+    return model.log_density(regressors(rows, space), observed).reshape(len(own), len(grid))
 
 
 def bending_table(space: Space, found: Posterior, level: float) -> NDArray[np.float64]:

@@ -148,7 +148,9 @@ class _Run:
         embedded = [e.embed(t.clip[None])[0] for e, t in zip(self.evaluators, self.targets, strict=True)]
         observed = [start.summaries(self.estimator, row[None])[0] for row in embedded]
         told = [
-            start.amortised(self.estimator, target.clip, seed=child_seed(self.settings.seed, "amortised"), draws=400)
+            start.amortised(
+                self.estimator, target.clip, self.space, seed=child_seed(self.settings.seed, "amortised"), draws=400
+            )
             for target in self.targets
         ]
         points: list[NDArray[np.float64]] = []  # (clip, θ, 17) of each round
@@ -198,7 +200,7 @@ class _Run:
         """(clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
         count = self.settings.fewest // self.settings.replicates
         rng = stream(self.settings.seed, OWN, "first")
-        wide = [start.widened(draws, self.settings.widening) for draws in told]
+        wide = [start.widened(draws, self.settings.widening, self.space) for draws in told]
         chosen = np.stack([draws[rng.choice(len(draws), count, replace=False)] for draws in wide])
         turn = np.arange(count) % len(told)
         shared = chosen[turn, np.arange(count)]
@@ -232,7 +234,7 @@ class _Run:
             place = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
             there = np.isfinite(rows).all(axis=1)
             told = start.summaries(self.estimator, rows[there])
-            known = regressors(self.space.reported(points[clip]))[place[there]]
+            known = regressors(self.space.reported(points[clip]), self.space)[place[there]]
             models.append(Metamodel.fit(known, told, place[there]))
         return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))
 

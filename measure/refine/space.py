@@ -57,6 +57,8 @@ QUANTITIES = (
 )  # fmt: skip
 """What a refinement reports; the first two have the paper's ranges."""
 _ROWS, _COLUMNS = BENDING_SHAPE
+_REACH = 6.5
+_SHARES = (np.arange(10_000) + 0.5) / 10_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,6 +68,7 @@ class Space:
     Attributes:
         material: whose bending coefficients are multiplied.
         factor: of each bending coefficient; the scale is the prior's, coordinates are logarithmic.
+        common: of all bending coefficients together, likewise; None where there is none.
         density: [kg/m²].
         wind: [m/s].
     """
@@ -74,6 +77,7 @@ class Space:
     factor: Range
     density: Range
     wind: Range
+    common: Range | None = None
 
     @classmethod
     def of(cls, recipe: Recipe) -> Space:
@@ -84,23 +88,49 @@ class Space:
         """
         spec, speed = recipe.material, recipe.wind.speed
         factor, density, wind = spec.bending_each, spec.density, speed
+        common = spec.bending if isinstance(spec.bending, Range) else None
         alone = len(spec.bases) == 1 and not recipe.effects and recipe.scene.shape is Shape.FLAG
         if not (
             isinstance(factor, Range) and isinstance(density, Range) and isinstance(wind, Range)
-            and alone and spec.bending == 1.0 and factor.low > 0
+            and alone and ((common is not None and common.low > 0) or spec.bending == 1.0) and factor.low > 0
         ):  # fmt: skip
             raise InputError(
                 "the scene is not a flag of one material with ranges of bending factors (above 0), density and wind",
                 where=f"recipe {recipe.name!r}", fix='take "flag-wide", or a recipe of the same form',
             )  # fmt: skip
-        return cls(material=spec.bases[0], factor=factor, density=density, wind=wind)
+        return cls(material=spec.bases[0], factor=factor, density=density, wind=wind, common=common)
 
     @property
     def ranges(self) -> tuple[Range, ...]:
         """Of each of the 17 parameters, in SI."""
         table = self.material.bending.ravel().tolist()
-        bending = [Range(low=k * self.factor.low, high=k * self.factor.high, scale=Scale.LOG) for k in table]
+        low, high = self._factors
+        bending = [Range(low=k * low, high=k * high, scale=Scale.LOG) for k in table]
         return (*bending, self.density, self.wind)
+
+    @property
+    def _factors(self) -> tuple[float, float]:
+        """Smallest and largest factor of a bending coefficient."""
+        low, high = self.factor.low, self.factor.high
+        return (low, high) if self.common is None else (low * self.common.low, high * self.common.high)
+
+    @property
+    def told(self) -> tuple[Range, Range, Range, Range]:
+        """Ranges of wind, density, bending scale and anisotropy: of the latter two the prior's mean and `_REACH` of its
+        standard deviations either way, within the box."""
+        table = np.log10(self.material.bending)
+        each = np.log10(_drawn(self.factor, _SHARES))
+        common = np.zeros(1) if self.common is None else np.log10(_drawn(self.common, _SHARES))
+        scale = _REACH * float(np.sqrt(each.var() / BENDING + common.var()))
+        slope = _REACH * float(np.sqrt(2 * each.var() / _COLUMNS))
+        middle, tilt = float(table.mean() + each.mean() + common.mean()), float(table[0].mean() - table[-1].mean())
+        low, high = (float(end) for end in np.log10(self._factors))
+        least, most = float(table.mean()) + low, float(table.mean()) + high
+        slope = min(slope, high - low)
+        return (
+            self.wind, self.density, Range(low=max(middle - scale, least), high=min(middle + scale, most)),
+            Range(low=tilt - slope, high=tilt + slope),
+        )  # fmt: skip
 
     def values(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
         """SI values of points (n, 17) of [−1, 1]¹⁷.
@@ -129,11 +159,12 @@ class Space:
     def prior(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Points (count, 17) of the prior: what the scene's recipe draws."""
         shares = rng.random((count, DIMENSION))
-        if self.factor.scale is Scale.LINEAR:
-            low, high = self.factor.low, self.factor.high
-            drawn = np.log(low + shares[:, :BENDING] * (high - low))
-            shares[:, :BENDING] = (drawn - np.log(low)) / (np.log(high) - np.log(low))
-        return 2 * shares - 1
+        drawn = np.log(_drawn(self.factor, shares[:, :BENDING]))
+        if self.common is not None:
+            drawn += np.log(_drawn(self.common, rng.random((count, 1))))
+        low, high = np.log(self._factors)
+        shares[:, :BENDING] = (drawn - low) / (high - low)
+        return np.clip(2 * shares - 1, -1.0, 1.0)
 
     def reported(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
         """The `QUANTITIES` of points (n, 17): (n, quantity), in their units."""
@@ -154,4 +185,12 @@ class Space:
     def identity(self) -> str:
         """A hash of all of it."""
         ranges = [plain(entry) for entry in (self.factor, self.density, self.wind)]
+        ranges += [] if self.common is None else [plain(self.common)]
         return digest(canonical({"material": self.material.fingerprint, "ranges": ranges}))
+
+
+def _drawn(entry: Range, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of a range at shares of it."""
+    if entry.scale is Scale.LINEAR:
+        return entry.low + shares * (entry.high - entry.low)
+    return np.exp(np.log(entry.low) + shares * (np.log(entry.high) - np.log(entry.low)))

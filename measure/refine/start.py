@@ -17,7 +17,7 @@ from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.refine.space import DENSITY, DIMENSION, WIND, Space
 from models.estimator import Estimator
-from models.targets import TARGETS
+from models.restriction import Known
 
 TOLD = ("wind_speed", "density", "bending_scale", "anisotropy")
 """Targets that a network must tell for a refinement to start from it."""
@@ -61,26 +61,37 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
     return out
 
 
-def amortised(estimator: Estimator, clip: NDArray[np.uint8], *, seed: int, draws: int) -> NDArray[np.float64]:
-    """Draws of `TOLD` for a clip (frame, height, width): (draw, 4), in the targets' units."""
-    found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws)
+def amortised(
+    estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, seed: int, draws: int
+) -> NDArray[np.float64]:  # fmt: skip
+    """Draws of `TOLD` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
+    weights are fewer than the network's, they are what is known of it."""
+    target = next(target for target in estimator.targets if target.name == "density")
+    low, high = max(space.density.low, target.low), min(space.density.high, target.high)
+    known = None
+    if low > target.low or high < target.high:
+        known = Known.everywhere("density", low, high, count=1)
+    found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=known)
     names = [target.name for target in found.targets]
     return found.draws[0][:, [names.index(name) for name in TOLD]].astype(np.float64)
 
 
-def logits(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Logits of the places of values (…, 4) of `TOLD` in their ranges, as networks learn them."""
-    low = np.array([TARGETS[name].low for name in TOLD])
-    high = np.array([TARGETS[name].high for name in TOLD])
+def logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
+    """Logits of the places of values (…, 4) of `TOLD` in the ranges of the space, much as networks learn them."""
+    low, high = _ends(space)
     share = np.clip((values - low) / (high - low), _MARGIN, 1 - _MARGIN)
     return np.log(share / (1 - share))
 
 
-def widened(values: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+def _ends(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(4,) lower and upper ends of `TOLD`."""
+    return np.array([entry.low for entry in space.told]), np.array([entry.high for entry in space.told])
+
+
+def widened(values: NDArray[np.float64], factor: float, space: Space) -> NDArray[np.float64]:
     """Draws (n, 4) of `TOLD` with their logits' deviations from the mean enlarged."""
-    low = np.array([TARGETS[name].low for name in TOLD])
-    high = np.array([TARGETS[name].high for name in TOLD])
-    z = logits(values)
+    low, high = _ends(space)
+    z = logits(values, space)
     z = z.mean(axis=0) + factor * (z - z.mean(axis=0))
     return low + (high - low) / (1 + np.exp(-z))
 
@@ -99,6 +110,6 @@ def completed(space: Space, told: NDArray[np.float64], *, seed: int) -> NDArray[
         place = next(int(n) for n in np.atleast_1d(near) if int(n) not in taken)
         taken.add(place)
         out[i] = pool[place]
-    for column, entry, own in ((DENSITY, space.density, told[:, 1]), (WIND, space.wind, told[:, 0])):
-        out[:, column] = np.clip(2 * (own - entry.low) / (entry.high - entry.low) - 1, -1.0, 1.0)
-    return out
+    values = space.values(out)
+    values[:, DENSITY], values[:, WIND] = told[:, 1], told[:, 0]
+    return space.unit(values)

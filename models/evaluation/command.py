@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flagdata.commands.ranges import RANGE
 from flagdata.console import document, json_option, lake_option, progress, say
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
               help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.")  # fmt: skip
 @click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
 @click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")
+@click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
+              help="Range of all clips' area weight, if it is known [kg/m²]; the paper's is 0.10:0.17.")  # fmt: skip
 @click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of draws and of the bootstrap.")
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
@@ -52,6 +55,7 @@ def evaluate(
     cache: Path | None,
     reference: str | None,
     tsne: str | None,
+    area_weight: tuple[float, float] | None,
     handmade: bool,
     seed: int,
     workers: int | None,
@@ -73,7 +77,7 @@ def evaluate(
 
     source = flagdata.open(lake_path)
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
-    desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed)
+    desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed, area_weight)
     found = desk.evaluation(models, side=side, reference=reference, tsne=tsne, handmade=handmade)
     page, text, data = report.write(found, out, name=name)
     if as_json:
@@ -86,8 +90,12 @@ def evaluate(
 class _Desk:
     """Where models are judged: a data set, and what was prepared of it."""
 
-    def __init__(self, source: Source, dataset: str, at: str | None, cache: Path, workers: int, seed: int) -> None:
+    def __init__(
+        self, source: Source, dataset: str, at: str | None, cache: Path, workers: int, seed: int,
+        area_weight: tuple[float, float] | None,
+    ) -> None:  # fmt: skip
         self._source, self._dataset, self._at = source, dataset, at
+        self._known = None if area_weight is None else ("density", *area_weight)
         self._cache, self._workers, self._seed = cache, workers, seed
         self._pairs: dict[str, Pairs] = {}
         self._prepared: dict[tuple[str, str], Prepared] = {}
@@ -110,7 +118,7 @@ class _Desk:
             told += self._handmade(side)
         return scored(
             told or [predictions for _, predictions in learning],
-            data=f"{self._dataset}, {side} side, at {self._at or 'head'}",
+            data=f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}",
             seed=self._seed, reference=reference, tsne_of=tsne, learning=_points(learning, told, self._all_sequences()),
         )  # fmt: skip
 
@@ -141,7 +149,7 @@ class _Desk:
         from models.training.recipe import DataSpec
 
         if side not in self._pairs:
-            spec = DataSpec(dataset=self._dataset)
+            spec = DataSpec(datasets=(self._dataset,))
             split = ExplicitSplit(where={name: spec.where(name) for name in {"train", side}})
             self._pairs[side] = self._source.pairs(at=self._at, split=side, split_by=split)
         return self._pairs[side]
@@ -166,9 +174,17 @@ class _Desk:
         contrast = estimator.learners[0].objective is Loss.CONTRASTIVE
         return predict(
             estimator, self._clips(side, estimator), label=estimator.name, note=_note(estimator), seed=self._seed,
-            milliseconds=time_a_clip(estimator, self._side(side)),
+            milliseconds=time_a_clip(estimator, self._side(side)), known=self._known,
             fitted_on=self._clips("train", estimator) if contrast else None,
         )  # fmt: skip
+
+    @property
+    def _stated(self) -> str:
+        """What is known of all clips, in words."""
+        if self._known is None:
+            return ""
+        _, low, high = self._known
+        return f", area weight known to lie in {low:g} to {high:g} kg/m² (which only distributions use)"
 
     def _all_sequences(self) -> int:
         return len(set(self._side("train").table.seed.tolist()))

@@ -15,6 +15,7 @@ from flagdata.rng import child_seed
 from models.estimator import Estimator
 from models.evaluation.predictions import Predictions
 from models.learner import Learner, Loss
+from models.restriction import Known
 from models.training.inputs import Prepared
 
 DRAWS = 200
@@ -27,11 +28,12 @@ READ_FROM = ("wind_speed", "density", "bending_scale", "anisotropy")
 
 def predict(
     estimator: Estimator, prepared: Prepared, *, label: str, note: str, milliseconds: float, seed: int,
-    fitted_on: Prepared | None = None,
+    fitted_on: Prepared | None = None, known: tuple[str, float, float] | None = None,
 ) -> Predictions:  # fmt: skip
     """Predictions of a model for prepared clips.
 
     Args:
+        known: name and range of a quantity of all clips that is known; it restricts what has a distribution.
         fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
             regression.
     """
@@ -43,7 +45,7 @@ def predict(
         samples = None
     else:
         targets, names = learner.scaling.quantities, learner.scaling.names
-        samples, mean, embedding = _told(estimator, prepared, seed=seed)
+        samples, mean, embedding = _told(estimator, prepared, seed=seed, known=known)
     return Predictions(
         label=label, targets=targets, truth=prepared.truth(names), mean=mean, samples=samples, embedding=embedding,
         group=prepared.sequence,
@@ -52,13 +54,16 @@ def predict(
     )  # fmt: skip
 
 
-def _told(estimator: Estimator, prepared: Prepared, *, seed: int) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
+def _told(
+    estimator: Estimator, prepared: Prepared, *, seed: int, known: tuple[str, float, float] | None
+) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     learner = estimator.learners[0]
     draws, means, embeddings = [], [], []
     for first in range(0, len(prepared), _TOGETHER):
         inputs = _batch(prepared, first).to(estimator.device)
         if learner.objective is Loss.POSTERIOR:
-            found = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS)
+            within = None if known is None else Known.everywhere(known[0], known[1], known[2], count=len(inputs))
+            found = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=within)
             draws.append(found.draws)
             means.append(found.mean)
             embeddings.append(found.summary)

@@ -1,7 +1,8 @@
 """What is trained on what, as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
 title, seed
-[data]       dataset: a data set's name, whose sides are told by names; sequences: of the training side, all by default
+[data]       dataset: a data set's name, or a list of them, whose sides are told by names; sequences: of the training
+             side, all by default
 [input]      maps: "frames", "spectral-maps" or "wave-maps"; size [px], frames; scales, mirror: of crops;
              variants: crops of each film that are prepared
 [network]    name: of `models.registry.NETWORKS`; its other keys are the network's own
@@ -54,16 +55,27 @@ class Precision(StrEnum):
 @dataclass(frozen=True, kw_only=True)
 class DataSpec:
     """Attributes:
-    dataset: name of the data set; its sides are told by names.
+    datasets: names of the data sets that are learned from together; their sides are told by names.
     sequences: of the training side that are used; None for all.
     """
 
-    dataset: str
+    datasets: tuple[str, ...]
     sequences: int | None = None
+
+    @classmethod
+    def of_identity(cls, entry: Mapping[str, Any]) -> DataSpec:
+        """What `identity` was made of, as a model's card keeps it."""
+        named = entry["dataset"]
+        return cls(datasets=(named,) if isinstance(named, str) else tuple(named), sequences=entry["sequences"])
 
     def where(self, side: str) -> str:
         """SQL over the catalog that takes a side."""
-        return f"name like '{self.dataset}-{side}-%'"
+        return "(" + " or ".join(f"name like '{dataset}-{side}-%'" for dataset in self.datasets) + ")"
+
+    def identity(self) -> dict[str, Any]:
+        """JSON values; one data set is named by itself."""
+        dataset = self.datasets[0] if len(self.datasets) == 1 else list(self.datasets)
+        return {"dataset": dataset, "sequences": self.sequences}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +156,7 @@ class TrainingRecipe:
     def identity(self) -> dict[str, Any]:
         """All that shapes the weights beside the data themselves, as JSON."""
         return {
-            "training": RECIPE_VERSION, "seed": self.seed, "data": asdict(self.data),
+            "training": RECIPE_VERSION, "seed": self.seed, "data": self.data.identity(),
             "front_end": asdict(self.front_end), "cropping": asdict(self.cropping), "variants": self.variants,
             "network": {"name": self.network.name, "options": dict(self.network.options)},
             "loss": asdict(self.loss), "optimiser": asdict(self.optimiser),
@@ -195,12 +207,20 @@ def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> Trainin
 
 
 def _data(table: Table) -> DataSpec:
-    dataset = table.text("dataset", None)
-    if not dataset or not all(part.isalnum() for part in dataset.split("-")):
-        raise InputError(f"the data set is {dataset!r}", where=table.where, fix='name one: dataset = "flagsim-wide"')
-    spec = DataSpec(dataset=dataset, sequences=table.whole("sequences", 1, least=1) if "sequences" in table else None)
+    named = table.value("dataset")
+    datasets = [named] if isinstance(named, str) else named
+    if not isinstance(datasets, list) or not datasets or not all(_is_name(dataset) for dataset in datasets):
+        raise InputError(
+            f"the data set is {named!r}", where=table.where,
+            fix='name one, or several in a list: dataset = "flagsim-wide"',
+        )  # fmt: skip
+    sequences = table.whole("sequences", 1, least=1) if "sequences" in table else None
     table.done()
-    return spec
+    return DataSpec(datasets=tuple(datasets), sequences=sequences)
+
+
+def _is_name(value: object) -> bool:
+    return isinstance(value, str) and all(part.isalnum() for part in value.split("-"))
 
 
 def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:

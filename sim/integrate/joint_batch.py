@@ -15,7 +15,7 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from sim.cloth import Cloth
 from sim.state import State
-from sim.system import System
+from sim.system import AnchorMotion, System
 from sim.wind import Wind
 
 
@@ -28,6 +28,17 @@ class _Winds:
     def velocity(self, time: float) -> Tensor:
         """(3, batch) [m/s] at a time [s]."""
         return torch.cat([part.velocity(time) for part in self.parts], dim=-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Motions:
+    """The anchors of all batches, each moving as its own do."""
+
+    parts: tuple[AnchorMotion, ...]
+
+    def displacement(self, time: float) -> Tensor:
+        """(held, 3, batch) [m] at a time [s]."""
+        return torch.cat([part.displacement(time) for part in self.parts], dim=-1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,7 +67,8 @@ class JointBatch:
         """The base model of all, without ties and loads.
 
         Raises:
-            UsageError: batches that differ in their mesh, handles, air, contact or strain limits.
+            UsageError: batches that differ in their mesh, handles, air, contact or strain limits, or in whether their
+                anchors move.
         """
         parts = [system.alone for system in self.systems]
         first = parts[0]
@@ -68,10 +80,16 @@ class JointBatch:
                     where="joint batch",
                     fix="run them one by one",
                 )
+        motions = [part.motion for part in parts if part.motion is not None]
+        if motions and len(motions) < len(parts):
+            raise UsageError(
+                "batches with anchors that move and anchors that do not", where="joint batch", fix="run them one by one"
+            )
         return replace(
             first, cloth=Cloth.joined([part.cloth for part in parts]), wind=_Winds(parts=tuple(p.wind for p in parts)),
             gravity=torch.cat([part.gravity for part in parts], dim=-1),
             anchors=torch.cat([part.anchors for part in parts], dim=-1),
+            motion=_Motions(parts=tuple(motions)) if motions else None,
         )  # fmt: skip
 
     def parts(self, state: State) -> Iterator[tuple[System, slice, State]]:

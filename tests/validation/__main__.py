@@ -14,6 +14,7 @@ VALIDATIONS = {
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
+    "foreign": "tests.validation.foreign",
     "gate": "tests.validation.gate",
     "hanging-cloth": "tests.validation.hanging_cloth",
     "measure-windows": "tests.validation.measure_windows",
@@ -22,6 +23,7 @@ VALIDATIONS = {
     "real-flag": "tests.validation.real_flag",
     "refinement": "tests.validation.refinement",
     "renderers": "tests.validation.renderers",
+    "robot-held": "tests.validation.robot_held",
     "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
 }

@@ -20,17 +20,16 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
-from measure.challenge.rates import Share
 from measure.gate.gate import Gate
 from measure.gate.judgement import CONFIDENCE, FALSE_ALARM, Judgement, judge
 from measure.gate.nearest import nearest
-from measure.gate.prepare import FilmsOf, calibrated
+from measure.gate.prepare import FilmsOf, calibrated, data_of
 from measure.gate.storage import read
+from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
 from tests.validation.gate_clips import KINDS, made, seed_of
 
 LAKE = "FLAGDATA_LAKE"
-DATASET = "flagsim-wide"
 SOURCES = 60
 """Films of the test side that the clips are made of; the others are judged as they are."""
 _CLIP = "video/dyntex_flag_571c110.avi"
@@ -40,11 +39,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """The sheet, as JSON and as `validate-gate.md`."""
     path = os.environ.get(LAKE)
     if path is None:
-        return {"left_out": f"no lake; set {LAKE} to one with the data set {DATASET}"}
+        return {"left_out": f"no lake; set {LAKE} to one with the data sets that the model was trained on"}
     torch.set_num_threads(1)
     model = shipped()
     gate = gate_of(model, Path(path), seed=seed)
-    films = FilmsOf(Path(path), DATASET, "test")
+    films = FilmsOf(Path(path), data_of(model), "test")
     with torch.no_grad():
         begun = time.perf_counter()
         plain = [judge(films[index][: model.front_end.frames], model, gate) for index in range(SOURCES, len(films))]
@@ -66,7 +65,7 @@ def gate_of(model: Estimator, lake: Path, *, seed: int) -> Gate:
     try:
         return read(SHIPPED / model.name, model)
     except NotFoundError:
-        train, validation = (FilmsOf(lake, DATASET, side) for side in ("train", "validation"))
+        train, validation = (FilmsOf(lake, data_of(model), side) for side in ("train", "validation"))
         return calibrated(model, train, validation, seed=seed, advance=lambda _: None)
 
 

@@ -45,7 +45,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     model = estimator.shipped("wave-cloth")
     source = flagdata.open(place)
-    spec = DataSpec(dataset=_DATASET)
+    spec = DataSpec(datasets=(_DATASET,))
     split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
     train, test = (source.pairs(split=side, split_by=split) for side in ("train", "test"))
     rows = source.lake.rows(f"kind = 'recording' and {spec.where('test')}", columns=["artifact", "parameters"])

@@ -38,7 +38,7 @@ def run(*, seed: int, out: object) -> dict[str, Any]:
     model = estimator.shipped()
     recipe: Any = model.card["recipe"]
     data: Any = model.card["data"]
-    spec = DataSpec(dataset=recipe["data"]["dataset"])
+    spec = DataSpec.of_identity(recipe["data"])
     split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
     pairs = flagdata.open(path).pairs(at=data["at"], split="test", split_by=split)
     chosen = np.unique(pairs.table.seed, return_index=True)[1][:FILMS].tolist()

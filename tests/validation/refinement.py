@@ -4,6 +4,8 @@ Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, F
 FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how many evaluations each method has (50),
 FLAGDATA_REFINE_PEERS which optimisers (all, separated by commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped
 one), FLAGDATA_REFINE_CACHE a folder for evaluations, so that an interrupted run goes on. Without a lake it is left out.
+With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of the reference simulator (../shared/data/arcsim), filmed by our
+rasteriser: six runs, of two views each for 12 targets.
 Writes `refinement.md` beside the JSON.
 """
 
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
 from measure.refine import start
-from measure.refine.command import RENDERS, SCENE
+from measure.refine.command import RENDERS, scene_of
 from measure.refine.distance import squared
 from measure.refine.evaluator import STAGES, Evaluator
 from measure.refine.peers.registry import PEERS, minimise
@@ -37,10 +39,10 @@ from models import estimator as models
 from models.estimator import Estimator
 from sim.assets import Assets
 from sim.render.prior import named
-from sim.run import load
+from tests.validation.transfer import REFERENCE_RUNS, reference_clips
 
 LEVEL = 0.9
-_DENSITY_RANGE = 0.07  # kg/m², of the search space
+ARCSIM = "arcsim"
 _RESAMPLES = 2000
 _OWN, _REGRESSION = "refine", "regression alone"
 
@@ -80,17 +82,23 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     cache = out / "refinement-cache" if folder is None else Path(folder)
     own_model = os.environ.get("FLAGDATA_REFINE_MODEL")
     estimator = models.shipped() if own_model is None else models.load(Path(own_model))
+    scene = scene_of(estimator)
+    space = Space.of(scene)
     at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
     scores: list[Score] = []
     stages: dict[str, list[float]] = {}
     own: list[Refinement] = []
-    for number, target in enumerate(_targets(Path(lake), at=at, count=count, seed=seed)):
+    if lake == ARCSIM:
+        targets = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
+    else:
+        targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
+    for number, target in enumerate(targets):
         found = refine(
-            target, estimator, load(SCENE), cache=cache,
+            target, estimator, scene, cache=cache,
             settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
         )  # fmt: skip
         own.append(found)
-        scores += [_regression(target, estimator, seed), _of_own(target, found)]
+        scores += [_regression(target, estimator, space, seed), _of_own(target, found)]
         for stage, spent in found.seconds.items():
             stages.setdefault(stage, []).append(spent / found.evaluations)
         for peer in peers:
@@ -102,7 +110,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     rows = _rows(scores, seed=seed)
     result = {
         "lake": Path(lake).name, "at": at, "targets": [found.targets[0].name for found in own], "model": estimator.name,
-        "budget": budget, "level": LEVEL, "methods": rows, "scores": [vars(score).copy() for score in scores],
+        "budget": budget, "level": LEVEL,
+        "density_range": space.density.high - space.density.low, "methods": rows,
+        "scores": [vars(score).copy() for score in scores],
         "seconds_per_evaluation": {stage: float(np.median(values)) for stage, values in stages.items()},
         "floor_reached": [found.reached for found in own],
     }  # fmt: skip
@@ -110,11 +120,10 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return result
 
 
-def _targets(lake: Path, *, at: str, count: int, seed: int) -> list[Target]:
+def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> list[Target]:
     """Clips of the test side, each of another simulation."""
     source = Source.open(lake)
     pairs = source.pairs("name like '%-test-%'", at=at)
-    space = Space.of(load(SCENE))
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
     order = stream(seed, "refinement", "targets").permutation(len(pairs)).tolist()
     taken: set[int] = set()
@@ -129,6 +138,17 @@ def _targets(lake: Path, *, at: str, count: int, seed: int) -> list[Target]:
     return found
 
 
+def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
+    """Runs of the reference simulator, of as many views as there must be; how they were filmed is not told."""
+    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
+    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    clips = reference_clips(Path(data) / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
+    return [
+        Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "density": density})
+        for name, (film, wind, density) in list(clips)[:count]
+    ]
+
+
 def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, seed: int) -> Trace:
     """An optimiser of the paper's objective: the squared distance of embeddings, one clip an evaluation."""
     wanted = evaluator.embed(target.clip[None])[0]
@@ -141,9 +161,9 @@ def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, see
     return minimise(method, evaluate, dimension=DIMENSION, budget=budget, seed=seed)
 
 
-def _regression(target: Target, estimator: Estimator, seed: int) -> Score:
+def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -> Score:
     begun = time.perf_counter()
-    draws = start.amortised(estimator, target.clip, seed=seed, draws=models.DRAWS)
+    draws = start.amortised(estimator, target.clip, space, seed=seed, draws=models.DRAWS)
     seconds = time.perf_counter() - begun
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
     wind, density = target.truth["wind_speed"], target.truth["density"]
@@ -220,7 +240,7 @@ def _sheet(result: dict[str, Any]) -> str:
     )
     lines = ["# Refinement and its peers", "", about, "", header, "|---|---|---|---|---|---|---|"]
     for row in result["methods"]:
-        share = [100 * value / _DENSITY_RANGE for value in row["density_error"]]
+        share = [100 * value / result["density_range"] for value in row["density_error"]]
         lines.append(
             f"| {row['method']} | {_span(row['wind_error'], 2)} | {_span(share, 0)} | {_span(row['wind_inside'], 2)} | "
             f"{_span(row['density_inside'], 2)} | {row['evaluations']:.0f} | {row['seconds']:.1f} |"

@@ -1,28 +1,36 @@
-"""NMEA 2000 as text of the canboat project: raw lines (PLAIN, FAST), analyzer's text and its JSON.
+"""NMEA 2000 as text: frames, and the canboat project's raw lines (PLAIN, FAST), analyzer's text and its JSON.
 
+    (1502979132.106111) can0 09FD0223#00A50267FE02FFFF
+    17:33:21.107 R 09FD0223 00 A5 02 67 FE 02 FF FF
     2016-02-28T19:57:02.364Z,2,130306,130,255,8,f7,df,01,67,00,fa,ff,ff
     2011-11-24-22:42:04.437 2  36 255 130306 Wind Data:  SID = 177; Wind Speed = 0.92 m/s; Wind Angle = 353.4 deg; …
     {"timestamp":"…","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind Data","fields":{"Wind Speed":0.92,…}}
 
-Source: canboat project, README "File formats", wiki "analyzer", and its table of PGNs: 130306 Wind Data is SID, speed
-(uint16, 0.01 m/s), angle (uint16, 0.0001 rad), reference (3 bits: 0 over ground from true north, 1 from magnetic north,
-2 apparent, 3 boat-referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and
-5, 0.01 m/s); the three largest numbers of a field stand for no value. References 3 and 4 are winds computed as if the
-platform stood still (theoretical). JSON says by "units" in its first line whether angles are rad ("si") or deg.
+The first is of Linux' candump -L, the second the RAW text of Yacht Devices' gateways, of which the user gives the day.
+Source: SocketCAN, candump(1); Yacht Devices, Wi-Fi Gateway YDWG-02 user manual, appendix "Format of messages in RAW
+mode" (UTC, R received, identifier, data); SAE J1939-21, 5.2, for the identifier's 29 bits: priority 3, then data page,
+PDU format and PDU specific, which make the number of the message, and the sender's address 8; canboat project, README
+"File formats", wiki "analyzer", and its table of PGNs: 130306 Wind Data is SID, speed (uint16, 0.01 m/s), angle
+(uint16, 0.0001 rad), reference (3 bits: 0 over ground from true north, 1 from magnetic north, 2 apparent, 3 boat-
+referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and 5, 0.01 m/s); the
+three largest numbers of a field stand for no value. References 3 and 4 are winds computed as if the platform stood
+still (theoretical). JSON says by "units" in its first line whether angles are rad ("si") or deg.
 """
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
@@ -39,6 +47,12 @@ CHANNELS = (
 )  # fmt: skip
 MOVING = 0.26
 """Speed over ground that a moored or fixed receiver does not report in the median [m/s]."""
+_CANDUMP = re.compile(
+    r"\((?P<stamp>\d{10}\.\d{1,9})\)\s+\S+\s+(?P<id>[0-9A-F]{8})#(?P<bytes>(?:[0-9A-F]{2}){0,8})\s*[RT]?"
+)
+_GATEWAY = re.compile(
+    r"(?P<stamp>\d{2}:\d{2}:\d{2}\.\d{3})\s+[RT]\s+(?P<id>[0-9A-F]{8})(?P<bytes>(?:\s+[0-9A-F]{2}){0,8})\s*"
+)
 _WIND = 130306
 _OVER_GROUND = 129026
 _STAMP = r"(?P<date>\d{4}-\d{2}-\d{2})[T Z-](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)(?P<zone>Z?)"
@@ -60,8 +74,8 @@ class Canboat:
     """Format "canboat"."""
 
     name = "canboat"
-    about = "NMEA 2000 as canboat's text: raw, analyzed or JSON"
-    uses = frozenset({"zone", "platform", "azimuth", "talker"})
+    about = "NMEA 2000: frames of candump and gateways; canboat's text, raw, analyzed or JSON"
+    uses = frozenset({"zone", "platform", "azimuth", "talker", "date"})
 
     def recognise(self, head: Head) -> Guess | None:
         """Lines that are canboat's, some of them of wind."""
@@ -72,7 +86,7 @@ class Canboat:
         if ours < max(1, len(lines) // 2):
             return None
         reasons = (
-            f"{ours} of the first {len(lines)} lines are NMEA 2000 messages as canboat writes them",
+            f"{ours} of the first {len(lines)} lines are NMEA 2000 messages",
             f"{wind} of them are wind (PGN {_WIND})",
         )
         return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons)
@@ -85,7 +99,7 @@ class Canboat:
             name="wind on NMEA 2000 (PGN 130306)", channels=CHANNELS, parse=network, split=split,
             sensor=Sensor(name="NMEA 2000 wind sensor", resolution=0.01),
         )  # fmt: skip
-        reading = read_lines(source, instrument, zone_name=options.zone)
+        reading = read_lines(_dated(source, options), instrument, zone_name=options.zone)
         if len(network.devices) > 1:
             listed = ", ".join(sorted(network.devices, key=int))
             raise InputError(
@@ -110,7 +124,74 @@ def split(line: str) -> tuple[str, str]:
         match = re.search(r"\"timestamp\"\s*:\s*\"" + _STAMP + r"\"", text[:400])
         return (_iso(match) if match else ""), text
     match = _RAW.fullmatch(text) or _TEXT.fullmatch(text)
-    return (_iso(match), match["rest"]) if match else ("", text)
+    if match is not None:
+        return _iso(match), match["rest"]
+    date, text = (text[:10], text[11:]) if re.match(r"\d{4}-\d{2}-\d{2} ", text) else ("", text)
+    frame = _CANDUMP.fullmatch(text) or _GATEWAY.fullmatch(text)
+    if frame is None:
+        return "", text
+    stamp = f"{date}T{frame['stamp']}Z" if date else frame["stamp"] if "(" in text[:1] else ""
+    return stamp, _message(frame)
+
+
+def _message(frame: re.Match[str]) -> str:
+    """A frame as canboat's raw line without its stamp."""
+    identifier, data = int(frame["id"], 16), bytes.fromhex(frame["bytes"].replace(" ", ""))
+    number = (identifier >> 8) & 0x1FFFF
+    # Below 240 the second byte is the address the message is sent to, and no part of its number.
+    number = number if (number >> 8) & 0xFF >= 240 else number & 0x1FF00
+    listed = "".join(f",{byte:02x}" for byte in data)
+    return f"{(identifier >> 26) & 7},{number},{identifier & 0xFF},255,{len(data)}{listed}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Dated(TextFile):
+    """The same lines, frames after a time of day with the day before it.
+
+    Attributes:
+        date: of the first line.
+    """
+
+    date: dt.date
+
+    def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
+        """See `TextFile.blocks`."""
+        day, before = self.date, ""
+        for first, lines in super().blocks(size):
+            told: list[str] = []
+            for line in lines:
+                frame = _GATEWAY.fullmatch(line.strip())
+                if frame is None:
+                    told.append(line)
+                    continue
+                if before[:2] > "18" and frame["stamp"][:2] < "06":
+                    day += dt.timedelta(days=1)
+                before = frame["stamp"]
+                told.append(f"{day.isoformat()} {line.strip()}")
+            yield first, told
+
+
+def _dated(source: TextFile, options: WindOptions) -> TextFile:
+    """The file with the day that the user gives before times of day.
+
+    Raises:
+        TimeError: times of day, and no day given.
+        UsageError: a day for stamps that have one.
+    """
+    timed = any(_GATEWAY.fullmatch(line.strip()) for line in source.head())
+    if timed and options.date is None:
+        raise TimeError(
+            "the stamps are times of day without a date", where=f"{source.path}, line 1",
+            fix="give the day of the first row, in UTC: --date 2026-05-01",
+        )  # fmt: skip
+    if options.date is None:
+        return source
+    if not timed:
+        raise UsageError(
+            "the stamps say when they were: --date is not used", where=str(source.path), fix="leave it out"
+        )
+    own = {item.name: getattr(source, item.name) for item in fields(TextFile)}
+    return _Dated(**own, date=options.date)
 
 
 def _iso(match: re.Match[str]) -> str:
@@ -121,7 +202,7 @@ def _is_message(line: str) -> bool:
     text = line.strip()
     if text.startswith("{"):
         return '"pgn":' in text and '"timestamp":' in text
-    return bool(_RAW.fullmatch(text) or _TEXT.fullmatch(text))
+    return any(form.fullmatch(text) for form in (_RAW, _TEXT, _CANDUMP, _GATEWAY))
 
 
 class _Network:

@@ -24,6 +24,7 @@ from flagdata.ingest.anemometer.instruments import (
     find_winds,
     mixed_units,
     named_wind,
+    site_of_all,
     sites,
 )
 from flagdata.ingest.anemometer.layout import Layout, lay_out
@@ -307,13 +308,19 @@ def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
     for channel, column in (wind.columns if wind is not None else {}).items():
         lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
         lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
+        lines += ['convention = "to"'] if column.towards else []
         suffix = layout.suffixes[column.index]
         lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
     own = wind.columns.values() if wind is not None else ()
-    for column in dict.fromkeys(other for one in own for other in _beside(layout, one)):
+    units = list(dict.fromkeys(other for one in own for other in _beside(layout, one)))
+    for column in units:
         text = next(row[column].strip() for row in layout.rows if row[column].strip())
         lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
         lines += ['about = "unit"']
+    site = site_of_all(layout, apart={*time.columns, *units}) if time is not None else None
+    if site is not None and own:
+        lines += ["", "[[check]]", f"column = {_reference(layout, site[0])}", f"values = [{_quoted(site[1])}]"]
+        lines += ['about = "site"']
     lines += ["", "[sensor]", f"name = {_quoted(label)}"]
     if wind is not None and wind.height is not None:
         lines.append(f"height = {wind.height:g}")

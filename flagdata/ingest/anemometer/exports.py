@@ -29,16 +29,13 @@ from flagdata.ingest.anemometer.table import read_table
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import NANOSECONDS
-from flagdata.units import spelled, unit
+from flagdata.units import POINTS, spelled, unit
 
 Names = Sequence[tuple[str, str]]
 """Patterns of a column's whole name, case ignored → channel; the first pattern that fits decides."""
 
 _INCHES = ("in", "inches")
 """What these exports call inches of mercury; the table of units knows lengths by such names."""
-_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
-POINTS: Mapping[str, str] = {name: f"{number * 22.5:g}" for number, name in enumerate(_ROSE)}
-"""Points of the compass → degrees from north, as text."""
 _REST = re.compile(
     r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
 )
@@ -217,7 +214,7 @@ class CompassRows(RowReader):
     def __init__(self, source: TextFile, layout: FileLayout, columns: Sequence[int]) -> None:
         super().__init__(source, layout)
         self._compass = [column - 1 for column in columns]
-        self._degrees = {name: text.replace(".", layout.decimal) for name, text in POINTS.items()}
+        self._degrees = {name: f"{degrees:g}".replace(".", layout.decimal) for name, degrees in POINTS.items()}
         self.points = 0
 
     def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer.languages import in_english
 from flagdata.schema import CHANNELS
 from flagdata.timebase import zone
 from flagdata.units import UNITS, spelled
@@ -22,6 +23,9 @@ _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
+_TOWARDS = re.compile(
+    r"\btowards?\b|\bblowing to\b|\bto dir|\bgoing to\b|\bdir(?:ection)? to\s*(?:[\[(]|$)", re.IGNORECASE
+)
 _PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
 _WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
 _SPEED = frozenset(
@@ -36,7 +40,8 @@ _DIRECTION = frozenset(
     {
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
         "dd", "vane", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
-        "retning", "vindretning", "riktning", "wdr", "wdire", "deg", "winddeg", "azimuth", "bearing",
+        "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire", "deg", "winddeg", "azimuth",
+        "bearing",
     }
 )  # fmt: skip
 _OTHER = frozenset(
@@ -58,8 +63,15 @@ _SPREAD = frozenset(
         "status", "skew", "skewness", "kurt", "kurtosis", "windgust", "wgust", "gustspeed", "windgustdir", "windrun",
         "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples", "percentile", "trend",
         "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast", "threshold",
+        "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr", "setpoint",
+        "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
+        "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
     }
 )  # fmt: skip
+_AXES = frozenset(
+    {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down"}
+)
+"""Words of a component of the wind along an axis of the Earth, which is no speed of wind."""
 _MEAN = frozenset({"avg", "average", "mean", "ave", "av", "moy", "mittel", "mittelwert", "media", "medio", "smp"})
 _PLAIN = frozenset(
     {
@@ -122,6 +134,8 @@ class Heading:
         height: above ground [m].
         label: words that tell instruments apart, lower-case.
         magnetic: of a direction, whether it is from magnetic north.
+        towards: of a direction, whether the wind blows to it.
+        strange: what stands in brackets where a unit does, but spells none that is known; "" where nothing does.
     """
 
     name: str
@@ -134,12 +148,14 @@ class Heading:
     height: float | None
     label: tuple[str, ...]
     magnetic: bool = False
+    towards: bool = False
+    strange: str = ""
 
 
 @lru_cache(maxsize=4096)
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
-    text = name[:120].strip().strip('"').strip()
+    text = in_english(name[:120].strip().strip('"').strip())
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
     rest, unit = _unit(text, stated)
     height = _height(rest)
@@ -158,6 +174,8 @@ def understand(name: str, stated: str = "") -> Heading:
         excluded = known & _OTHER - {"vertical"} if quantity == "wind_z" else known & _OTHER
         if "wind" in quantity and excluded:
             quantity, sure = "", False
+    if quantity.endswith("wind_speed") and known & _AXES:
+        quantity, sure = "", False
     left = list(words)
     for word in used:
         left.remove(word)
@@ -165,7 +183,8 @@ def understand(name: str, stated: str = "") -> Heading:
     return Heading(
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
-        magnetic=bool(known & {"mag", "magnetic"}),
+        magnetic=bool(known & {"mag", "magnetic"}), towards=bool(_TOWARDS.search(text.replace("_", " "))),
+        strange=_strange(text) if unit is None else "",
     )  # fmt: skip
 
 
@@ -183,7 +202,7 @@ def interest(name: str) -> int:
 
 def names_time(name: str) -> bool:
     """Whether a heading names a time or a date."""
-    words = set(_words(name))
+    words = set(words_of(name))
     known = {
         "time", "timestamp", "date", "datetime", "datum", "uhrzeit", "zeit", "zeitstempel", "fecha", "hora", "heure",
         "horodatage", "stamp", "epoch", "unixtime", "unix", "millis", "milliseconds", "seconds", "elapsed", "ts",
@@ -221,7 +240,7 @@ def _is_zone(name: str) -> bool:
 
 def words_of(name: str) -> list[str]:
     """Words of a heading, lower-case."""
-    return _words(name)
+    return _words(in_english(name))
 
 
 def _words(text: str) -> list[str]:
@@ -235,6 +254,12 @@ def _words(text: str) -> list[str]:
             parts = [part.lower() for part in _CAMEL.findall(word)]
             found.extend(parts)
     return found
+
+
+def _strange(text: str) -> str:
+    """What stands in brackets at the end of a heading as a unit does, such as "gon" or "V"."""
+    found = re.search(r"[\[(<{]\s*([^\W\d_]{1,4})\s*[\])>}]\s*$", text)
+    return found[1] if found is not None and "°" not in text else ""
 
 
 def _height(text: str) -> float | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from flagdata.ingest.anemometer import unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
-from flagdata.ingest.anemometer.layout import Layout
-from flagdata.units import spelled, unit
+from flagdata.ingest.anemometer.layout import Layout, cell_kind
+from flagdata.units import POINTS, spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -27,6 +27,8 @@ _SITES = frozenset(
         "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
     }
 )  # fmt: skip
+_NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
+"""Words beside which a heading is still that of a site."""
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 _UNREADABLE = 0.1
@@ -34,11 +36,19 @@ _UNREADABLE = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """A column for a channel: its index, its unit (`None` where nothing tells it), and how the unit is known."""
+    """A column for a channel.
+
+    Attributes:
+        index: of the column.
+        unit: as `flagdata.units` spells it; `None` where nothing tells it.
+        told: how the unit is known.
+        towards: of a direction, whether the wind blows to it.
+    """
 
     index: int
     unit: str | None
     told: str
+    towards: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +111,10 @@ def find_winds(
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        if float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
+        if heading.quantity.endswith("direction") and (degrees := _points(layout.column(index))) is not None:
+            found.values[index] = degrees
+            found.headings[index] = replace(heading, unit="points")
+        elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
@@ -112,6 +125,14 @@ def find_winds(
     _doubt_headings(found, winds)
     _check_gusts(found, winds)
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+
+
+def _points(cells: Sequence[str]) -> NDArray[np.float64] | None:
+    """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
+    filled = [cell for cell in cells if cell_kind(cell) != "missing"]
+    if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):
+        return None
+    return np.array([POINTS.get(cell.upper(), np.nan) for cell in cells])
 
 
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
@@ -177,17 +198,40 @@ def _otherwise(name: str, stated: str, told: str) -> str:
 
 
 def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
-    """The column that tells sites apart whose rows share their stamps, and the sites in the first rows."""
-    if len(set(stamps)) == len(stamps):
-        return None
+    """The column that tells sites apart, and the sites in the first rows; `None` where all rows are of one.
+
+    Its heading is that of a site; or the rows of different sites share their stamps.
+    """
+    shared = len(set(stamps)) < len(stamps)
     for index, name in enumerate(layout.names):
-        if index in time or not set(words_of(name)) & _SITES or understand(name).quantity:
+        words = set(words_of(name))
+        if index in time or not words & _SITES or understand(name).quantity:
             continue
         cells = layout.column(index)
         kinds = sorted({cell for cell in cells if cell})
-        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
-        if 2 <= len(kinds) <= 50 and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+        if not 2 <= len(kinds) <= 50:
+            continue
+        if words <= _SITES | _NUMBERED and len(cells) >= 3 * len(kinds):
             return index, tuple(kinds)
+        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
+        if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+            return index, tuple(kinds)
+    return None
+
+
+def site_of_all(layout: Layout, *, apart: Collection[int]) -> tuple[int, str] | None:
+    """The column with a site's heading and the one site that the first rows hold; `None` where there is none.
+
+    Args:
+        apart: columns of the time or of units, which are none.
+    """
+    for index, name in enumerate(layout.names):
+        words = set(words_of(name))
+        if index in apart or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
+            continue
+        kinds = set(layout.column(index))
+        if len(kinds) == 1 and (site := next(iter(kinds))):
+            return index, site
     return None
 
 
@@ -250,13 +294,25 @@ def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
     for index in order:
         heading = found.headings[index]
         same = next((other for other in kept if _same(found, index, other)), None)
-        if same is None:
+        if same is None and _marks_quality(found, index, indices):
+            found.remarks.append(f"column {found.name(index)!r} holds marks of another column of its name: left out")
+        elif same is None:
             kept.append(index)
         else:
             found.remarks.append(
                 f"column {heading.name!r} is {found.layout.names[same]!r} again, averaged or in another unit"
             )
     return sorted(kept)
+
+
+def _marks_quality(found: _Found, index: int, indices: Sequence[int]) -> bool:
+    """Whether a column holds one or two whole numbers, where another of the same name holds more."""
+    name = found.layout.names[index]
+    kinds = {
+        i: np.unique(found.values[i][np.isfinite(found.values[i])]) for i in indices if found.layout.names[i] == name
+    }
+    own = kinds[index]
+    return len(own) <= 2 and bool(np.all(own % 1 == 0)) and any(len(other) > 2 for other in kinds.values())
 
 
 def _same(found: _Found, index: int, other: int) -> bool:
@@ -305,17 +361,28 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     )
     lone = candidates if len(candidates) == 1 else []
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
-    chosen = sorted(exact, key=lambda i: found.headings[i].unit is None) or near[:1] or lone or plain
+    exact.sort(key=lambda i: (found.headings[i].unit == "points", found.headings[i].unit is None))
+    chosen = exact or near[:1] or lone or plain
     if not chosen:
         if candidates:
             names = ", ".join(repr(found.layout.names[i]) for i in candidates)
             found.remarks.append(f"none of the directions {names} is surely that of {found.name(speed)!r}: left out")
         return None
     index = next((i for i in chosen if not found.headings[i].magnetic), chosen[0])
+    angles = [i for i in candidates if found.headings[i].unit != "points" and not found.headings[i].magnetic]
+    if found.headings[index].unit == "points" and len(angles) == 1:
+        index = angles[0]  # the same in degrees
     heading, value = found.headings[index], found.values[index]
     known = value[np.isfinite(value)]
     if heading.unit is not None and not fits(channel, heading.unit):
         return None
+    if heading.strange:
+        found.remarks.append(
+            f"column {heading.name!r} is in {heading.strange!r}, which is no unit that is known: left out"
+        )
+        return None
+    if heading.unit == "gon":
+        return channel, Column(index=index, unit="gon", told="in gon by its heading", towards=heading.towards)
     if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
         found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
         return None
@@ -329,13 +396,20 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out"
         )
         return None
+    if heading.unit is None and float(known.max()) <= 36 and bool(np.all(known % 1 == 0)) and len(np.unique(known)) > 3:
+        found.remarks.append(f"column {heading.name!r} may be in degrees or in tens of degrees: left out")
+        return None
     if heading.unit is None and float(np.abs(known).max()) <= 6.3:
         found.remarks.append(f"column {heading.name!r} may be in degrees or radians: left out")
         return None
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"
+    if heading.unit == "points":
+        told = "as points of the compass, 22.5° apart"
+        return channel, Column(index=index, unit="points", told=told, towards=heading.towards)
     told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
-    return channel, Column(index=index, unit=heading.unit or "deg", told=told)
+    told = f"{told}, to which the wind blows" if heading.towards else told
+    return channel, Column(index=index, unit=heading.unit or "deg", told=told, towards=heading.towards)
 
 
 def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:

@@ -43,7 +43,7 @@ _SIGNAL_K = {
 }  # fmt: skip
 
 
-def is_json(lines: Sequence[str]) -> bool:
+def matches(lines: Sequence[str]) -> bool:
     """Whether the first lines of a file are JSON objects, or a list of them; canboat's messages are not meant."""
     filled = [line for line in lines[:_LOOKED_AT] if line.strip()]
     if not filled:

@@ -17,6 +17,7 @@ from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.order import in_order
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniff import recognise
 from flagdata.ingest.anemometer.sniffing import SURE
 from flagdata.ingest.anemometer.source import TextFile, open_text
@@ -38,9 +39,9 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     """
     path = Path(path)
     options = options or WindOptions()
-    layout = recipes.load(options.recipe).file if options.recipe is not None else None
-    encoding = options.encoding or (layout.encoding if layout else None)
-    source = open_text(path, limits=options.limits, encoding=encoding)
+    recipe = recipes.load(options.recipe) if options.recipe is not None else None
+    encoding = options.encoding or (recipe.file.encoding if recipe else None)
+    source = restate(open_text(path, limits=options.limits, encoding=encoding), recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()
     unused = options.given() - reader.uses

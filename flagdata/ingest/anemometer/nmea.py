@@ -1,14 +1,16 @@
-"""NMEA 0183 streams: wind from MWV and MWD, time from the sentences around them.
+"""NMEA 0183 streams: wind from MWV and MWD, else VWR, VWT and MDA, time from the sentences around them.
 
 Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
 GGA, GLL, or the time of a TAG block), and the flag TIME_UNSURE. MWV,R is wind past the platform; MWV,T is
 "theoretical": what the instrument computed as if the platform stood still; both are relative to the bow. They stay in
-channels of their own, and neither is ground truth unless the user says the platform is fixed.
+channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR, VWT and MDA are
+what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the same wind again.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,6 +41,9 @@ from flagdata.units import UNITS
 
 MOVING = 0.5
 """Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
+_OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
+"""Older sentences → the wind they hold."""
+WINDS = ("MWV", "MWD", *_OTHERS)
 _CHANNELS = (
     "apparent_wind_speed", "apparent_wind_direction", "theoretical_wind_speed", "theoretical_wind_direction",
     "wind_speed", "wind_direction", "wind_direction_magnetic",
@@ -62,13 +67,14 @@ class _Stream:
     undirected: int = 0
     unstated: int = 0
     speeds: list[float] = field(default_factory=list)
+    others: list[tuple[Sentence, int]] = field(default_factory=list)
 
 
 class Nmea:
     """Format "nmea"."""
 
     name = "nmea"
-    about = "NMEA 0183 sentences MWV and MWD"
+    about = "NMEA 0183 sentences MWV and MWD, or VWR, VWT and MDA"
     uses = frozenset({"date", "platform", "azimuth", "talker"})
 
     def recognise(self, head: Head) -> Guess | None:
@@ -84,12 +90,12 @@ class Nmea:
                 continue
             if sentence is not None:
                 right += 1
-                wind += sentence.kind in ("MWV", "MWD")
+                wind += sentence.kind in WINDS
         if right < max(1, len(head.lines) // 2):
             return None
         reasons = (
             f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences with right checksums, {wrong} wrong",
-            f"{wind} of them are wind (MWV or MWD)",
+            f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         return Guess(format="nmea", score=0.95 if wind else 0.3, reasons=reasons)
 
@@ -100,13 +106,14 @@ class Nmea:
             for at, line in enumerate(lines, start=first):
                 if line.strip(" \t\x00"):
                     _take(stream, line, at, options.talker)
+        _take_others(stream)
         where = str(source.path)
         if not stream.line:
             by = f" of the talker {options.talker}" if options.talker is not None else ""
             seen = ", ".join(f"{count} {kind}" for kind, count in stream.kinds.most_common(6))
             raise InputError(
-                f"no valid MWV or MWD sentence{by}{'; there are ' + seen if seen else ''}", where=where,
-                fix="have the instrument send MWV, or check its baud rate if sentences are broken",
+                f"no valid sentence of wind ({', '.join(WINDS)}){by}{'; there are ' + seen if seen else ''}",
+                where=where, fix="have the instrument send MWV, or check its baud rate if sentences are broken",
             )  # fmt: skip
         if len(stream.talkers) > 1:
             what = f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments"
@@ -166,6 +173,69 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
         _mwv(stream, sentence, at)
     elif sentence.kind == "MWD":
         _mwd(stream, sentence, at)
+    elif sentence.kind in _OTHERS:
+        stream.others.append((sentence, at))
+
+
+def _take_others(stream: _Stream) -> None:
+    """Sentences of older kinds, of each wind that the stream holds in no other."""
+    known = {name for row in stream.values for name in row}
+    added = False
+    for sentence, at in stream.others:
+        kind = _OTHERS[sentence.kind]
+        if f"{kind}_speed" in known:
+            continue
+        added = True
+        (_mda if kind == "wind" else _vwr)(stream, sentence, at)
+    if added:
+        order = np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist()
+        stream.line = [stream.line[index] for index in order]
+        stream.values = [stream.values[index] for index in order]
+        stream.flags = [stream.flags[index] for index in order]
+
+
+def _vwr(stream: _Stream, sentence: Sentence, at: int) -> None:
+    """VWR and VWT: the angle to the left or right of the bow, then the speed in knots, m/s and km/h."""
+    fields = sentence.fields
+    if len(fields) < 4 or fields[1] not in ("L", "R", ""):
+        stream.invalid.append(at)
+        return
+    kind = _OTHERS[sentence.kind]
+    angle = number(fields[0])
+    row: dict[str, float] = {}
+    if angle is not None and fields[1]:
+        row[f"{kind}_direction"] = float(np.radians(angle if fields[1] == "R" else -angle))
+    speed = _speed(fields[2:])
+    if speed is not None:
+        row[f"{kind}_speed"] = speed
+    _add(stream, sentence, at, row, SampleFlag.OK if speed is not None else SampleFlag.MISSING)
+
+
+def _mda(stream: _Stream, sentence: Sentence, at: int) -> None:
+    """MDA: of the composite of a weather station the direction (true, magnetic) and the speed (knots, m/s)."""
+    fields = sentence.fields
+    if len(fields) < 20:
+        stream.invalid.append(at)
+        return
+    true, magnetic, speed = number(fields[12]), number(fields[14]), _speed(fields[16:20])
+    row: dict[str, float] = {}
+    if true is not None:
+        row["wind_direction"] = float(np.radians(true))
+    if magnetic is not None:
+        row["wind_direction_magnetic"] = float(np.radians(magnetic))
+    if speed is not None:
+        row["wind_speed"] = speed
+    _add(stream, sentence, at, row, SampleFlag.OK if speed is not None else SampleFlag.MISSING)
+
+
+def _speed(fields: Sequence[str]) -> float | None:
+    """The first speed that pairs of a value and a letter hold [m/s]; m/s first, since it has most digits."""
+    pairs = {letter: number(value) for value, letter in zip(fields[0::2], fields[1::2], strict=False)}
+    known = (
+        value * UNITS[SPEED_UNITS[letter]].scale
+        for letter in ("M", "K", "N") if (value := pairs.get(letter)) is not None
+    )  # fmt: skip
+    return next(known, None)
 
 
 def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:

@@ -1,8 +1,8 @@
 """Lines that an instrument sent over a serial port, as a computer or logger wrote them down.
 
 The instruments do not know the time: it is the stamp that the logging computer wrote before each line, ISO 8601 or Unix
-seconds or milliseconds, alone or in brackets, set off by a comma, semicolon, tab or blank. Each instrument's file says
-what its lines mean; the rest is here.
+seconds or milliseconds, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the
+connection's name between stamp and sentence. Each instrument's file says what its lines mean; the rest is here.
 """
 
 from __future__ import annotations
@@ -34,9 +34,12 @@ from flagdata.signals import Sensor
 
 _STAMP = re.compile(
     r"\s*[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
-    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
+    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!]))?(?P<raw>\S.*)"
 )
-_EPOCH = re.compile(r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?[\s,;>|]+(?P<raw>\S.*)")
+_EPOCH = re.compile(
+    r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?[\s,;>|]+"
+    r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!]))?(?P<raw>\S.*)"
+)
 _MONTH = re.compile(
     r"\s*[\"\[(]?(?P<day>\d{1,2})[-/ ](?P<month>[A-Za-z]{3})[-/ ](?P<year>\d{4})[T ,;:\t]"
     r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)[\"\])]?[\s,;>|]+(?P<raw>\S.*)"

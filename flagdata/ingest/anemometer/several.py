@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flagdata.ingest.anemometer.delimited import drafted, guess, sites
 from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniff import recognise
 from flagdata.ingest.anemometer.sniffing import Guess
 from flagdata.ingest.anemometer.source import open_text
@@ -22,7 +23,7 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     options = options or WindOptions()
     if options.wind is not None or options.recipe is not None or options.format not in (None, "delimited"):
         return ()
-    source = open_text(Path(path), limits=options.limits, encoding=options.encoding)
+    source = restate(open_text(Path(path), limits=options.limits, encoding=options.encoding))
     if options.format is None:
         guesses = recognise(source)
         if not guesses or guesses[0].format != "delimited" or guesses[0].recipe is not None:
@@ -40,5 +41,5 @@ def completed(path: Path | str, options: WindOptions) -> Guess | None:
     Raises:
         FlagdataError: the file cannot be read as text.
     """
-    proposal = drafted(open_text(Path(path), limits=options.limits, encoding=options.encoding), options)
+    proposal = drafted(restate(open_text(Path(path), limits=options.limits, encoding=options.encoding)), options)
     return None if proposal is None else guess(proposal)

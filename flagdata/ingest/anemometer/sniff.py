@@ -10,6 +10,7 @@ from flagdata.ingest.anemometer import excel
 from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
 
@@ -41,7 +42,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         reason = f"the name ends in {path.suffix}"
         return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
     try:
-        source = open_text(path, limits=Limits())
+        source = restate(open_text(path, limits=Limits()))
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
     guesses = recognise(source)

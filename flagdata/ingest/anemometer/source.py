@@ -51,6 +51,11 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"TOB1", "a Campbell TOB1 binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
     (0, b'"TOB', "a Campbell binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
 )
+_ENCODINGS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("gb18030", ("风速", "风向")), ("cp932", ("風速", "風向")), ("big5", ("風速", "風向")), ("cp949", ("풍속", "풍향")),
+    ("cp1251", ("ветр",)), ("cp1250", ("prędkość", "větru")),
+)  # fmt: skip
+"""Encodings that are tried where a file is no UTF-8, and words that show the right one."""
 _BOMS: tuple[tuple[bytes, str], ...] = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -120,7 +125,7 @@ class TextFile:
 
 @dataclass(frozen=True, kw_only=True)
 class TableText(TextFile):
-    """What is no table of text, made one: a workbook's sheet, or JSON, as lines of comma-separated text.
+    """What is no table of text, made one: a workbook's sheet, JSON, labelled lines, as lines of comma-separated text.
 
     Attributes:
         text: one line a row.
@@ -217,7 +222,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
     text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
-    table = json_text.as_table(text) if json_text.is_json(text.head()) else None
+    table = json_text.as_table(text) if json_text.matches(text.head()) else None
     return table or text
 
 
@@ -272,6 +277,10 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                     f"not valid {codec}: {error.__class__.__name__}",
                     where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. --encoding cp1252",
                 ) from None  # fmt: skip
+            told = _by_words(path)
+            if told is not None:
+                text = f"not valid UTF-8, read as {told}, in which its headings are words of wind"
+                return told, (Finding(kind="encoding-assumed", severity=Severity.NOTE, what=text),)
             return "latin-1", (
                 Finding(
                     kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
@@ -280,6 +289,21 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                 ),
             )  # fmt: skip
     return codec or "utf-8", ()
+
+
+def _by_words(path: Path) -> str | None:
+    """The encoding in which the beginning of a file holds words of wind of the language it is used for."""
+    with opened(path) as stream:
+        head = stream.read(HEAD)
+    head = head[: head.rfind(b"\n") + 1] or head
+    for codec, words in _ENCODINGS:
+        try:
+            text = head.decode(codec)
+        except UnicodeDecodeError:
+            continue
+        if any(word in text.lower() for word in words):
+            return codec
+    return None
 
 
 def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Finding, ...]]:

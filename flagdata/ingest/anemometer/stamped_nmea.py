@@ -15,7 +15,7 @@ import numpy as np
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.nmea import Nmea
+from flagdata.ingest.anemometer.nmea import WINDS, Nmea
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sentences import ChecksumError, checksum, split
@@ -32,7 +32,7 @@ class StampedNmea:
     """Format "nmea-stamped"."""
 
     name = "nmea-stamped"
-    about = "NMEA 0183 sentences MWV and MWD, each after a computer's stamp"
+    about = "NMEA 0183 sentences of wind, each after a computer's stamp"
     uses = frozenset({"zone", "platform", "azimuth", "talker"})
 
     def recognise(self, head: Head) -> Guess | None:
@@ -42,7 +42,7 @@ class StampedNmea:
             return None
         reasons = (
             f"{stamped} of the first {len(head.lines)} lines are a computer's stamp and an NMEA 0183 sentence",
-            f"{wind} of them are wind (MWV or MWD)",
+            f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons)
 
@@ -121,5 +121,5 @@ def count(head: Head) -> tuple[int, int]:
             continue
         if sentence is not None:
             stamped += 1
-            wind += sentence.kind in ("MWV", "MWD")
+            wind += sentence.kind in WINDS
     return stamped, wind

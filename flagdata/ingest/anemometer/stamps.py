@@ -32,6 +32,12 @@ _GROUPS: dict[str, str] = {
     "z": r"\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_CLOCK_RUN = re.compile(r"%H%M(?:%S)?")
+_CLOCK_RUNS = {
+    "%H%M": r"(?P<H>\d{0,2}?)(?P<M>\d{1,2})",
+    "%H%M%S": r"(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})",
+}
+"""Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
     r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?$"
@@ -83,6 +89,12 @@ def pattern(form: str) -> str:
                     f"unknown directive %{directive}", where=f"time format {form!r}",
                     fix=f"use {' '.join('%' + g for g in _GROUPS)}, iso, epoch-s or epoch-ms",
                 )  # fmt: skip
+            run = _CLOCK_RUN.match(form, position)
+            if run is not None and (position == 0 or form[position - 1] == " "):
+                used.extend(run[0].replace("%", ""))
+                out.append(_CLOCK_RUNS[run[0]])
+                position = run.end()
+                continue
             used.append(directive)
             out.append(_GROUPS[directive])
             position += 2

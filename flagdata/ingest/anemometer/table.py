@@ -25,7 +25,7 @@ from flagdata.ingest.anemometer.wall import to_utc, zone_advice
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
-from flagdata.units import unit
+from flagdata.units import POINTS, unit
 
 DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 """Channels whose unit is held against their values."""
@@ -75,6 +75,7 @@ class _Column:
 
     index: int
     suffix: str = ""
+    points: bool = False
     values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
@@ -207,9 +208,10 @@ class _Gathered:
         self.distant += int(stamps.distant.sum())
         self.lines.add(line[keep])
         for column in self.columns():
+            cells = _cells(block, column.index)
+            cells = _in_degrees(cells, recipe.file.decimal) if column.points else cells
             parsed = numbers(
-                _cells(block, column.index), decimal=recipe.file.decimal, missing=recipe.file.missing,
-                suffix=column.suffix,
+                cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix
             )  # fmt: skip
             column.values.add(parsed.value[keep])
             column.states.add(parsed.state[keep])
@@ -223,6 +225,13 @@ class _Gathered:
 
 def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
     return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]
+
+
+def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str) -> list[str]:
+    """Points of the compass as degrees; calm air and what else is no point have no direction."""
+    texts: list[str] = [str(text) for text in cells]
+    degrees = (POINTS.get(text.strip().upper()) for text in texts)
+    return ["" if value is None else f"{value:g}".replace(".", decimal) for value in degrees]
 
 
 def _where(block: Block, wanted: NDArray[np.bool_]) -> Block:
@@ -268,7 +277,7 @@ def read_table(
         clock=_Clock(form=recipe.time.format, columns=own) if own or host is None else host,
         host=host if own else None,
         channels={
-            name: _Column(index=i, suffix=recipe.channels[name].suffix)
+            name: _Column(index=i, suffix=recipe.channels[name].suffix, points=recipe.channels[name].unit == "points")
             for name, i in _channel_columns(recipe, rows, where).items()
         },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
@@ -304,6 +313,12 @@ def read_table(
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         cells = column.value(order)  # NaN where a cell is no number
+        if name in DOUBTED:
+            coded = unitcheck.nines(cells)
+            found = unitcheck.coded(name, cells, coded, line)
+            state = np.where(coded, np.uint8(Cell.MISSING), state)
+            cells = np.where(coded, np.nan, cells)
+            findings.extend(found)
         value = in_si(cells, layout)
         if name in DOUBTED:
             span = float(time.max() - time.min()) / NANOSECONDS

@@ -36,11 +36,16 @@ _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
 )
-_CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$")
+_CLOCK = re.compile(
+    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
+)
+_DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
+_EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
     ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31),
     ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 23),
@@ -80,10 +85,39 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
         order: of dates written with numbers only, as the user says.
     """
     best: TimeChoice | None = None
-    for choice in _choices(layout, order):
+    choices = list(_choices(layout, order))
+    for choice in _without_false_epochs(layout, choices):
         if best is None or choice.score > best.score + 1e-9:
             best = choice
     return best
+
+
+def _without_false_epochs(layout: Layout, choices: Sequence[TimeChoice]) -> list[TimeChoice]:
+    """The choices without those that count seconds since 1970 to another year than the dates in the same rows."""
+    dated = {
+        int(year[0])
+        for choice in choices if not (choice.form or "").startswith("epoch")
+        for text in _texts(layout, choice)[:20] if (year := re.search(r"(?<!\d)(?:19|20)\d\d(?!\d)", text))
+    }  # fmt: skip
+    kept: list[TimeChoice] = []
+    for choice in choices:
+        if dated and choice.form in _EPOCHS:
+            ns = _parsed(_texts(layout, choice)[:20], choice.form).ns
+            years = {
+                1970 + int(value) for value in ns.astype("datetime64[ns]").astype("datetime64[Y]").astype(np.int64)
+            }
+            if min(abs(year - other) for year in years for other in dated) > 1:
+                continue
+        kept.append(choice)
+    return kept
+
+
+def _texts(layout: Layout, choice: TimeChoice) -> list[str]:
+    return [" ".join(cells) for cells in zip(*(layout.column(index) for index in choice.columns), strict=True)]
+
+
+def _parsed(texts: Sequence[str], form: str) -> Stamps:
+    return counted.parse(texts, form) if form in counted.FORMS else parse_with_bare_dates(texts, form)[0]
 
 
 def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
@@ -150,7 +184,9 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
     """Date and time in `texts`."""
     if not any(_STAMPLIKE.search(text) for text in texts[:5]):
         return None
-    for form in ("iso", "epoch-s", "epoch-ms"):
+    # 2023070100 is an hour of July 2023 before it is the Unix time of a day in 2034.
+    hours = ("%Y%m%d%H",) if _share(_DATE_AND_HOUR, texts) else ()
+    for form in (*hours, "iso", "epoch-s", "epoch-ms"):
         found, _ = parse_with_bare_dates(texts, form)
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)
@@ -164,10 +200,11 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         found, _ = parse_with_bare_dates(texts, form + zoned)
         if _fits(found):
             return _choice(layout, columns, form + zoned, found, 2.0)
-    if re.search("[A-Za-z]{3}", shape):
+    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT)$", "", shape)):
         if cell_kind(texts[0]) != "stamp":
             return None
         return _with_month_names(layout, columns, texts, zoned)
+    order = order or _order_of(" ".join(layout.names[index] for index in columns))
     try:
         date = decide(texts, told=order, where="")
     except TimeError as error:
@@ -193,6 +230,15 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)
     return None
+
+
+def _order_of(heading: str) -> Order | None:
+    """The order of a date that its heading spells, as "DATE (MM/DD/YYYY)"."""
+    found = re.search(r"\b(?P<first>dd?|mm?|yyyy)[-/. ](?P<second>mm?|dd?)[-/. ](?:y|dd?\b)", heading.lower())
+    if found is None:
+        return None
+    known: dict[str, Order] = {"dm": "dmy", "md": "mdy", "ym": "ymd"}
+    return known.get(found["first"][0] + found["second"][0])
 
 
 def _gaps(shape: str) -> tuple[str, ...]:
@@ -253,7 +299,14 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
             if not _part_at(names, columns, at, part):
                 break
             chosen, form, at = [*chosen, at], f"{form} {part[0]}", at + 1
-        if "%H" not in form:
+        clock = [cell for cell in columns[at] if cell] if at < len(names) else []
+        beside = names[at] if at < len(names) else ""
+        if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and _share(_DIGITS, clock):
+            chosen, form = [*chosen, at], f"{form} %H%M"
+        elif form == "%Y %m %d" and clock and _share(_CLOCK, clock):
+            known = next((found for found in _CLOCKS if _fits(counted.parse(clock, found))), None)
+            chosen, form = [*chosen, at], f"{form} {known}" if known else form
+        if "%H" not in form and "%I" not in form:
             continue
         texts = [" ".join(cells) for cells in zip(*(columns[i] for i in chosen), strict=True)]
         found, _ = parse_with_bare_dates(texts, form)
@@ -285,6 +338,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
+    if set(words) & _PARTS_OF_DATES:
+        return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
         for form, low, high in (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
@@ -301,11 +356,12 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if form is None:
         usual = float(np.median(steps[steps > 0]))
         unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"
+        likely = f"likely {unit}" if usual < _SLOW else "ms of a slow logger, or us of a fast one"
         yield TimeChoice(
             columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
-            doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated (likely {unit})",
-            fix=f'save the draft, complete format = "elapsed-s" or "elapsed-ms" (likely elapsed-{unit}), and name it: '
-            "--recipe FILE.toml --start TIME",
+            doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely})",
+            fix='save the draft, complete format = "elapsed-s", "elapsed-ms" or "elapsed-us" '
+            f"({likely}), and name it: --recipe FILE.toml --start TIME",
         )  # fmt: skip
         return
     yield choice
@@ -317,5 +373,8 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-min", frozenset({"minutes", "mins", "minute"})),
     ("elapsed-s", frozenset({"s", "sec", "secs", "second", "seconds"})),
 )
+_PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
+_SLOW = 5000.0
+"""Steps of a count from which it is as likely of microseconds as of milliseconds."""
 _SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0}
 """Seconds a count."""

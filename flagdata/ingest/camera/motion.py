@@ -34,6 +34,7 @@ _BRIDGE = 8  # px of the images that are compared
 _PAD = 0.15  # of the motion's extent, on each side: the hoist of a flag hardly moves
 _LEAST_SHARE = 0.5
 _GROWTH = 1.8  # the tip of a flag that is seen without it; who walks into the region makes it larger
+_EDGE = 3  # px of the images that are compared, by which blur widens what moves
 _NEAR = 3  # px of the images that are compared, between what moves and the tip of it
 
 
@@ -43,12 +44,14 @@ class CropProposal:
 
     Attributes:
         box: of the upright image; square, unless the motion is longer than the image's shorter side.
+        moving: the part of the upright image that moves, without the padding.
         share: part of the motion's energy that lies in the region the box was drawn around, 0 to 1.
         runs: runs of frames it rests on.
         picture: PNG of the whole upright image, the motion in red, the box in yellow.
     """
 
     box: CropBox
+    moving: CropBox
     share: float
     runs: int
     picture: bytes
@@ -89,7 +92,30 @@ def propose(source: Source, *, rate: float, where: str) -> CropProposal:
             f"motion is all over the image: its largest region carries {share:.0%} of it",
             where=where, fix="give the crop as x,y,width,height",
         )  # fmt: skip
-    return CropProposal(box=box, share=share, runs=len(maps), picture=_draw(shown, motion, box, wide=wide))
+    return CropProposal(
+        box=box, moving=_extent_box(region, wide=wide, high=high), share=share, runs=len(maps),
+        picture=_draw(shown, motion, box, wide=wide),
+    )  # fmt: skip
+
+
+def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, int]:
+    """By how many pixels what moves reaches beyond each edge of a crop, where it is partly inside; none elsewhere.
+
+    Args:
+        wide: width of the upright image; the motion is known to `_EDGE` pixels of the images that were compared.
+    """
+    moving = proposal.moving
+    beyond = {
+        "left": crop.x - moving.x, "top": crop.y - moving.y,
+        "right": moving.x + moving.width - crop.x - crop.width,
+        "bottom": moving.y + moving.height - crop.y - crop.height,
+    }  # fmt: skip
+    if beyond["left"] >= moving.width or beyond["right"] >= moving.width:
+        return {}
+    if beyond["top"] >= moving.height or beyond["bottom"] >= moving.height:
+        return {}
+    least = _EDGE * wide / _WORK
+    return {edge: pixels for edge, pixels in beyond.items() if pixels > least}
 
 
 def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> NDArray[np.uint8]:
@@ -178,6 +204,15 @@ def _with_tip(region: NDArray[np.bool_], maps: NDArray[np.float32]) -> NDArray[n
 def _extent(region: NDArray[np.bool_]) -> int:
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     return int(max(rows[-1] - rows[0], columns[-1] - columns[0])) + 1
+
+
+def _extent_box(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:
+    """The box just around `region`, in pixels of the upright image."""
+    rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
+    scale = wide / region.shape[1]
+    x, y = round(columns[0] * scale), round(rows[0] * scale)
+    right, bottom = min(wide, round((columns[-1] + 1) * scale)), min(high, round((rows[-1] + 1) * scale))
+    return CropBox(x=x, y=y, width=right - x, height=bottom - y)
 
 
 def _box_around(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:

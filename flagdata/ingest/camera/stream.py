@@ -7,13 +7,13 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
-from flagdata.errors import LimitError, UsageError
+from flagdata.errors import LimitError, RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.container import check_path
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
-from flagdata.ingest.camera.motion import CropProposal, propose
-from flagdata.ingest.camera.options import CameraOptions, exact
+from flagdata.ingest.camera.motion import CropProposal, cut_off, propose
+from flagdata.ingest.camera.options import CameraOptions, CropBox, exact
 from flagdata.ingest.camera.sequence import SequenceSource
 from flagdata.ingest.camera.source import Picture, Source
 from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
@@ -85,6 +85,26 @@ class CameraStream:
             crop=crop.as_tuple(),
         )
         self._opening += self._standing_findings()
+        if isinstance(options.crop, CropBox) or options.crop == "square":
+            self._opening += self._cut_off(crop, str(path))
+
+    def _cut_off(self, crop: CropBox, where: str) -> list[Finding]:
+        """A finding where the crop that was chosen cuts through what moves."""
+        try:
+            proposal = propose(self._source, rate=float(self.info.true_rate), where=where)
+        except RefusedError:
+            return []  # nothing moves, or no one thing does: there is nothing to cut off
+        beyond = cut_off(crop, proposal, wide=self.info.width)
+        if not beyond:
+            return []
+        edges = " and ".join(f"{pixels} px at the {edge}" for edge, pixels in beyond.items())
+        return [
+            Finding(
+                kind="crop-cuts-motion", severity=Severity.WARNING, value=float(max(beyond.values())),
+                what=f"what moves reaches beyond the crop, by {edges}: a part of it is cut off",
+                fix=f"--crop {proposal.box} takes it whole",
+            )
+        ]  # fmt: skip
 
     def _check_exposure(self, where: str) -> None:
         """Refuse an exposure that no frame of this camera can have had: it ends before the next one begins.

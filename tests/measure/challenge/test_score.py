@@ -14,10 +14,11 @@ from measure.challenge import sheet as sheets
 from measure.challenge.classes import class_of, classes
 from measure.challenge.key import Key
 from measure.challenge.outcome import Outcome
-from measure.challenge.rates import Power, Share
+from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
 from measure.challenge.score import Sheet, graded
 from measure.loop.verdict import Conclusion, Verdict
+from measure.shares import Share
 from sim.effects import EFFECTS
 from tests.measure.challenge.cases import acting, candidate, comparison, estimate, filing, key, verdict
 

@@ -70,6 +70,33 @@ def test_an_unknown_size_widens_the_interval_of_the_wind(model: Estimator) -> No
     assert high > 0.17
 
 
+def test_an_area_weight_that_is_known_restricts_the_answer_to_it(model: Estimator) -> None:
+    film = even(4 * FRAMES)
+    free, known = measured(film, model), measured(film, model, area_weight=(0.12, 0.13))
+    density = known.quantities[1]
+    assert density.assumed == (0.12, 0.13)
+    assert 0.12 <= density.low < density.high <= 0.13
+    assert density.sigma < free.quantities[1].sigma / 2
+    assert known.options.recipe()["area_weight"] == [0.12, 0.13]
+    for window in known.windows:
+        assert 0.12 - 1e-6 <= window.quantity("density").low < window.quantity("density").high <= 0.13 + 1e-6
+
+
+def test_an_area_weight_is_that_of_the_flag_itself_whatever_its_size(model: Estimator) -> None:
+    # a flag twice as long with 0.24 to 0.26 kg/m² moves like one of the training with 0.12 to 0.13
+    film = even(6 * FRAMES)
+    large = measured(film, model, size=FlagSize(length=3.0, height=2.0), area_weight=(0.24, 0.26)).quantities[1]
+    assert large.assumed == (0.24, 0.26)
+    assert 0.24 <= large.low < large.high <= 0.26
+
+
+def test_an_area_weight_that_no_training_had_is_refused(model: Estimator) -> None:
+    with pytest.raises(UsageError, match=r"knows 0\.1 to 0\.17"):
+        measured(even(2 * FRAMES), model, area_weight=(0.15, 0.30))
+    with pytest.raises(UsageError, match=r"knows 0\.2 to 0\.34"):
+        measured(even(6 * FRAMES), model, size=FlagSize(length=3.0, height=2.0), area_weight=(0.12, 0.15))
+
+
 def test_windows_that_overlap_are_shown_and_not_counted_twice(model: Estimator) -> None:
     film = even(4 * FRAMES)
     apart, dense = (

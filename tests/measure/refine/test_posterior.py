@@ -19,7 +19,7 @@ NOISE = 0.4
 def _rows(space: Space, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Points of the prior and summaries of one clip of each."""
     points = space.prior(rng, count)
-    return points, regressors(space.reported(points)) @ SLOPES + rng.normal(0, NOISE, (count, 3))
+    return points, regressors(space.reported(points), space) @ SLOPES + rng.normal(0, NOISE, (count, 3))
 
 
 def test_with_many_evaluations_it_is_the_exact_posterior(recipe: Recipe) -> None:
@@ -27,10 +27,10 @@ def test_with_many_evaluations_it_is_the_exact_posterior(recipe: Recipe) -> None
     space, rng = Space.of(recipe), np.random.default_rng(0)
     points, summaries = _rows(space, rng, 4000)
     _, observed = _rows(space, rng, 1)
-    model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(4000))
+    model = Metamodel.fit(regressors(space.reported(points), space), summaries, np.arange(4000))
     found = posterior(space, [model], [observed[0]], seed=1)
     drawn = space.reported(space.prior(rng, 50_000))
-    weight = norm.logpdf(observed[0], regressors(drawn) @ SLOPES, NOISE).sum(axis=1)
+    weight = norm.logpdf(observed[0], regressors(drawn, space) @ SLOPES, NOISE).sum(axis=1)
     weight = np.exp(weight - weight.max())
     middle = weight @ drawn / weight.sum()
     spread = np.sqrt(weight @ np.square(drawn - middle) / weight.sum())
@@ -47,7 +47,7 @@ def test_intervals_cover_as_often_as_they_say_after_few_evaluations(recipe: Reci
     for trial in range(trials):
         truth, observed = _rows(space, rng, 1)
         points = np.repeat(space.prior(rng, 14), 2, axis=0)
-        known = regressors(space.reported(points))
+        known = regressors(space.reported(points), space)
         summaries = known @ SLOPES + rng.normal(0, NOISE, (28, 3))
         model = Metamodel.fit(known, summaries, np.repeat(np.arange(14), 2))
         found = posterior(space, [model], [observed[0]], seed=trial, cloths=300, winds=41, draws=1000)
@@ -61,11 +61,11 @@ def test_intervals_cover_as_often_as_they_say_after_few_evaluations(recipe: Reci
 def test_two_clips_of_one_cloth_tell_more_of_it_than_one(recipe: Recipe) -> None:
     space, rng = Space.of(recipe), np.random.default_rng(6)
     points, summaries = _rows(space, rng, 2000)
-    model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(2000))
+    model = Metamodel.fit(regressors(space.reported(points), space), summaries, np.arange(2000))
     truth = space.prior(rng, 1)
     several = np.repeat(truth, 8, axis=0)
     several[:, 16] = np.linspace(-0.7, 0.7, 8)
-    observed = regressors(space.reported(several)) @ SLOPES + rng.normal(0, NOISE, (8, 3))
+    observed = regressors(space.reported(several), space) @ SLOPES + rng.normal(0, NOISE, (8, 3))
     one = posterior(space, [model], [observed[0]], seed=2, cloths=1000, winds=61)
     all_ = posterior(space, [model] * 8, list(observed), seed=2, cloths=1000, winds=61)
     spread = [space.reported(found.points)[:, 1].std() for found in (one, all_)]
@@ -77,7 +77,7 @@ def test_two_clips_of_one_cloth_tell_more_of_it_than_one(recipe: Recipe) -> None
 def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
     space, rng = Space.of(recipe), np.random.default_rng(7)
     points, _ = _rows(space, rng, 2000)
-    model = Metamodel.fit(regressors(space.reported(points)), rng.normal(size=(2000, 2)), np.arange(2000))
+    model = Metamodel.fit(regressors(space.reported(points), space), rng.normal(size=(2000, 2)), np.arange(2000))
     found = posterior(space, [model], [np.zeros(2)], seed=3)
     told = space.reported(found.points)
     prior = space.reported(space.prior(rng, 4000))
@@ -88,7 +88,7 @@ def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
 def test_the_same_seed_gives_the_same_draws(recipe: Recipe) -> None:
     space, rng = Space.of(recipe), np.random.default_rng(8)
     points, summaries = _rows(space, rng, 100)
-    model = Metamodel.fit(regressors(space.reported(points)), summaries, np.arange(100))
+    model = Metamodel.fit(regressors(space.reported(points), space), summaries, np.arange(100))
     a, b, c = (posterior(space, [model], [summaries[0]], seed=seed, cloths=200, winds=21) for seed in (1, 1, 2))
     np.testing.assert_array_equal(a.points, b.points)
     assert not np.array_equal(a.points, c.points)

@@ -55,6 +55,24 @@ def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> Non
     assert (told["wind_speed"], told["density"]) == (pytest.approx(3.0), pytest.approx(0.12))
 
 
+def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() -> None:
+    space = Space.of(load("flag-fabrics"))
+    bending = named("camel-ponte-roma").bending.ravel()
+    low, high = space.values(np.array([[-1.0] * 17, [1.0] * 17]))
+    np.testing.assert_allclose(low, [*(bending * 0.125 * 0.1), 0.05, 0.0])
+    np.testing.assert_allclose(high, [*(bending * 4 * 10), 0.40, 10.0])
+    logs = np.log(space.values(space.prior(np.random.default_rng(1), 20_000))[:, :15] / bending)
+    # ln of a log-uniform factor from 0.125 to 4: variance (ln 32)²/12, shared by all coefficients
+    np.testing.assert_allclose(np.cov(logs[:, 0], logs[:, 1])[0, 1], np.log(32) ** 2 / 12, rtol=0.05)
+
+
+def test_draws_of_the_prior_lie_within_what_is_told_of_the_space() -> None:
+    space = Space.of(load("flag-fabrics"))
+    told = space.reported(space.prior(np.random.default_rng(2), 5_000))[:, :4]
+    for column, entry in zip(told.T, space.told, strict=True):
+        assert entry.low <= column.min() <= column.max() <= entry.high
+
+
 def test_points_outside_of_the_box_are_refused(recipe: Recipe) -> None:
     with pytest.raises(InputError, match="outside"):
         Space.of(recipe).values(np.full((1, 17), 1.2))

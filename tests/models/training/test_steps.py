@@ -53,7 +53,7 @@ def recipe(loss: Loss = Loss.POSTERIOR, **optimiser: object) -> TrainingRecipe:
     spec = OptimiserSpec(rate=5e-3, decay=1e-4, batch=8, epochs=4, schedule=Schedule.COSINE, patience=9)
     targets = () if loss is Loss.CONTRASTIVE else ("wind_speed",)
     return TrainingRecipe(
-        name="small", title="", seed=3, data=DataSpec(dataset="made"), front_end=FRONT_END,
+        name="small", title="", seed=3, data=DataSpec(datasets=("made",)), front_end=FRONT_END,
         cropping=Cropping(size=SIZE), variants=2,
         network=NetworkSpec(name="wave", options={"dimension": 4, "widths": (4, 4, 4)}),
         loss=LossSpec(name=loss, targets=targets, components=2), optimiser=replace(spec, **optimiser),  # pyright: ignore[reportArgumentType]

@@ -109,7 +109,12 @@ REFUSED = [
         {"content": stream(GOOD_WIND), "error": UsageError, "options": {"azimuth": 0.5}}, id="azimuth-of-a-boat"
     ),
     pytest.param(
-        {"content": stream(GOOD_WIND), "error": InputError, "says": "no valid MWV", "options": {"talker": "WI"}},
+        {
+            "content": stream(GOOD_WIND),
+            "error": InputError,
+            "says": "no valid sentence of wind",
+            "options": {"talker": "WI"},
+        },
         id="talker-absent",
     ),
 ]

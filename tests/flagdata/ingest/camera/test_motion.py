@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -13,7 +14,7 @@ import pytest
 from PIL import Image
 
 from flagdata.errors import RefusedError
-from flagdata.ingest.camera import CameraOptions, open_camera, propose_crop
+from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, parse_crop, propose_crop
 
 WIDE, HIGH = 384, 216
 
@@ -127,6 +128,35 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
     assert len(frames) == 100
     with open_camera(path, plain) as stream:
         assert stream.proposal is None
+
+
+@pytest.mark.parametrize(
+    ("crop", "edges"),
+    [
+        ("150,20,100,160", {"right": 30}),
+        ("230,90,150,100", {"left": 30, "top": 30}),
+        ("190,50,100,100", {}),
+        ("10,10,100,100", {}),
+    ],
+    ids=["tip", "corner", "whole flag", "elsewhere"],
+)
+def test_a_crop_that_cuts_through_what_moves_is_told_with_the_edges(
+    crop: str, edges: dict[str, int], film: Callable[..., Path], plain: CameraOptions
+) -> None:
+    """The flag is from 200 to 280 px across and from 60 to 140 px down; blur and compression widen it by a few."""
+    path = film("flag.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=60)
+    with open_camera(path, replace(plain, crop=parse_crop(crop))) as stream:
+        found = [finding for finding in stream.findings if finding.kind == "crop-cuts-motion"]
+        assert len(list(stream)) == 60
+    assert len(found) == bool(edges)
+    for finding in found:
+        told = {edge: int(pixels) for pixels, edge in re.findall(r"(\d+) px at the (\w+)", finding.what)}
+        assert told == {edge: pytest.approx(pixels, abs=8) for edge, pixels in edges.items()}
+        given = re.search(r"--crop (\S+)", finding.fix or "")
+        assert given is not None
+        box = parse_crop(given[1])
+        assert isinstance(box, CropBox)
+        assert covers(box.as_tuple(), (200, 60, 80))
 
 
 def test_a_single_frame_shows_no_motion(film: Callable[..., Path]) -> None:

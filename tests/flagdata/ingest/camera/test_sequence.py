@@ -110,7 +110,7 @@ def test_exif_turns_and_dates_a_photograph(
     for number in range(3):
         exif = Image.Exif()
         exif[0x0112] = 6  # the stored picture is to be turned 90° clockwise
-        exif.get_ifd(0x8769).update({0x9003: "2026:05:01 12:00:00", 0x9291: "250", 0x9011: "+02:00"})
+        exif[0x8769] = {0x9003: "2026:05:01 12:00:00", 0x9291: "250", 0x9011: "+02:00"}
         stored = np.rot90(numbered(number))
         Image.fromarray(np.ascontiguousarray(stored)).save(folder / f"p{number}.jpg", exif=exif, quality=95)
     info, frames, _ = read(folder, replace(options, start=None, sequence_fps=25.0))

@@ -1,0 +1,110 @@
+"""Lines that say what each number is, all in the same words, as programs print to a console.
+
+    12:00:01.007 -> Wind Speed: 3.21 m/s, Direction: 231
+     23:11:01:17:39:22.316 SN150 U -00.90 V -00.21 T  19.78 BATTV  4.16
+
+The words before a number name its column, those between it and the next name are its unit where they spell one. What
+the words mean, and what is missing, is told as of any table. Formats that know the lines themselves go first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.restated import rows_of, table
+from flagdata.ingest.anemometer.source import TableText, TextFile
+from flagdata.units import spelled
+
+_STAMP = re.compile(
+    r"[\s\[(\"]*(?P<stamp>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+    r"(?:\s?Z|[+-]\d{2}:?\d{2})?"
+    r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+    r"|(?P<parts>\d{2}:\d{2}:\d{2}):(?P<clock>\d{2}:\d{2}:\d{2}(?:\.\d+)?)"
+    r"|\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?|\d{10}(?:\.\d+)?|\d{13})(?![\d:])"
+)
+_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?!\d)")
+_UNIT = re.compile(r"\s?(?P<unit>[^\s\d,;:|=()\[\]]{1,10})")
+_WORDS = re.compile(r"[^\W\d_]")
+_SERIAL = re.compile(r"\d{3}")
+_MOST = 40
+"""Columns of the widest line that is looked at."""
+_SHARE = 0.8
+
+
+def matches(lines: Sequence[str]) -> bool:
+    """Most lines have the same words, some of them before numbers, and one of these is a wind."""
+    return _heading(lines) is not None
+
+
+def as_table(source: TextFile) -> TableText | None:
+    """The numbers below the words before them; `None` where another format knows the lines."""
+    from flagdata.ingest.anemometer.sniff import recognise  # it imports the module that asks for this one
+    from flagdata.ingest.anemometer.sniffing import SURE
+
+    heading = _heading(source.head())
+    if heading is None or any(guess.score >= SURE and not guess.doubts for guess in recognise(source)):
+        return None
+    words, names = heading
+
+    def row(line: str) -> list[str] | None:
+        cut = _cut(line)
+        return [cut[1], *cut[2]] if cut is not None and cut[0] == words else None
+
+    found, other = rows_of(source, row)
+    return table(
+        source, ["time", *names], found, kind="labelled-lines", what="lines that name each number",
+        left_out=other,
+    )  # fmt: skip
+
+
+def _heading(lines: Sequence[str]) -> tuple[tuple[str, ...], list[str]] | None:
+    """The words of most lines, and the names of their columns with units; `None` where they name no wind."""
+    filled = [line for line in lines if line.strip()]
+    cuts = [cut for line in filled if (cut := _cut(line)) is not None]
+    if len(cuts) < 3:
+        return None
+    words, count = Counter(cut[0] for cut in cuts).most_common(1)[0]
+    if count < _SHARE * len(filled):
+        return None
+    names: list[str] = []
+    label, unit = words[0], None
+    for text in words[1:]:
+        unit, following = _unit(text)
+        bare = " ".join(word for word in re.findall(r"[^\W_]+(?:[-/][^\W_]+)*", label) if not _SERIAL.search(word))
+        names.append(f"{bare} [{unit}]" if unit else bare)
+        label = following
+    if not any(_WORDS.search(name) for name in names):
+        return None
+    headings = [understand(name) for name in names]
+    winds = {heading.channel for heading in headings if heading.sure and "wind" in heading.channel}
+    spoken = winds & {"wind_speed", "apparent_wind_speed"} or {"wind_x", "wind_y"} <= winds
+    return (words, names) if spoken and len(set(names)) == len(names) else None
+
+
+def _unit(text: str) -> tuple[str | None, str]:
+    """The unit that a text between two numbers begins with, and the rest of it."""
+    found = _UNIT.match(text)
+    if found is None or spelled(found["unit"]) is None:
+        return None, text
+    return found["unit"], text[found.end() :]
+
+
+def _cut(line: str) -> tuple[tuple[str, ...], str, list[str]] | None:
+    """The texts around the numbers of a line, its stamp ("" where there is none) and the numbers."""
+    stamp = _STAMP.match(line)
+    rest = line[stamp.end() :] if stamp is not None else line
+    numbers = list(_NUMBER.finditer(rest))
+    if not 0 < len(numbers) <= _MOST:
+        return None
+    edges = [0, *(at for number in numbers for at in number.span()), len(rest)]
+    words = tuple(" ".join(rest[low:high].split()) for low, high in zip(edges[0::2], edges[1::2], strict=True))
+    if stamp is None:
+        when = ""
+    elif stamp["parts"]:
+        when = f"{stamp['parts'].replace(':', '-')} {stamp['clock']}"
+    else:
+        when = stamp["stamp"].replace(",", " ")
+    return words, when, [number[0] for number in numbers]

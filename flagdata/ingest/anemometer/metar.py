@@ -1,0 +1,63 @@
+"""METAR and SPECI reports, one in a line after the stamp of when it was of: archives of airports' weather.
+
+    202307010025 METAR EHAM 010025Z 23008KT 9999 FEW020 18/12 Q1013=
+    2023-07-01 00:25,EHAM,EHAM 010025Z VRB02KT CAVOK 18/12 Q1013
+
+Source: WMO, Manual on Codes (WMO-No. 306), FM 15: dddff(Gfmfm) with KT, MPS or KMH is the mean wind over ten minutes,
+its direction true and rounded to ten degrees, VRB for a variable one; 00000KT is calm; the group YYGGggZ is the day of
+the month and the time in UTC. The month is only in the stamp before the report, which must agree with that group.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+
+from flagdata.ingest.anemometer.restated import rows_of, table
+from flagdata.ingest.anemometer.source import TableText, TextFile
+
+_STAMP = re.compile(
+    r"\D*(?P<year>\d{4})[-/]?(?P<month>\d{2})[-/]?(?P<day>\d{2})[T ,]?(?P<hour>\d{2}):?(?P<minute>\d{2})"
+)
+_REPORT = re.compile(
+    r"\b(?P<station>[A-Z][A-Z0-9]{3})\s+(?P<day>\d{2})(?P<hour>\d{2})(?P<minute>\d{2})Z\s+(?:AUTO\s+|COR\s+)?"
+    r"(?P<dir>\d{3}|VRB|///)(?P<speed>P?\d{2,3}|//)(?:G(?P<gust>P?\d{2,3}))?(?P<unit>KT|MPS|KMH)\b"
+)
+_UNITS = {"KT": "kn", "MPS": "m/s", "KMH": "km/h"}
+
+
+def matches(lines: Sequence[str]) -> bool:
+    """Most lines are a stamp and a report whose day agrees, and no table already states the wind beside it."""
+    filled = [line for line in lines if line.strip()]
+    rows = [_row(line) for line in filled]
+    if sum(row is not None for row in rows) <= len(filled) / 2:
+        return False
+    heads = next(csv.reader(filled[:1]), [])
+    return not any(name.strip().lower() in ("sknt", "drct", "wind_speed", "speed", "wspd") for name in heads)
+
+
+def as_table(source: TextFile) -> TableText | None:
+    """The wind of each report."""
+    found, other = rows_of(source, _row)
+    units = {row[-1] for row in found}
+    unit = next(iter(units)) if len(units) == 1 else ""
+    names = ["time [UTC]", "station", f"wind speed [{unit}]", "wind direction [deg]", f"gust [{unit}]"]
+    if len(units) > 1:
+        names = ["time [UTC]", "station", "wind speed", "unit", "wind direction [deg]", "gust"]
+        found = [[*row[:3], row[5], *row[3:5]] for row in found]
+    else:
+        found = [row[:5] for row in found]
+    return table(source, names, found, kind="metar-reports", what="METAR reports", left_out=other)
+
+
+def _row(line: str) -> list[str] | None:
+    """Stamp, station, speed, direction, gust and unit of a line; `None` where it is no report of a known day."""
+    stamp, report = _STAMP.match(line), _REPORT.search(line)
+    if stamp is None or report is None or stamp["day"] != report["day"]:
+        return None
+    when = f"{stamp['year']}-{stamp['month']}-{stamp['day']}T{report['hour']}:{report['minute']}:00Z"
+    speed = "" if "/" in report["speed"] else report["speed"].lstrip("P")
+    away = report["dir"] if report["dir"].isdigit() and speed.strip("0") else ""
+    gust = (report["gust"] or "").lstrip("P")
+    return [when, report["station"], speed, away, gust, _UNITS[report["unit"]]]

@@ -1,0 +1,45 @@
+"""Shares with exact bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from scipy.stats import beta
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """How often something happened.
+
+    Attributes:
+        hits, count: in so many of so many.
+        low, high: Clopper–Pearson interval at `level`, each side (1 − level)/2.
+    """
+
+    hits: int
+    count: int
+    low: float
+    high: float
+    level: float
+
+    @property
+    def value(self) -> float | None:
+        """None of nothing."""
+        return self.hits / self.count if self.count else None
+
+    @classmethod
+    def of(cls, happened: Iterable[bool], *, level: float = 0.9) -> Share:
+        """From cases. The interval is that of Clopper and Pearson, Biometrika 26:404 (1934); 0 to 1 of no cases."""
+        cases = [bool(case) for case in happened]
+        hits, count, tail = sum(cases), len(cases), (1 - level) / 2
+        low = float(beta.ppf(tail, hits, count - hits + 1)) if hits else 0.0
+        high = float(beta.ppf(1 - tail, hits + 1, count - hits)) if hits < count else 1.0
+        return cls(hits=hits, count=count, low=low, high=high, level=level)
+
+    def as_dict(self) -> dict[str, float | int | None]:
+        """JSON values."""
+        return {
+            "value": self.value, "low": self.low, "high": self.high, "level": self.level, "hits": self.hits,
+            "count": self.count,
+        }  # fmt: skip

@@ -1,0 +1,44 @@
+"""Anchors that move one by one along tracks: a cloth held by hands or by a robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from flagdata.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AnchorTracks:
+    """Displacements of anchors, linear between samples and constant beyond them.
+
+    Attributes:
+        start: time of the first sample [s].
+        period: between samples [s].
+        samples: (n, held, 3, batch) [m], from where the system has the anchors.
+
+    Raises:
+        InputError: fewer than two samples, another shape, values that are not finite, a period that is not positive.
+    """
+
+    start: float
+    period: float
+    samples: Tensor
+
+    def __post_init__(self) -> None:
+        shape = tuple(self.samples.shape)
+        if len(shape) != 4 or shape[0] < 2 or shape[2] != 3 or not torch.isfinite(self.samples).all():
+            raise InputError(
+                f"tracks of anchors of shape {shape}, or not finite", where="anchors",
+                fix="give two or more samples, (n, held, 3, batch), in metres",
+            )  # fmt: skip
+        if not self.period > 0:
+            raise InputError(f"a period of {self.period!r} s", where="anchors", fix="give seconds between samples")
+
+    def displacement(self, time: float) -> Tensor:
+        """(held, 3, batch) [m] at a time [s]."""
+        place = min(max((time - self.start) / self.period, 0.0), float(len(self.samples) - 1))
+        index = min(int(place), len(self.samples) - 2)
+        return torch.lerp(self.samples[index], self.samples[index + 1], place - index)

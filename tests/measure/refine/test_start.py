@@ -1,0 +1,39 @@
+"""A refinement starts from what the network says of the clip and from what is known of the cloth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flagdata.rng import stream
+from flagdata.tables import Range
+from measure.refine import start
+from measure.refine.space import DENSITY, WIND, Space
+from models.estimator import Estimator
+from sim.run.recipe import Recipe
+
+
+def test_completed_points_have_the_wind_and_the_area_weight_that_were_told(recipe: Recipe) -> None:
+    space = Space.of(recipe)
+    told = np.array([[3.0, 0.12, -4.0, 0.1], [7.5, 0.165, -3.9, -0.2]])
+    values = space.values(start.completed(space, told, seed=0))
+    np.testing.assert_allclose(values[:, WIND], told[:, 0])
+    np.testing.assert_allclose(values[:, DENSITY], told[:, 1])
+
+
+def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimator: Estimator, recipe: Recipe) -> None:
+    known = replace(recipe, material=replace(recipe.material, density=Range(low=0.12, high=0.125)))
+    clip = stream(0, "clip").integers(0, 255, (8, 48, 48), dtype=np.uint8)
+    draws = start.amortised(estimator, clip, Space.of(known), seed=1, draws=200)
+    assert 0.12 <= draws[:, 1].min() <= draws[:, 1].max() <= 0.125 + 1e-6
+    free = start.amortised(estimator, clip, Space.of(recipe), seed=1, draws=200)
+    assert np.ptp(free[:, 1]) > 0.01
+
+
+def test_widening_by_one_changes_nothing(recipe: Recipe) -> None:
+    space = Space.of(recipe)
+    told = space.reported(space.prior(np.random.default_rng(3), 50))[:, :4]
+    told[:, :2] = np.clip(told[:, :2], [0.2, 0.101], [9.8, 0.169])
+    assert start.widened(told, 1.0, space) == pytest.approx(told)
