@@ -129,6 +129,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     tell("base model", 0, 1)
     setting, fits = _calibrated(setting, _fits(setting, found, projection, bank), bank)
     tell("base model", 1, 1)
+    reference = reference.at(setting.calibration)
     evidence = fits.whitened.evidence(fits.whitened.found)
     judgement, refits = judge(evidence, reference, level=options.level), dict[int, Refit | None]()
     if judgement.conclusion not in (Conclusion.SUFFICIENT, Conclusion.UNTESTED):

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.loop.columns import PRIOR, THETA
+from measure.loop.columns import PRIOR, THETA, Calibration
 from measure.loop.course import Course
+from measure.loop.growth import power
 from measure.loop.statistics import Statistics
 from measure.loop.wind_log import by_recording
 
@@ -39,11 +40,13 @@ class Design:
         noise: of a marker's coordinate [m].
         period: between the frames that are used [s].
         cloth: `Material.fingerprint` of the nominal one.
+        damping: of the base model that the statistics are taken at [s].
     """
 
     noise: float
     period: float
     cloth: str
+    damping: float = Calibration().damping
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,8 +70,13 @@ class NullModel:
 
     @classmethod
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
-        """From segments whose calibrations are known, for segments of a design."""
-        clean = nulls.statistics.r
+        """From segments whose calibrations are known, for segments of a design.
+
+        What numerics leave is smoother the more the cloth is damped, so that more of it lies along the columns: all
+        of it is taken to be larger by a power of the damping.
+        """
+        grown = _power_of_damping(nulls)
+        clean = nulls.statistics.r * np.exp(-grown * nulls.calibration[:, _DAMPING])[:, None]
         features = np.c_[_features(nulls.speeds), nulls.beyond(design)]
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
         left = clean - features @ coefficients
@@ -83,9 +91,10 @@ class NullModel:
         if design.cloth in by_cloth:
             coefficients[0] += by_cloth[design.cloth]
             means = means - np.stack([by_cloth[cloth] for cloth in nulls.cloth[first]])
-        turning = nulls.statistics.turning
+        turning, size = nulls.statistics.turning, (design.damping / Calibration().damping) ** grown
         return cls(
-            coefficients=coefficients[:_POWERS], covariance=covariance, shifts=_principal(means, covariance),
+            coefficients=size * coefficients[:_POWERS], covariance=size**2 * covariance,
+            shifts=size * _principal(means, covariance),
             turning=None if turning is None else cls.fit(replace(nulls, statistics=turning), design),
         )  # fmt: skip
 
@@ -154,13 +163,31 @@ class Nulls:
 
     @property
     def design(self) -> Design:
-        """Of the first segment: that of all, where they are of one kind."""
-        return Design(noise=float(self.noise[0]), period=float(self.period[0]), cloth=str(self.cloth[0]))
+        """Of the first segment: that of all, where they are of one experiment."""
+        damping = Calibration().moved((0.0, 0.0, float(self.calibration[0, _DAMPING]))).damping
+        return Design(
+            noise=float(self.noise[0]), period=float(self.period[0]), cloth=str(self.cloth[0]), damping=damping
+        )
 
 
 _POWERS = 3
 _UNSEEN = 1e-9
 """Share of the mean variance that a column has of which nothing is seen, as of an effect without a moment."""
+
+
+_DAMPING = [name for name, *_ in THETA].index("damping")
+
+
+def _power_of_damping(nulls: Nulls) -> float:
+    """By which power of the damping r grows, about the mean of its experiment and in units of all."""
+    _, first, experiment = np.unique(nulls.experiment, return_index=True, return_inverse=True)
+    clean, features = nulls.statistics.r, _features(nulls.speeds)
+    left = clean - features @ np.linalg.lstsq(features, clean, rcond=None)[0]
+    means = np.stack([left[experiment == index].mean(axis=0) for index in range(len(first))])
+    squared = (left - means[experiment]) ** 2
+    whole = np.maximum(squared.mean(axis=0), np.finfo(np.float64).tiny)
+    sizes = np.array([(squared[experiment == index].mean(axis=0) / whole).mean() for index in range(len(first))])
+    return power(np.sqrt(sizes), nulls.calibration[first, _DAMPING])
 
 
 def _features(speeds: Floats) -> Floats:

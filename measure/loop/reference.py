@@ -12,27 +12,29 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
-from measure.loop.columns import THETA
+from measure.loop.columns import THETA, Calibration
 from measure.loop.conformal import GroupedConformal, kinds_needed
 from measure.loop.criteria import CRITERIA
 from measure.loop.fluctuation import fluctuation
+from measure.loop.growth import power
 from measure.loop.inference import Design, Evidence, NullModel, Nulls
 from measure.loop.lines import Line, Lines, strongest
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
+_DAMPING = [name for name, *_ in THETA].index("damping")
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LeftOutKind:
-    """Null experiments of one kind of numerics, and a null model that has not seen it.
+class LeftOut:
+    """A null experiment, and a null model that has not seen its kind of numerics.
 
     Attributes:
-        model: learnt from all other kinds.
-        outside: the nulls of this kind.
-        groups: places among them, of one experiment each.
+        model: learnt from all other kinds, for its design.
+        outside: the nulls of this experiment.
+        groups: places among them.
     """
 
     model: NullModel
@@ -40,8 +42,8 @@ class LeftOutKind:
     groups: tuple[NDArray[np.int64], ...]
 
 
-def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOutKind]:
-    """Groups like data, of each kind in turn: so many segments of recordings of one experiment.
+def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOut]:
+    """Groups like data, of each experiment in turn: so many segments of its recordings.
 
     Args:
         nulls: what the null models learn from.
@@ -52,24 +54,21 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
     """
     rng = stream(seed, "null", "groups")
     each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
-    for kind in np.unique(pool.numerics):
-        outside = pool.select(pool.numerics == kind)
+    for index in range(pool.experiment.max() + 1):
+        outside = pool.select(pool.experiment == index)
         recording = outside.statistics.recording
+        places = [np.flatnonzero(recording == r) for r in np.unique(recording)]
         groups: list[NDArray[np.int64]] = []
-        for index in range(outside.experiment.max() + 1):
-            places = [np.flatnonzero(recording == r) for r in np.unique(recording[outside.experiment == index])]
-            for _ in range(each):
-                chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
-                if len(chosen) < segments:
-                    raise InputError(
-                        f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
-                        fix="simulate longer nulls, or give shorter recordings",
-                    )  # fmt: skip
-                groups.append(chosen)
-        yield LeftOutKind(
-            model=NullModel.fit(nulls.select(nulls.numerics != kind), outside.design), outside=outside,
-            groups=tuple(groups),
-        )  # fmt: skip
+        for _ in range(each):
+            chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
+            if len(chosen) < segments:
+                raise InputError(
+                    f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
+                    fix="simulate longer nulls, or give shorter recordings",
+                )  # fmt: skip
+            groups.append(chosen)
+        others = nulls.select(nulls.numerics != outside.numerics[0])
+        yield LeftOut(model=NullModel.fit(others, outside.design), outside=outside, groups=tuple(groups))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,6 +142,7 @@ class _Groups:
     noises: list[float] = field(default_factory=list)
     kinds: list[int] = field(default_factory=list)
     deviations: list[Floats] = field(default_factory=list)
+    damping: list[float] = field(default_factory=list)
 
     def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int, nominal: Floats) -> None:
         """Of a group whose statistics are at its true calibration, the nominal one so many steps away."""
@@ -154,28 +154,37 @@ class _Groups:
             self.lines.append(strongest(evidence.lines))
         self.noises.append(noise)
         self.kinds.append(kind)
+        self.damping.append(-float(nominal[_DAMPING]))
         self.deviations.append(evidence.fit((), centre=nominal).in_errors(range(len(THETA))))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Found:
     """Statistics of null groups: (group, column) shares, (group,) what is left, (group, part) swings of the wind's
-    course, of no part where it is not looked at, (group, shape · axis) lines."""
+    course, of no part where it is not looked at, (group, shape · axis) lines, (group,) logarithms of the damping over
+    the nominal."""
 
     shares: Floats
     left: Floats
     swings: Floats
     lines: Floats | None
+    damping: Floats
 
     @classmethod
     def of(cls, groups: _Groups) -> _Found:
         lines = np.array(groups.lines) if groups.lines else None
         swings = np.array(groups.swings).reshape(len(groups.left), -1)
-        return cls(shares=np.array(groups.shares), left=np.array(groups.left), swings=swings, lines=lines)
+        return cls(
+            shares=np.array(groups.shares), left=np.array(groups.left), swings=swings, lines=lines,
+            damping=np.array(groups.damping),
+        )  # fmt: skip
 
     def select(self, chosen: NDArray[np.bool_]) -> _Found:
         lines = None if self.lines is None else self.lines[chosen]
-        return _Found(shares=self.shares[chosen], left=self.left[chosen], swings=self.swings[chosen], lines=lines)
+        return _Found(
+            shares=self.shares[chosen], left=self.left[chosen], swings=self.swings[chosen], lines=lines,
+            damping=self.damping[chosen],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -186,26 +195,29 @@ class _Usual:
     centre: Floats
     width: Floats
     lines: Lines | None
+    powers: Floats
 
     @classmethod
     def of(cls, found: _Found) -> _Usual:
         lines = None if found.lines is None else Lines.of(found.lines)
-        roots = _roots(found, lines)
+        powers = np.array([power(np.abs(own), found.damping) for own in found.swings.T])
+        roots = _roots(found, lines, powers)
         return cls(
-            spread=np.maximum(found.shares.mean(axis=0), _NOTHING), centre=roots.mean(axis=0),
+            powers=powers, spread=np.maximum(found.shares.mean(axis=0), _NOTHING), centre=roots.mean(axis=0),
             width=np.maximum(roots.std(axis=0), np.cbrt(_NOTHING)), lines=lines,
         )  # fmt: skip
 
     def far(self, found: _Found) -> Floats:
         """(group, column + 1 to 5) how far groups are from their mean, in their standard deviations."""
-        far = (_roots(found, self.lines) - self.centre) / self.width
+        far = (_roots(found, self.lines, self.powers) - self.centre) / self.width
         swings = slice(found.shares.shape[1] + 1, found.shares.shape[1] + 1 + found.swings.shape[1])
         far[:, swings] = np.abs(far[:, swings])
         return far
 
 
-def _roots(found: _Found, lines: Lines | None) -> Floats:
-    roots = np.c_[np.cbrt(np.c_[found.shares, found.left]), found.swings]
+def _roots(found: _Found, lines: Lines | None, powers: Floats) -> Floats:
+    swings = found.swings * np.exp(-np.outer(found.damping, powers))
+    roots = np.c_[np.cbrt(np.c_[found.shares, found.left]), swings]
     return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
 
 
@@ -222,8 +234,9 @@ class Reference:
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
     nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
-    So they do how the wind's course swings, as it is: a covariance, of which nulls have what chance and their numerics
-    leave, on either side of nothing, and both sides are far. Evidence whose moments or course are not to count goes
+    So they do how the wind's course swings: a covariance, of which nulls have what chance and their numerics leave, on
+    either side of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
+    `growth`). Evidence whose moments or course are not to count goes
     without them.
 
     What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
@@ -240,6 +253,8 @@ class Reference:
             standard errors as Σ has them.
         centre, width: (column + 1 to 5,) mean and standard deviation of the same, of nulls as noisy as the data.
         lines: of the nulls; None where spectra are not looked at.
+        powers: (part,) of the damping by which swings grow.
+        damping: of the data, the logarithm of its ratio to the nominal one.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
     """
 
@@ -251,6 +266,8 @@ class Reference:
     centre: Floats
     width: Floats
     lines: Lines | None = None
+    powers: Floats = field(default_factory=lambda: np.zeros(0))
+    damping: float = 0.0
     beside_gusts: Reference | None = None
 
     @classmethod
@@ -279,8 +296,13 @@ class Reference:
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
         return cls(
             scaled=scaled, spread=usual.spread, far=far, kinds=kinds, deviations=np.array(groups.deviations),
-            centre=usual.centre, width=usual.width, lines=usual.lines, beside_gusts=beside_gusts,
+            centre=usual.centre, width=usual.width, lines=usual.lines, powers=usual.powers,
+            beside_gusts=beside_gusts,
         )  # fmt: skip
+
+    def at(self, calibration: Calibration) -> Reference:
+        """For data whose statistics are taken at a calibration."""
+        return replace(self, damping=calibration.steps_from(Calibration())[_DAMPING])
 
     def beside(self) -> Reference:
         """That of evidence with a pressure that is free in every segment.
@@ -345,7 +367,8 @@ class Reference:
         own = slice(len(self.spread) + 1, len(self.centre) - (self.lines is not None))
         if len(self.centre[own]) != len(found):
             raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
-        return float(np.abs((found - self.centre[own]) / self.width[own]).max())
+        alike = found * np.exp(-self.damping * self.powers)
+        return float(np.abs((alike - self.centre[own]) / self.width[own]).max())
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.

@@ -51,7 +51,7 @@ class Setting:
         """Its markers are as noisy as in the noisiest recording."""
         return Design(
             noise=float(self.segments.noise.max()), period=self.segments.period,
-            cloth=self.experiment.specimen.material.fingerprint,
+            cloth=self.experiment.specimen.material.fingerprint, damping=self.calibration.damping,
         )  # fmt: skip
 
     def moved(self, lags: Sequence[float]) -> Setting:

@@ -334,3 +334,23 @@ def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
 
 def test_nulls_fluctuate_little(world: World, null: NullModel) -> None:
     assert np.median([fluctuation(world.data(null, effect(0.0)), 5).deviation for _ in range(40)]) < 0.1
+
+
+def test_what_numerics_leave_is_that_of_the_damping_of_the_data(world: World) -> None:
+    """Where all of r is 1.5 times larger for each factor of e in the damping, so are the mean, the shifts and Σ of a
+    design's null model."""
+    nulls = world.nulls()
+    rng = np.random.default_rng(5)
+    damping = rng.uniform(-1.5, 2.5, nulls.experiment.max() + 1)[nulls.experiment]
+    calibration = nulls.calibration.copy()
+    calibration[:, 2] = damping
+    larger = nulls.statistics.r * np.exp(np.log(1.5) * damping)[:, None]
+    seen = replace(nulls, statistics=replace(nulls.statistics, r=larger), calibration=calibration)
+    speeds = np.array([3.0, 5.0, 8.0])
+    plain = NullModel.fit(nulls, nulls.design)
+    for step in (-1.0, 0.0, 2.0):
+        own = NullModel.fit(seen, replace(nulls.design, damping=2.5e-3 * np.exp(step)))
+        ratio = np.sqrt(np.diag(own.covariance) / np.diag(plain.covariance))
+        np.testing.assert_allclose(ratio, 1.5**step, rtol=0.15)
+        np.testing.assert_allclose(np.linalg.norm(own.shifts[0]) / np.linalg.norm(plain.shifts[0]), 1.5**step, rtol=0.2)
+        np.testing.assert_allclose(own.mean(speeds), 1.5**step * plain.mean(speeds), rtol=0.2, atol=0.6 * 1.5**step)
