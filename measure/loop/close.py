@@ -38,7 +38,7 @@ from measure.loop.course import ALONG
 from measure.loop.criteria import CRITERIA
 from measure.loop.field import corrective_field
 from measure.loop.floor import numerical_floor
-from measure.loop.inference import Evidence
+from measure.loop.inference import Evidence, Fit
 from measure.loop.reference import NullBank, Reference
 from measure.loop.refine import Refined, cut
 from measure.loop.refit import Fits, Refit, refit
@@ -211,16 +211,25 @@ def _fits(setting: Setting, found: Statistics, projection: Projection, bank: Nul
 
 
 def _calibrated(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
-    """Statistics at the base model that all directions lead to, taken anew until a step is within its errors."""
+    """Statistics at the base model that all directions lead to, taken anew until a step is within its errors, or leaves
+    more than there was before it: beyond that, directions follow what numerics do."""
     for _ in range(_LOOKS):
-        whitened = fits.whitened
-        fit = whitened.evidence(whitened.found).fit((), centre=Calibration().steps_from(setting.calibration))
+        fit = _base_fit(setting, fits)
         step, errors = np.array([fit.of(place) for place in range(len(THETA))]).T
         if (np.abs(step) < errors).all():
             break
-        setting = replace(setting, calibration=setting.calibration.moved(cut(step)))
-        fits = _fits(setting, *_looked_at(setting), bank)
+        moved = replace(setting, calibration=setting.calibration.moved(cut(step)))
+        there = _fits(moved, *_looked_at(moved), bank)
+        if _base_fit(moved, there).left > fit.left:
+            break
+        setting, fits = moved, there
     return setting, fits
+
+
+def _base_fit(setting: Setting, fits: Fits) -> Fit:
+    """The base model, linear where statistics were taken."""
+    evidence = fits.whitened.evidence(fits.whitened.found)
+    return evidence.fit((), centre=Calibration().steps_from(setting.calibration))
 
 
 def _bank(setting: Setting, options: Options, tell: Stage) -> NullBank:

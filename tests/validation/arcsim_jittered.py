@@ -8,6 +8,7 @@ once more by one that was drawn anew: verdicts that differ between the two depen
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,6 +31,8 @@ from tests.validation.flags_runs import CAMEL
 WINDS = (3, 5, 7)
 DRAWS = (1, 2)
 _UNIT = 1e-4  # m, of the stored positions
+_SHOWN = 7
+"""Candidates that are told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,21 +57,29 @@ CASES = {
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Verdicts; what is missing where the reference runs are."""
+    """Verdicts; what is missing where the reference runs are. Nulls and verdicts of a draw stay in `out`, so that a run
+    that was stopped goes on where it was."""
     runs = folder()
     if runs is None or not (runs / "jittered").is_dir():
         return {"missing": "no ArcSim runs in the reference data (set FLAGDATA_REFERENCE)"}
     experiments = {name: _experiment(runs / "jittered", name) for name in CASES}
     told: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
     for draw in DRAWS:
-        nulls = out / f"arcsim-jittered-nulls-{seed}-{draw}"
+        place = out / f"arcsim-jittered-{seed}-{draw}"
         wanted = batches(Setting.of(experiments["null"]), kinds=CRITERIA.simulated_kinds, seed=100 * seed + draw)
-        banks.build(nulls, wanted, workers=len(os.sched_getaffinity(0)))
-        told[f"draw {draw}"] = {
-            name: _told(close_loop(own, Options(bank=nulls, seed=seed)), CASES[name])
-            for name, own in experiments.items()
-        }
+        banks.build(place / "nulls", wanted, workers=len(os.sched_getaffinity(0)))
+        told[f"draw {draw}"] = {name: _once(place, name, own, seed) for name, own in experiments.items()}
+    (out / "validate-arcsim-jittered.md").write_text(_page(told), encoding="utf-8")
     return told
+
+
+def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str, Any]:
+    """A verdict as it is told, from its file where it was made before."""
+    kept = place / f"{name}.json"
+    if not kept.exists():
+        told = _told(close_loop(experiment, Options(bank=place / "nulls", seed=seed)), CASES[name])
+        kept.write_text(json.dumps(told, allow_nan=False), encoding="utf-8")
+    return json.loads(kept.read_text(encoding="utf-8"))
 
 
 def _experiment(runs: Path, name: str) -> Experiment:
@@ -91,14 +102,27 @@ def _told(verdict: Verdict, truth: Truth) -> dict[str, Any]:
     return {
         "said": verdict.conclusion.value, "named": list(verdict.named), "right": _right(verdict, truth),
         "p": verdict.test.p_value.value, "p low": verdict.test.p_value.low, "p high": verdict.test.p_value.high,
-        "statistic": verdict.test.statistic, "kinds": verdict.test.kinds,
+        "statistic": verdict.test.statistic, "critical": verdict.test.critical, "kinds": verdict.test.kinds,
         "parameters": {name: _interval(own, wanted[name]) for name, own in shown.items()},
-        "strengths": {c.effect: [c.strength.low, c.strength.value, c.strength.high] for c in verdict.ranking[:3]},
+        "candidates": [
+            {
+                "effect": c.effect, "low": c.strength.low, "value": c.strength.value, "high": c.strength.high,
+                "gain": c.gain, "behind": c.behind, "leftover": c.leftover, "heterogeneity": c.heterogeneity,
+                "why not": c.why_not,
+            }
+            for c in verdict.ranking[:_SHOWN]
+        ],
+        "unseen": [
+            {"what": c.what, "before": c.before.value, "after": c.after.value, "floor": c.floor.value}
+            for c in verdict.comparisons
+        ],
         "words": verdict.words, "seconds": round(verdict.seconds),
     }  # fmt: skip
 
 
 def _right(verdict: Verdict, truth: Truth) -> bool:
+    """Whether it names what acted, alone or as one of several, or nothing where nothing did. A parameter of the base
+    model that is not the nominal cloth's is no effect."""
     if not truth.effect:
         return verdict.conclusion is Conclusion.SUFFICIENT
     return verdict.conclusion in (Conclusion.EFFECT, Conclusion.ONE_OF) and truth.effect in verdict.named
@@ -106,3 +130,34 @@ def _right(verdict: Verdict, truth: Truth) -> bool:
 
 def _interval(found: Estimate, true: float) -> dict[str, Any]:
     return {"low": found.low, "value": found.value, "high": found.high, "covers": found.low <= true <= found.high}
+
+
+def _page(told: Mapping[str, Any]) -> str:
+    """The verdicts as a page."""
+    lines = ["# The loop on four experiments of ArcSim", ""]
+    for draw in DRAWS:
+        lines += [
+            f"## Nulls drawn {'once' if draw == 1 else 'anew'}", "",
+            "| what acted | verdict | p | density, of nominal | bending, of nominal | damping [ms] | right | s |",
+            "|---|---|---|---|---|---|---|---|",
+        ]  # fmt: skip
+        for name, own in told[f"draw {draw}"].items():
+            found = own["parameters"]
+            lines.append(
+                f"| {name} | {own['said']}{': ' * bool(own['named'])}{', '.join(own['named'])} | {own['p']:.3f} "
+                f"[{own['p low']:.3f}, {own['p high']:.3f}] | {_span(found['density'])} | {_span(found['bending'])} | "
+                f"{_span(found['damping'], 1e3)} | {'yes' if own['right'] else 'no'} | {own['seconds']} |"
+            )
+        lines += ["", "| what acted | unseen | before [mm] | after [mm] | floor [mm] |", "|---|---|---|---|---|"]
+        lines += [
+            f"| {name} | {c['what']} | {1e3 * c['before']:.1f} | {1e3 * c['after']:.1f} | {1e3 * c['floor']:.1f} |"
+            for name, own in told[f"draw {draw}"].items()
+            for c in own["unseen"]
+        ]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _span(found: Mapping[str, Any], unit: float = 1.0) -> str:
+    told = f"{unit * found['value']:.3g} [{unit * found['low']:.3g}, {unit * found['high']:.3g}]"
+    return told if found["covers"] else f"{told}, misses"
