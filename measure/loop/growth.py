@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-_FEWEST = 3
 
 
 def power(sizes: Floats, damping: Floats) -> float:
@@ -24,7 +23,7 @@ def power(sizes: Floats, damping: Floats) -> float:
     """
     about = damping - damping.mean()
     spread = float(about @ about)
-    if len(sizes) < _FEWEST or spread < np.finfo(np.float64).eps:
+    if len(sizes) <= 2 or spread < np.finfo(np.float64).eps:
         return 0.0
     size = np.log(np.maximum(sizes, np.finfo(np.float64).tiny))
     slope = float(about @ size) / spread

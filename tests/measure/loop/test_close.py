@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import numpy as np
 import pytest
@@ -13,10 +14,11 @@ from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
 from measure.loop import bank as banks
+from measure.loop import close
 from measure.loop.close import Options, close_loop
 from measure.loop.columns import Calibration, fields
 from measure.loop.field import corrective_field
-from measure.loop.inference import Design
+from measure.loop.inference import Design, Fit
 from measure.loop.nulls import NullBatch
 from measure.loop.setting import Setting
 from measure.loop.statistics import projected
@@ -85,7 +87,10 @@ def lifted(specimen: Specimen, bank: Path) -> Verdict:
 
 def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, bank: Path) -> None:
     nulls = banks.load(bank, words="made").nulls
-    assert nulls.design == Design(noise=NOISE, period=0.04, cloth=specimen.material.fingerprint)
+    first = batches(specimen)[0].calibrations[0].damping
+    assert nulls.design.damping == pytest.approx(first, rel=1e-12)
+    known = replace(nulls.design, damping=first)
+    assert known == Design(noise=NOISE, period=0.04, cloth=specimen.material.fingerprint, damping=first)
     for kind, batch in enumerate(batches(specimen)):
         own = nulls.select(nulls.numerics == kind)
         recording = own.statistics.recording - own.statistics.recording.min()
@@ -185,3 +190,32 @@ def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen,
 def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(UsageError):
         Options(**wrong)  # pyright: ignore[reportArgumentType]
+
+
+@dataclass(frozen=True)
+class At:
+    """What of a setting the looks for the base model need."""
+
+    calibration: Calibration = field(default_factory=Calibration)
+
+
+@pytest.mark.parametrize(
+    ("left", "looks"), [((9.0, 5.0, 4.0, 3.0, 2.0, 1.0), 5), ((9.0, 5.0, 6.0), 2), ((9.0, 9.5), 1)]
+)
+def test_the_base_model_is_led_on_only_to_where_less_is_left(
+    monkeypatch: pytest.MonkeyPatch, left: tuple[float, ...], looks: int
+) -> None:
+    """Each step doubles the bending. The first look is that of the nominal cloth, at most four follow."""
+
+    def fitted(setting: At, fits: object) -> Fit:
+        place = round(math.log2(setting.calibration.bending))
+        return Fit(
+            active=(0, 1, 2), value=np.array([0.0, math.log(2), 0.0]), covariance=1e-2 * np.eye(3), left=left[place]
+        )
+
+    monkeypatch.setattr(close, "_looked_at", lambda setting: ())
+    monkeypatch.setattr(close, "_fits", lambda setting, bank: setting)
+    monkeypatch.setattr(close, "_base_fit", fitted)
+    ended, fits = close._calibrated(*cast(Any, (At(), At(), None)))  # pyright: ignore[reportPrivateUsage]
+    assert ended.calibration.bending == pytest.approx(2.0 ** (looks - 1))
+    assert fits is ended or looks == 1
