@@ -440,3 +440,11 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
             fit = inside.fit(chosen)
             result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
     return result
+
+
+def best_gain(evidence: Evidence, beside: Chosen = ()) -> float:
+    """The largest held-out gain that one more column brings, over that of some columns alone: by how much the model
+    that they make is predicted worse than another."""
+    others = [column for column in range(len(THETA), evidence.columns) if column not in beside]
+    found = gains(evidence, [beside, *([*beside, column] for column in others)]).sum(axis=1)
+    return float((found[1:] - found[0]).max())

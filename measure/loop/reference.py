@@ -17,7 +17,7 @@ from measure.loop.conformal import GroupedConformal, kinds_needed
 from measure.loop.criteria import CRITERIA
 from measure.loop.fluctuation import fluctuation
 from measure.loop.growth import power
-from measure.loop.inference import Design, Evidence, NullModel, Nulls
+from measure.loop.inference import Design, Evidence, NullModel, Nulls, best_gain
 from measure.loop.lines import Line, Lines, strongest
 
 Floats = NDArray[np.float64]
@@ -137,6 +137,7 @@ class _Groups:
 
     shares: list[Floats] = field(default_factory=list)
     left: list[float] = field(default_factory=list)
+    gained: list[float] = field(default_factory=list)
     swings: list[Floats] = field(default_factory=list)
     lines: list[Floats] = field(default_factory=list)
     noises: list[float] = field(default_factory=list)
@@ -148,6 +149,7 @@ class _Groups:
         """Of a group whose statistics are at its true calibration, the nominal one so many steps away."""
         self.shares.append(unscaled(evidence, columns))
         self.left.append(evidence.fit(()).left)
+        self.gained.append(best_gain(evidence))
         if evidence.swing is not None:
             self.swings.append(evidence.swing)
         if evidence.lines is not None:
@@ -160,12 +162,14 @@ class _Groups:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Found:
-    """Statistics of null groups: (group, column) shares, (group,) what is left, (group, part) swings of the wind's
+    """Statistics of null groups: (group, column) shares, (group,) what is left, (group,) best held-out gains, (group,
+    part) swings of the wind's
     course, of no part where it is not looked at, (group, shape · axis) lines, (group,) logarithms of the damping over
     the nominal."""
 
     shares: Floats
     left: Floats
+    gained: Floats
     swings: Floats
     lines: Floats | None
     damping: Floats
@@ -175,15 +179,15 @@ class _Found:
         lines = np.array(groups.lines) if groups.lines else None
         swings = np.array(groups.swings).reshape(len(groups.left), -1)
         return cls(
-            shares=np.array(groups.shares), left=np.array(groups.left), swings=swings, lines=lines,
-            damping=np.array(groups.damping),
+            shares=np.array(groups.shares), left=np.array(groups.left), gained=np.array(groups.gained), swings=swings,
+            lines=lines, damping=np.array(groups.damping),
         )  # fmt: skip
 
     def select(self, chosen: NDArray[np.bool_]) -> _Found:
         lines = None if self.lines is None else self.lines[chosen]
         return _Found(
-            shares=self.shares[chosen], left=self.left[chosen], swings=self.swings[chosen], lines=lines,
-            damping=self.damping[chosen],
+            shares=self.shares[chosen], left=self.left[chosen], gained=self.gained[chosen],
+            swings=self.swings[chosen], lines=lines, damping=self.damping[chosen],
         )  # fmt: skip
 
 
@@ -208,16 +212,16 @@ class _Usual:
         )  # fmt: skip
 
     def far(self, found: _Found) -> Floats:
-        """(group, column + 1 to 5) how far groups are from their mean, in their standard deviations."""
+        """(group, column + 2 to 6) how far groups are from their mean, in their standard deviations."""
         far = (_roots(found, self.lines, self.powers) - self.centre) / self.width
-        swings = slice(found.shares.shape[1] + 1, found.shares.shape[1] + 1 + found.swings.shape[1])
+        swings = slice(found.shares.shape[1] + 2, found.shares.shape[1] + 2 + found.swings.shape[1])
         far[:, swings] = np.abs(far[:, swings])
         return far
 
 
 def _roots(found: _Found, lines: Lines | None, powers: Floats) -> Floats:
     swings = found.swings * np.exp(-np.outer(found.damping, powers))
-    roots = np.c_[np.cbrt(np.c_[found.shares, found.left]), swings]
+    roots = np.c_[np.cbrt(np.c_[found.shares, found.left]), found.gained, swings]
     return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
 
 
@@ -234,6 +238,8 @@ class Reference:
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
     nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
+    What the calibrated parameters and the directions of the numerics take in of an effect shows on winds that they were
+    not fitted to: so they weigh the best held-out gain as well, in its own unit.
     So they do how the wind's course swings: a covariance, of which nulls have what chance and their numerics leave, on
     either side of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
     `growth`). Evidence whose moments or course are not to count goes
@@ -245,13 +251,13 @@ class Reference:
     Attributes:
         scaled: (group, column) of `unscaled`: columns, gusts, then moments.
         spread: (column,) mean share of nulls as noisy as the data.
-        far: (group, column + 1 to 5) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
-            standard deviations; after the columns that of what the base model leaves, then swings and the line as they
-            are.
+        far: (group, column + 2 to 6) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
+            standard deviations; after the columns that of what the base model leaves, then the best held-out gain,
+            swings and the line as they are.
         kinds: (group,) of numerics.
         deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
             standard errors as Σ has them.
-        centre, width: (column + 1 to 5,) mean and standard deviation of the same, of nulls as noisy as the data.
+        centre, width: (column + 2 to 6,) mean and standard deviation of the same, of nulls as noisy as the data.
         lines: of the nulls; None where spectra are not looked at.
         powers: (part,) of the damping by which swings grow.
         damping: of the data, the logarithm of its ratio to the nominal one.
@@ -352,8 +358,10 @@ class Reference:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
         shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
         far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
+        place = len(self.spread) + 1
+        gained = (best_gain(evidence, chosen) - float(self.centre[place])) / float(self.width[place])
         swing, line = self.swing(evidence), self.line(evidence)
-        return max([far, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
+        return max([far, gained, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
 
     def swing(self, evidence: Evidence) -> float | None:
         """How far the wind's course of data swings, by the part that does most; None where it is not looked at.
@@ -364,7 +372,7 @@ class Reference:
         found = evidence.swing
         if found is None:
             return None
-        own = slice(len(self.spread) + 1, len(self.centre) - (self.lines is not None))
+        own = slice(len(self.spread) + 2, len(self.centre) - (self.lines is not None))
         if len(self.centre[own]) != len(found):
             raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
         alike = found * np.exp(-self.damping * self.powers)

@@ -12,7 +12,7 @@ from scipy.stats import chi2, kstest, uniform
 from flagdata.errors import InputError, UsageError
 from measure.loop.columns import PRIOR, THETA
 from measure.loop.fluctuation import fluctuation
-from measure.loop.inference import Design, Evidence, NullModel, Nulls, gains
+from measure.loop.inference import Design, Evidence, NullModel, Nulls, best_gain, gains
 from measure.loop.reference import GUSTS, NullBank
 from measure.loop.statistics import Statistics
 
@@ -354,3 +354,34 @@ def test_what_numerics_leave_is_that_of_the_damping_of_the_data(world: World) ->
         np.testing.assert_allclose(ratio, 1.5**step, rtol=0.15)
         np.testing.assert_allclose(np.linalg.norm(own.shifts[0]) / np.linalg.norm(plain.shifts[0]), 1.5**step, rtol=0.2)
         np.testing.assert_allclose(own.mean(speeds), 1.5**step * plain.mean(speeds), rtol=0.2, atol=0.6 * 1.5**step)
+
+
+def test_the_best_gain_is_that_of_the_column_that_acts_and_falls_when_it_is_there(null: NullModel) -> None:
+    world = World(11)
+    without = [best_gain(world.data(null, effect(0.0))) for _ in range(20)]
+    acts = world.data(null, effect(2.0))
+    one = float(gains(acts, [[5]]).sum())
+    assert best_gain(acts) == pytest.approx(one)
+    assert one > max(without) + 5
+    # Beside it no other column helps more than where nothing acts.
+    assert best_gain(acts, [5]) < max(without) + 3
+
+
+def test_what_a_parameter_takes_in_shows_on_recordings_left_out() -> None:
+    """An effect that grows by the square of the wind, beside a parameter that does the same in all: to 9, 25 and 49 the
+    mean, 27.7, leaves squares of 809; each left out, the mean of the others leaves 784 + 16 + 1024."""
+    count, segments = len(THETA) + 1, 12
+    recording, speeds = np.repeat(np.arange(3), 4), np.repeat([3.0, 5.0, 7.0], 4)
+    free = np.array([1e3, 1e-3, 1e-3])
+    null = NullModel(
+        coefficients=np.zeros((3, count)), covariance=np.eye(count), shifts=np.zeros((0, count)), prior=free
+    )
+    response = np.zeros((segments, count, count))
+    response[:, 0, 0], response[:, 0, -1] = 1.0, speeds**2
+    found = Statistics(
+        recording=recording, r=response[:, :, -1], response=response, error=np.ones(segments),
+        marker_error=np.ones((segments, 1)),
+    )  # fmt: skip
+    evidence = Evidence.of(found, speeds, null)
+    assert evidence.drops()[-1] / 2 == pytest.approx(4 * 809 / 2, rel=1e-2)
+    assert best_gain(evidence) == pytest.approx(4 * 1824 / 2, rel=1e-2)
