@@ -3,7 +3,9 @@
 Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure of the air × 1.6, a
 linear tangential drag, and an internal damping of 30 ms. A verdict is right if it names what acted, alone or as one of
 several, and names nothing where only a calibrated parameter differs. All four are judged by the same bank of nulls, and
-once more by one that was drawn anew: verdicts that differ between the two depend on the draw.
+once more by one that was drawn anew: verdicts that differ between the two depend on the draw. The damping of the other
+three is that of ArcSim's steps, about 2.5 ms where they are short beside the motion and less where they are not, so that
+whether its interval holds is told of the fourth alone.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ from tests.validation.arcsim import RATE, folder
 from tests.validation.flags_runs import CAMEL
 
 WINDS = (3, 5, 7)
-DRAWS = (1, 2)
+DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "2"))))
+"""Of the nulls, some 25 minutes of a core each; FLAGDATA_DRAWS says how many."""
 _UNIT = 1e-4  # m, of the stored positions
 _SHOWN = 7
 """Candidates that are told."""
@@ -97,13 +100,13 @@ def _recording(path: Path, wind: int) -> Observation:
 
 
 def _told(verdict: Verdict, truth: Truth) -> dict[str, Any]:
-    wanted = {"density": 1.0, "bending": 1.0, "damping": 2.5e-3} | dict(truth.parameters)
+    wanted = {"density": 1.0, "bending": 1.0} | dict(truth.parameters)
     shown = {p.name: p.before if p.after is None else p.after for p in verdict.parameters}
     return {
         "said": verdict.conclusion.value, "named": list(verdict.named), "right": _right(verdict, truth),
         "p": verdict.test.p_value.value, "p low": verdict.test.p_value.low, "p high": verdict.test.p_value.high,
         "statistic": verdict.test.statistic, "critical": verdict.test.critical, "kinds": verdict.test.kinds,
-        "parameters": {name: _interval(own, wanted[name]) for name, own in shown.items()},
+        "parameters": {name: _interval(own, wanted.get(name)) for name, own in shown.items()},
         "candidates": [
             {
                 "effect": c.effect, "low": c.strength.low, "value": c.strength.value, "high": c.strength.high,
@@ -128,8 +131,9 @@ def _right(verdict: Verdict, truth: Truth) -> bool:
     return verdict.conclusion in (Conclusion.EFFECT, Conclusion.ONE_OF) and truth.effect in verdict.named
 
 
-def _interval(found: Estimate, true: float) -> dict[str, Any]:
-    return {"low": found.low, "value": found.value, "high": found.high, "covers": found.low <= true <= found.high}
+def _interval(found: Estimate, true: float | None) -> dict[str, Any]:
+    covers = None if true is None else found.low <= true <= found.high
+    return {"low": found.low, "value": found.value, "high": found.high, "covers": covers}
 
 
 def _page(told: Mapping[str, Any]) -> str:
@@ -160,4 +164,4 @@ def _page(told: Mapping[str, Any]) -> str:
 
 def _span(found: Mapping[str, Any], unit: float = 1.0) -> str:
     told = f"{unit * found['value']:.3g} [{unit * found['low']:.3g}, {unit * found['high']:.3g}]"
-    return told if found["covers"] else f"{told}, misses"
+    return f"{told}, misses" if found["covers"] is False else told
