@@ -3,9 +3,10 @@
 Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure of the air × 1.6, a
 linear tangential drag, and an internal damping of 30 ms. A verdict is right if it names what acted, alone or as one of
 several, and names nothing where only a calibrated parameter differs. All four are judged by the same bank of nulls, and
-once more by one that was drawn anew: verdicts that differ between the two depend on the draw. The damping of the other
-three is that of ArcSim's steps, about 2.5 ms where they are short beside the motion and less where they are not, so that
-whether its interval holds is told of the fourth alone.
+once more by one that was drawn anew: verdicts that differ between the two depend on the draw.
+
+The other three are damped by ArcSim's steps alone, like 2.5 ms where a motion is slow beside them and less where it is
+not, so that whether the interval of damping holds is told of the fourth alone.
 """
 
 from __future__ import annotations
