@@ -171,6 +171,7 @@ class Nulls:
 
 
 _POWERS = 3
+_TINY = np.finfo(np.float64).tiny
 _UNSEEN = 1e-9
 """Share of the mean variance that a column has of which nothing is seen, as of an effect without a moment."""
 
@@ -386,6 +387,20 @@ class Evidence:
         drops[active] = 0.0
         return drops[: self.columns]
 
+    def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[Floats, Floats, Floats]:
+        """How a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all, column)
+        how all coefficients go with it, (all,) those of the fit without."""
+        curvature, score, _ = self._total()
+        chosen, others = list(active), list(columns)
+        across = curvature[np.ix_(chosen, others)]
+        solved = np.linalg.solve(curvature[np.ix_(chosen, chosen)], np.c_[across, score[chosen]])
+        moved, fitted = np.zeros((len(score), len(others))), np.zeros(len(score))
+        moved[chosen], moved[others, range(len(others))], fitted[chosen] = -solved[:, :-1], 1.0, solved[:, -1]
+        whole = np.diag(curvature)[others]
+        own = whole - np.einsum("ai,ai->i", across, solved[:, :-1])
+        step = (score[others] - across.T @ solved[:, -1]) / np.maximum(own, np.maximum(1e-9 * whole, _TINY))
+        return step, moved, fitted
+
     def left_out(self, outside: NDArray[np.bool_], chosen: Chosen = ()) -> Floats:
         """(segment,) half misfits of some segments, when the nuisances and chosen columns are fitted to the others."""
         fit = self.select(~outside).fit(chosen)
@@ -443,8 +458,14 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
 
 
 def best_gain(evidence: Evidence, beside: Chosen = ()) -> float:
-    """The largest held-out gain that one more column brings, over that of some columns alone: by how much the model
-    that they make is predicted worse than another."""
-    others = [column for column in range(len(THETA), evidence.columns) if column not in beside]
-    found = gains(evidence, [beside, *([*beside, column] for column in others)]).sum(axis=1)
-    return float((found[1:] - found[0]).max())
+    """The largest held-out gain that one more column brings, over that of some columns alone: see `gains`."""
+    folds, active = left_together(evidence.recording), [*evidence.nuisance, *beside]
+    columns = [column for column in range(evidence.columns) if column not in active]
+    total = np.zeros(len(columns))
+    for index in np.unique(folds):
+        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
+        step, moved, fitted = inside.with_one_more(active, columns)
+        curvature = outside.curvature.sum(axis=0)
+        slope = (outside.score.sum(axis=0) - curvature @ fitted) @ moved
+        total += step * slope - step**2 * np.einsum("pc,pq,qc->c", moved, curvature, moved) / 2
+    return float(total.max())

@@ -367,6 +367,14 @@ def test_the_best_gain_is_that_of_the_column_that_acts_and_falls_when_it_is_ther
     assert best_gain(acts, [5]) < max(without) + 3
 
 
+@pytest.mark.parametrize("beside", [(), (5,), (4, 7)])
+def test_the_best_gain_is_the_largest_of_those_of_all_others(null: NullModel, beside: tuple[int, ...]) -> None:
+    acts = World(12).data(null, effect(1.0))
+    others = [column for column in range(len(THETA), COLUMNS) if column not in beside]
+    alone, *more = gains(acts, [beside, *((*beside, column) for column in others)]).sum(axis=1)
+    assert best_gain(acts, beside) == pytest.approx(max(more) - alone, rel=1e-9)
+
+
 def test_what_a_parameter_takes_in_shows_on_recordings_left_out() -> None:
     """An effect that grows by the square of the wind, beside a parameter that does the same in all: to 9, 25 and 49 the
     mean, 27.7, leaves squares of 809; each left out, the mean of the others leaves 784 + 16 + 1024."""

@@ -122,8 +122,10 @@ def comparison(what: str, before: float, *, with_after: bool, oracle: bool) -> C
 def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
     """Of the kind asked for, on three recordings."""
     rng = np.random.default_rng(4)
-    sufficient = conclusion is Conclusion.SUFFICIENT
+    untested = conclusion is Conclusion.UNTESTED
+    sufficient = untested or conclusion is Conclusion.SUFFICIENT
     named = {
+        Conclusion.UNTESTED: (),
         Conclusion.SUFFICIENT: (),
         Conclusion.EFFECT: ("lift",),
         Conclusion.ONE_OF: ("lift", "shear"),
@@ -138,6 +140,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         conclusion=conclusion,
         named=named,
         words={
+            Conclusion.UNTESTED: "The base model cannot be tested at a level of 0.01 by 20 kinds of numerics.",
             Conclusion.SUFFICIENT: "With its parameters calibrated, the base model predicts all three recordings as "
             "well as it predicts data simulated from itself.",
             Conclusion.EFFECT: "The air pushes sideways where the base model has only drag: with lift of coefficient "
@@ -152,9 +155,9 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
             statistic=statistic,
             null=null.tolist(),
             p_value=Estimate(value=p, low=0.5 * p, high=min(2.5 * p, 1.0), unit="1"),
-            kinds=199,
+            kinds=20 if untested else 199,
             level=0.01,
-            critical=float(np.sort(null)[-2]),
+            critical=None if untested else float(np.sort(null)[-2]),
             nulls="199 simulations at parameters drawn from the posterior, with half the step and a finer mesh.",
         ),
         parameters=(
