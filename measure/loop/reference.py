@@ -221,7 +221,7 @@ class _Usual:
 
 def _roots(found: _Found, lines: Lines | None, powers: Floats) -> Floats:
     swings = found.swings * np.exp(-np.outer(found.damping, powers))
-    roots = np.c_[np.cbrt(np.c_[found.shares, found.left]), found.gained, swings]
+    roots = np.c_[np.cbrt(np.c_[found.shares, found.left, found.gained]), swings]
     return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
 
 
@@ -239,7 +239,7 @@ class Reference:
     nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
     What the calibrated parameters and the directions of the numerics take in of an effect shows on winds that they were
-    not fitted to: so they weigh the best held-out gain as well, in its own unit.
+    not fitted to: so they weigh the best held-out gain as well.
     So they do how the wind's course swings: a covariance, of which nulls have what chance and their numerics leave, on
     either side of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
     `growth`). Evidence whose moments or course are not to count goes
@@ -358,8 +358,7 @@ class Reference:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
         shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
         far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
-        place = len(self.spread) + 1
-        gained = (best_gain(evidence, chosen) - float(self.centre[place])) / float(self.width[place])
+        gained = float(self._far(best_gain(evidence, chosen), len(self.spread) + 1))
         swing, line = self.swing(evidence), self.line(evidence)
         return max([far, gained, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
 
@@ -393,7 +392,7 @@ class Reference:
         return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
 
     def _far(self, values: Floats | float, columns: int | slice) -> Floats:
-        """Of shares, or what is left, as `far` has it."""
+        """Of shares, what is left, or the best gain, as `far` has it."""
         return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
 
 

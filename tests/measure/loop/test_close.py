@@ -80,8 +80,8 @@ def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
 
 
 @pytest.fixture(scope="module")
-def lifted(specimen: Specimen, bank: Path) -> Verdict:
-    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+def dragged(specimen: Specimen, bank: Path) -> Verdict:
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
     return close_loop(data, Options(bank=bank, level=0.1))
 
 
@@ -108,19 +108,19 @@ def test_a_null_needs_no_effect(specimen: Specimen, bank: Path) -> None:
     assert not verdict.comparisons
 
 
-def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(lifted: Verdict) -> None:
-    assert lifted.conclusion is not Conclusion.SUFFICIENT
-    assert lifted.named[:1] == ("full-hoist",)
-    assert len(lifted.comparisons) == 3
-    for comparison in lifted.comparisons:
+def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Verdict) -> None:
+    assert dragged.conclusion is not Conclusion.SUFFICIENT
+    assert dragged.named[:1] == ("tangential-linear-drag",)
+    assert len(dragged.comparisons) == 3
+    for comparison in dragged.comparisons:
         assert comparison.after.value < comparison.before.value
         assert comparison.control is None or comparison.after.value < comparison.control.value
 
 
-def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: Path, lifted: Verdict) -> None:
-    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: Path, dragged: Verdict) -> None:
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
     again = close_loop(data, Options(bank=bank, level=0.1, workers=2))
-    assert replace(again, seconds=0.0) == replace(lifted, seconds=0.0)
+    assert replace(again, seconds=0.0) == replace(dragged, seconds=0.0)
 
 
 def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: Path) -> None:
@@ -144,8 +144,8 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     assert abs(unmoved.value) < across.error
 
 
-def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifted: Verdict) -> None:
-    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, dragged: Verdict) -> None:
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
     c, s = np.cos(2.0), np.sin(2.0)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -157,14 +157,14 @@ def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, lifte
         specimen=replace(specimen, anchors=specimen.anchors @ turn), recordings=tuple(map(turned, data.recordings))
     )
     verdict = close_loop(moved, Options(bank=bank, level=0.1))
-    assert verdict.named == lifted.named
+    assert verdict.named == dragged.named
     # Single precision: the statistic to a few digits.
-    assert verdict.test.statistic == pytest.approx(lifted.test.statistic, rel=0.05)
+    assert verdict.test.statistic == pytest.approx(dragged.test.statistic, rel=0.05)
 
 
 def test_a_level_that_the_bank_cannot_test_is_said_to_be_so(specimen: Specimen, bank: Path) -> None:
     """Twelve kinds of numerics: no p is below 1/13."""
-    data = recorded(specimen, EFFECTS["full-hoist"](stiffness=2000.0), seed=77)
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
     verdict = close_loop(data, Options(bank=bank))
     assert verdict.conclusion is Conclusion.UNTESTED
     assert verdict.test.p_value.value >= 1 / 13
