@@ -9,7 +9,7 @@ from, with textures that none had; half of them are rendered by Cycles (in the e
 With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of the reference simulator (../shared/data/arcsim), filmed by our
 rasteriser: six runs, of two views each for 12 targets.
 FLAGDATA_REFINE_HANDMADE names a lake with flagsim-wide that gradient boosting on hand-made features learns from, at
-FLAGDATA_REFINE_AT; without it that peer is left out.
+FLAGDATA_REFINE_AT, with the features kept beside it; without it that peer is left out.
 Writes `refinement.md` beside the JSON.
 """
 
@@ -107,7 +107,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     scene = scene_of(estimator)
     space = Space.of(scene)
     at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
-    handmade = _handmade(at, cache, seed)
+    handmade = _handmade(at, seed)
     scores: list[Score] = []
     stages: dict[str, list[float]] = {}
     own: list[Refinement] = []
@@ -217,14 +217,14 @@ def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -
     )  # fmt: skip
 
 
-def _handmade(at: str, cache: Path, seed: int) -> Fitted | None:
+def _handmade(at: str, seed: int) -> Fitted | None:
     lake = os.environ.get("FLAGDATA_REFINE_HANDMADE")
     if lake is None:
         return None
     spec = DataSpec(datasets=("flagsim-wide",))
     split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
     train = Source.open(lake).pairs(at=at, split="train", split_by=split)
-    return fitted(train, cache=cache / "handmade", workers=1, seed=seed, bars=_bar)
+    return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=_bar)
 
 
 def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
