@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +14,6 @@ from flagdata.commands.ranges import RANGE
 from flagdata.console import document, json_option, lake_option, progress, say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
     from models.estimator import Estimator
@@ -169,7 +166,7 @@ class _Desk:
         key = (side, estimator.front_end.hash)
         if key not in self._prepared:
             pairs = self._side(side)
-            with _bar(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
+            with progress(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
                 self._prepared[key] = prepare_clips(
                     pairs, estimator.front_end, estimator.cropping, folder=self._cache, workers=self._workers,
                     advance=advance,
@@ -203,7 +200,12 @@ class _Desk:
         from models.evaluation.handmade import predictions
 
         return predictions(
-            self._side("train"), self._side(side), cache=self._cache, workers=self._workers, seed=self._seed, bars=_bar
+            self._side("train"),
+            self._side(side),
+            cache=self._cache,
+            workers=self._workers,
+            seed=self._seed,
+            bars=progress,
         )
 
 
@@ -236,7 +238,3 @@ def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
             LearningPoint(label=own.label, sequences=sequences, rmse=found.value, interval=(found.low, found.high))
         )
     return points
-
-
-def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
-    return progress(total, label=label, unit=unit)

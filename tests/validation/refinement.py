@@ -18,7 +18,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -224,11 +223,7 @@ def _handmade(at: str, seed: int) -> Fitted | None:
     spec = DataSpec(datasets=("flagsim-wide",))
     split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
     train = Source.open(lake).pairs(at=at, split="train", split_by=split)
-    return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=_bar)
-
-
-def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
-    return progress(total, label=label, unit=unit)
+    return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
 
 
 def _boosting(target: Target, models: Fitted) -> Score:

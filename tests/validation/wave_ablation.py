@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -66,7 +65,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for number in range(int(os.environ.get("FLAGDATA_ABLATION_SEEDS", "3"))):
             recipe = _recipe(label, chosen, seed=number + 1)
             report_of = trained(
-                recipe, Path(lake), at=at, cache=cache, run=None, workers=1, device="cpu", branch=BRANCH, bars=_bar
+                recipe, Path(lake), at=at, cache=cache, run=None, workers=1, device="cpu", branch=BRANCH, bars=progress
             )
             assert report_of is not None  # no torchrun
             told.append(_predictions(source, report_of["object"], label, at=at, cache=cache, seed=seed))
@@ -97,13 +96,9 @@ def _predictions(source: Source, obj: str, label: str, *, at: str | None, cache:
     network = models.load(source.lake.object_path(obj))
     split = ExplicitSplit(where={name: _TESTED.where(name) for name in ("train", "test")})
     pairs = source.pairs(at=at, split="test", split_by=split)
-    with _bar(len(pairs), "prepare what tests", "clip") as advance:
+    with progress(len(pairs), "prepare what tests", "clip") as advance:
         clips = prepare_clips(pairs, network.front_end, network.cropping, folder=cache, workers=1, advance=advance)
     return predict(
         network, clips, label=label, note=f"{network.learners[0].network.channels} maps", seed=seed,
         milliseconds=time_a_clip(network, pairs),
     )  # fmt: skip
-
-
-def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Any]:
-    return progress(total, label=label, unit=unit)
