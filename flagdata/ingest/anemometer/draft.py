@@ -18,6 +18,7 @@ from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
     COMPONENTS,
+    NO_ANGLE,
     Column,
     Wind,
     beaufort,
@@ -134,6 +135,9 @@ def draft(
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
     chosen = chosen or (winds[0] if winds else None)
+    if time is not None and time.unnamed:
+        shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
+        warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
@@ -178,6 +182,10 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     if not winds and classes:
         what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
         found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
+    elif not winds and (directions := _directions(layout)):
+        what = f"column {directions[0]!r} is a direction of the wind, but no column is its speed"
+        fix = "log the speed beside it; if a column is the speed all the same, name it: --wind COLUMN --unit m/s"
+        found.append(Doubt(what=what, fix=fix))
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
@@ -197,6 +205,10 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         found.append(Doubt(what=what, fix=fix))
     return found
+
+
+def _directions(layout: Layout) -> list[str]:
+    return [name for name in layout.names if understand(name).channel.endswith("wind_direction")]
 
 
 def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
@@ -334,6 +346,15 @@ def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
     return (other,) if other is not None and alone else ()
 
 
+def _near_a_thousand(layout: Layout, wind: Wind | None) -> bool:
+    """Whether a pressure of the table may be as large as a code for "no direction"."""
+    column = wind.columns.get("air_pressure") if wind is not None else None
+    if column is None:
+        return False
+    value = numbers(layout.column(column.index), decimal=layout.decimal).value
+    return bool(np.nanmedian(np.abs(value)) > 700)
+
+
 def _codes(layout: Layout, wind: Wind | None) -> list[float]:
     """Codes for "no value": those that no quantity here can have, and those above every other value of the wind."""
     codes = list(CODES)
@@ -345,6 +366,8 @@ def _codes(layout: Layout, wind: Wind | None) -> list[float]:
             codes = [code for code in codes if abs(code) * unit_of(column.unit).scale > FASTEST]
         if channel.endswith("direction") and bool(np.any((known < 0) & ~np.isin(known, CODES))):
             codes = [code for code in codes if code < -180]
+        if channel.endswith("direction") and not _near_a_thousand(layout, wind):
+            codes.extend(code for code in NO_ANGLE if code in known)
         for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
             others = known[known != code]
             if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:

@@ -168,12 +168,22 @@ def _suffix(cells: Sequence[str]) -> str:
 
 
 def _unit_column(rows: Sequence[Sequence[str]], index: int) -> int | None:
-    """The column next to a column of numbers, where all its cells spell one unit of what a log measures."""
+    """The column next to a column of numbers, where all its cells spell one unit of what a log measures.
+
+    Units side by side are a list of those of the whole row, not the unit of the number before them.
+    """
     if index + 1 >= len(rows[0]):
         return None
-    cells = {row[index + 1].strip() for row in rows} - {""}
-    name = spelled(cells.pop()) if len(cells) == 1 else None
+    name, beyond = _unit_of_all(rows, index + 1), _unit_of_all(rows, index + 2)
+    if beyond is not None:
+        return None
     return index + 1 if name is not None and UNITS[name].si in _BEHIND and name != "1" else None
+
+
+def _unit_of_all(rows: Sequence[Sequence[str]], index: int) -> str | None:
+    """The unit that all cells of a column spell, in the table's name."""
+    cells = {row[index].strip() for row in rows} - {""} if index < len(rows[0]) else set()
+    return spelled(cells.pop()) if len(cells) == 1 else None
 
 
 def _first(rows: Sequence[Sequence[str]], index: int) -> str:
