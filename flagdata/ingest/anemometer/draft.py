@@ -174,7 +174,10 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     found: list[Doubt] = []
     names = ", ".join(repr(name) for name in layout.names if name) or "no names"
     if time is None:
-        fix = "write a recipe with [time] columns and format, and name it: --recipe FILE.toml"
+        fix = (
+            "if a column is the time, write a recipe with [time] columns and format, and name it: --recipe FILE.toml; "
+            "if none is and the rows came at a steady rate: --start TIME --rate HZ"
+        )
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
         found.append(Doubt(what=time.doubt, fix=time.fix))
