@@ -6,6 +6,7 @@ is taken without asking. What is in doubt is named with the one thing to say, an
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -34,10 +35,15 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
 from flagdata.ingest.anemometer.unitcheck import FASTEST
+from flagdata.units import spelled
 from flagdata.units import unit as unit_of
 
 CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
 """Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
+_STATED = re.compile(
+    r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
+)
+"""How lines above a heading state a unit."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
 
 
@@ -125,7 +131,7 @@ def draft(
         )  # fmt: skip
     labels = tuple(one.label for one in winds)
     chosen = next((one for one in winds if one.label == wind), None)
-    doubts = list(_doubts(layout, time, winds, chosen))
+    doubts = list(_doubts(lines, layout, time, winds, chosen))
     if wind is not None and chosen is None and mixed is not None and winds:
         # A site that the first rows do not hold.
         label, _, rest = wind.partition(":")
@@ -135,6 +141,9 @@ def draft(
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
     chosen = chosen or (winds[0] if winds else None)
+    if layout.short:
+        shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
+        warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
     if time is not None and time.unnamed:
         shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
@@ -170,7 +179,9 @@ def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
     return tuple(found)
 
 
-def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None) -> list[Doubt]:
+def _doubts(
+    lines: Sequence[str], layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None
+) -> list[Doubt]:
     found: list[Doubt] = []
     names = ", ".join(repr(name) for name in layout.names if name) or "no names"
     if time is None:
@@ -200,7 +211,7 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     for wind in (chosen,) if chosen is not None else winds:
         missing = wind.without_unit()
         if missing:
-            found.append(_unit_doubt(layout, wind, missing))
+            found.append(_unit_doubt(lines, layout, wind, missing))
             break
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
@@ -214,7 +225,24 @@ def _directions(layout: Layout) -> list[str]:
     return [name for name in layout.names if understand(name).channel.endswith("wind_direction")]
 
 
-def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
+def _stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
+    """The one unit of speed that lines above the heading state, as "Units: mph", the line's number and the words."""
+    found: dict[str, tuple[str, int, str]] = {}
+    for number, line in enumerate(lines, start=1):
+        for match in _STATED.finditer(line):
+            name = spelled(match[1])
+            if name is not None and unit_of(name).si == "m/s":
+                found.setdefault(name, (name, number, match[0]))
+    return next(iter(found.values())) if len(found) == 1 else None
+
+
+def _unit_doubt(lines: Sequence[str], layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
+    above = _stated_unit(lines[: layout.preamble])
+    if above is not None:
+        name, number, words = above
+        heading = layout.names[wind.columns[missing[0]].index]
+        what = f"the unit of column {heading!r} is not stated in its heading; line {number} says {words!r}"
+        return Doubt(what=what, fix=f"if that is the unit of the wind, give it: --unit {name}")
     column = wind.columns[missing[0]].index
     value = numbers(layout.column(column), decimal=layout.decimal).value
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None

@@ -165,3 +165,43 @@ def test_sentences_among_the_words_of_a_programs_log_are_read(read: Read) -> Non
     assert instants(log)[:2] == ["2024-05-01T12:00:00", "2024-05-01T12:00:01"]
     assert log.series.channels["wind_speed"].tolist() == pytest.approx([5.8 * 1852 / 3600] * 12)
     assert not any(finding.kind == "malformed-lines" for finding in log.findings)
+
+
+def test_a_heading_of_other_rows_than_those_that_follow_names_no_column(log_file: Write) -> None:
+    """A logger's program was changed, and writes two more cells in front since."""
+    old = "2025-10-13T15:31:04+08:00,model,29.9,0.3,74.0,8.7,142.0\n"
+    new = "".join(f"2025-10-13T16:{at:02d}:04+08:00,,town,model,29.6,0.3,74.0,8.{at % 10},125.0\n" for at in range(12))
+    path = log_file(f"ts_iso,provider,temp_c,rain_mm,humidity_pct,wind_speed_mps,wind_dir_deg\n{old}{new}")
+    refusal(path)
+    notes = " ".join(sniff(path)[0].notes)
+    assert "names 7 columns, but rows have 9, and do not fit it" in notes
+
+
+def test_a_heading_that_stops_early_is_taken_for_the_first_columns_with_a_warning(read: Read) -> None:
+    rows = "".join(f"2025-10-13 16:{at:02d}:04,{3 + at / 10:.1f},{100 + at},13.1,5,6\n" for at in range(12))
+    log = read(f"time,wind speed [m/s],wind direction [deg],battery [V]\n{rows}", zone="UTC")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(3.0)
+    told = [finding.what for finding in log.findings if finding.kind == "heading-doubtful"]
+    assert told == ["line 1 names 4 of 6 columns: taken as the first 4"]
+
+
+def test_a_unit_that_the_lines_above_the_heading_state_is_proposed(log_file: Write) -> None:
+    rows = "".join(f"99-08-27,{at:02d}:10,{11.8 + at / 10:.1f},254.5\n" for at in range(24))
+    above = (
+        "Site: an island\nSensor 1: Maximum anemometer, 25 m above ground level, Units: mph\nSensor 2: Units: Volts\n"
+    )
+    error = refusal(log_file(f"{above}Year-Month-Day,Hour:Minute,#1 wind speed mean,#1 wind direction mean\n{rows}"))
+    assert "line 2 says 'Units: mph'" in error.what
+    assert "--unit mph" in error.fix
+
+
+def test_units_of_speed_that_differ_above_the_heading_propose_none(log_file: Write) -> None:
+    rows = "".join(f"2019-08-27 {at:02d}:10,{1.8 + at / 10:.1f}\n" for at in range(24))
+    error = refusal(log_file(f"a: Units: mph\nb: Units: km/h\ntime,wind speed\n{rows}"), WindOptions(zone="UTC"))
+    assert "says" not in error.what
+
+
+def test_a_line_of_units_alone_is_no_line_of_names(log_file: Write) -> None:
+    rows = "".join(f"{at / 10:.1f} {-5.8 + at / 10:.2f} 0.10 -0.24\n" for at in range(12))
+    guess = sniff(log_file(f"Elapsed Time Point01u Point01v Point01w\n(s) (m/s) (m/s) (m/s)\n{rows}"))[0]
+    assert not any("(m/s)#" in doubt for doubt in guess.doubts)
