@@ -205,3 +205,24 @@ def test_a_line_of_units_alone_is_no_line_of_names(log_file: Write) -> None:
     rows = "".join(f"{at / 10:.1f} {-5.8 + at / 10:.2f} 0.10 -0.24\n" for at in range(12))
     guess = sniff(log_file(f"Elapsed Time Point01u Point01v Point01w\n(s) (m/s) (m/s) (m/s)\n{rows}"))[0]
     assert not any("(m/s)#" in doubt for doubt in guess.doubts)
+
+
+@pytest.mark.parametrize(("short", "year"), [("26", 2026), ("00", 2000), ("99", 1999), ("70", 1970), ("69", 2069)])
+def test_years_of_two_digits_are_of_the_last_century_from_70(read: Read, short: str, year: int) -> None:
+    rows = [f"{short}-08-27 10:{k}0,{3.1 + k / 10:.1f}" for k in range(6)]
+    log = read("\n".join(["time,wind speed (m/s)", *rows]) + "\n", zone="UTC", date_order="ymd")
+
+    assert instants(log)[:2] == [f"{year}-08-27T10:00:00", f"{year}-08-27T10:10:00"]
+
+
+@pytest.mark.parametrize(("short", "year"), [("26", 2026), ("99", 1999)])
+def test_dates_of_sentences_are_of_the_same_centuries(log_file: Write, short: str, year: int) -> None:
+    rows = [
+        line
+        for k in range(6)
+        for line in (f"$GPRMC,10000{k},A,5950.0,N,01730.0,E,0.0,0.0,2708{short},,", f"$WIMWV,214.8,T,4.{k},M,A")
+    ]
+
+    log = read_log(log_file("\n".join(rows) + "\n"), WindOptions())
+
+    assert instants(log)[0].startswith(f"{year}-08-27T10:00:0")
