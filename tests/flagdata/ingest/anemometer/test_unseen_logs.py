@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -226,3 +227,34 @@ def test_dates_of_sentences_are_of_the_same_centuries(log_file: Write, short: st
     log = read_log(log_file("\n".join(rows) + "\n"), WindOptions())
 
     assert instants(log)[0].startswith(f"{year}-08-27T10:00:0")
+
+
+def _radio(time: str, speed: float, **more: object) -> str:
+    return json.dumps({"time": f"2026-05-01 12:{time}", "model": "A5", **more, "wind_avg_km_h": speed})
+
+
+def test_repeats_of_a_radio_message_are_no_further_readings(read: Read) -> None:
+    times = ["13:22", "13:40", "13:58", "14:17", "14:35"]
+    rows = [_radio(t, 2.6 + k, sequence_num=n, rssi=-n / 10) for k, t in enumerate(times) for n in range(3)]
+
+    log = read("\n".join(rows) + "\n", zone="UTC")
+
+    assert instants(log) == [f"2026-05-01T12:{t}" for t in times]
+    assert [f.count for f in log.findings if f.kind == "repeated-messages"] == [10]
+    assert not [f for f in log.findings if f.kind == "held-stamps"]
+
+
+def test_equal_readings_that_are_not_numbered_as_repeats_are_kept(read: Read) -> None:
+    rows = [_radio(f"13:{20 + k // 3}", 2.6) for k in range(30)]
+
+    log = read("\n".join(rows) + "\n", zone="UTC")
+
+    assert len(log.series.time) == 30
+
+
+def test_messages_numbered_alike_are_not_repeats_unless_they_say_the_same(read: Read) -> None:
+    rows = [_radio(f"13:{20 + k // 3}", 2.6 + k, sequence_num=k % 3) for k in range(30)]
+
+    log = read("\n".join(rows) + "\n", zone="UTC")
+
+    assert len(log.series.time) == 30
