@@ -64,7 +64,7 @@ def matches(lines: Sequence[str]) -> bool:
         return bool(re.match(r"\s*\"[^\"]*\"\s*:", "".join(filled[1:])))
     objects = [match for line in filled if (match := _LINE.fullmatch(line)) is not None and _object(match["object"])]
     messages = sum('"pgn":' in match["object"] for match in objects)
-    return len(objects) > len(filled) / 2 > messages
+    return 2 * len(objects) >= len(filled) > 2 * messages
 
 
 def as_table(source: TextFile) -> TableText | None:

@@ -119,3 +119,11 @@ def test_a_sodars_profiles_are_named_as_such(log_file: Write) -> None:
 def test_options_without_a_rate_keep_their_hash() -> None:
     assert "rate" not in WindOptions().as_dict()
     assert WindOptions(rate=2.0, start=_START).as_dict()["rate"] == 2.0
+
+
+def test_objects_between_lines_of_text_are_counted_from_the_start_at_the_rate(read: Read) -> None:
+    rows = "".join(f'uptime: {at} min\n{{"ws":{3.6 + at},"wd":{90 + at}}}\n' for at in range(6))
+    log = read(rows, start=_START, rate=1 / 60, unit="km/h")
+    assert since_start(log) == pytest.approx([60.0 * at for at in range(6)])
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([(3.6 + at) / 3.6 for at in range(6)])
+    assert {"rate-given", "malformed-lines"} <= {finding.kind for finding in log.findings}
