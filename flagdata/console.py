@@ -72,7 +72,7 @@ def _is_number(text: str) -> bool:
 
 
 @contextmanager
-def progress(total: int | None, *, label: str, unit: str) -> Iterator[Callable[[int], None]]:
+def progress(total: int | None, label: str, unit: str) -> Iterator[Callable[[int], None]]:
     """A bar on stderr for anything that takes longer than two seconds; yields a function that advances it."""
     from tqdm import tqdm
 

@@ -33,10 +33,16 @@ class Unit:
 
 
 _ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
-_WORDS = {"NORTH": "N", "EAST": "E", "SOUTH": "S", "WEST": "W"}
+_SIDES = {"N": "NORTH", "E": "EAST", "S": "SOUTH", "W": "WEST"}
 POINTS: dict[str, float] = {name: number * 22.5 for number, name in enumerate(_ROSE)}
 """Points of the compass → degrees from north; a column of them has the unit "points"."""
-POINTS |= {word: POINTS[name] for word, name in _WORDS.items()}
+POINTS |= {
+    sign.join(_SIDES[letter] for letter in point): POINTS[point] for point in _ROSE for sign in ("", " ", "-")
+}  # fmt: skip
+POINTS |= {
+    f"{_SIDES[point[0]]}{sign}{_SIDES[point[1]]}{_SIDES[point[2]]}": POINTS[point]
+    for point in _ROSE if len(point) == 3 for sign in (" ", "-")
+}  # fmt: skip
 
 UNITS: dict[str, Unit] = {
     "m/s": Unit(si="m/s", scale=1.0),

@@ -45,7 +45,8 @@ from flagdata.errors import UsageError
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(
     "--rate", default="25", show_default=True, metavar="HZ|native",
-    help="Camera: frames a second to keep. Meshes, markers: frames a second there are, by default as the source says.",
+    help="Camera: frames a second to keep. Meshes, markers: frames a second there are, by default as the source says. "
+    "Wind: readings a second of a log whose rows carry no time, from --start on.",
 )  # fmt: skip
 @click.option(
     "--crop", default="whole", show_default=True, metavar="BOX",
@@ -154,6 +155,7 @@ def ingest(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
             clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind,
+            rate=rate if "rate" in given else None,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
         markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),

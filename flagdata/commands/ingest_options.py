@@ -23,7 +23,7 @@ LENGTHS = ("unit",)
 """Of meshes and markers, and of the wind's speed."""
 FOREIGN = {
     "camera": ("a camera file", (*WIND_ONLY, *LENGTHS)),
-    "anemometer": ("an anemometer log", (*CAMERA_ONLY, "rate")),
+    "anemometer": ("an anemometer log", CAMERA_ONLY),
     "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
     "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
 }
@@ -113,8 +113,11 @@ def wind_options(
     unit: str | None,
     start: str | None,
     wind: str | None,
+    rate: str | None,
 ) -> WindIngest:
-    """Those of an anemometer; `unit` is heeded where it is one of speed, since meshes have units, too.
+    """Those of an anemometer; `rate` is `None` where none is given.
+
+    `unit` is heeded where it is one of speed, since meshes have units, too.
 
     Raises:
         UsageError: a date, start or zero offset that cannot be read.
@@ -153,6 +156,7 @@ def wind_options(
             zero_offset=offset,
             unit=unit if unit is not None and unit_of(unit, where="--unit").si == "m/s" else None,
             start=instant,
+            rate=_number(rate, "--rate", "readings a second") if rate not in (None, "native") else None,
             wind=wind,
         )
     )
@@ -221,9 +225,12 @@ def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozens
         what, parameters = foreign["camera"]
         foreign["camera"] = (f"{what} whose --start names its zone", (*parameters, "zone"))
     if "camera" in kinds:
-        # Of a camera and a log together, the start is the camera's.
+        # Of a camera and a log together, start and rate are the camera's.
         what, parameters = foreign["anemometer"]
-        foreign["anemometer"] = (what, (*parameters, "start"))
+        foreign["anemometer"] = (what, (*parameters, "start", "rate"))
+    if options.wind.wind.rate is None:
+        what, parameters = foreign["anemometer"]
+        foreign["anemometer"] = (what, (*parameters, "rate"))
     _check_unit(kinds, options.unit)
     for parameter in sorted(given):
         strange = [kind in foreign and parameter in foreign[kind][1] for kind in kinds]

@@ -47,7 +47,7 @@ def ingest_sources(
     kinds = _told(sources, lambda source: classify(source, format_name=format_name, recipe=recipe))
     check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
     if any(not isinstance(kind, FlagdataError) and kind.kind == "camera" for kind in kinds):
-        options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None)))
+        options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None, rate=None)))
     results, failures = _each(
         sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_results, as_json=as_json
     )

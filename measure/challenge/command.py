@@ -140,29 +140,39 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
     "--out", type=click.Path(path_type=Path), help="Path to which the sheet is also written, as .json, .md and .png."
 )
 @click.option(
+    "--history", type=click.Path(path_type=Path), metavar="FILE.csv",
+    help="File of all graded challenges, to which this one is added under its folder's name.",
+)  # fmt: skip
+@click.option(
     "--against", type=click.Choice(["oracle", "floor"]), default="oracle", show_default=True,
     help="What E_red is measured against: the true model's error, which is computed anew, or the verdict's floor.",
 )  # fmt: skip
 @json_option
 @click.pass_context
 def score(
-    context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, against: str, as_json: bool
-) -> None:
+    context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, history: Path | None, against: str,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Open the keys and grade; ends with 3 where a gate is not met.
 
     From then on no verdict can be filed on these sets.
     """
+    from measure.challenge import history as histories
     from measure.challenge import sheet as sheets
     from measure.challenge.folder import ChallengeFolder
     from measure.challenge.oracle import true_model
     from measure.challenge.score import score as score_challenge
 
     target, oracle = ChallengeFolder(folder), true_model if against == "oracle" else None
+    name = folder.resolve().name
+    before = [] if history is None else histories.without(history, name)  # refused before any key is opened
     with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
         sheet = score_challenge(target, only=only, oracle=oracle, progress=advance)
     if out is not None:
         for path in sheets.write(sheet, out):
             say(f"wrote {path}")
+    if history is not None:
+        histories.write(history, [*before, histories.row(name, sheets.as_dict(sheet))])
     if as_json:
         document("score", sheets.as_dict(sheet))
     else:

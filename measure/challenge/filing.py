@@ -34,6 +34,12 @@ class Filing:
     refusal: dict[str, str | None] | None
     seconds: float
 
+    @property
+    def criteria(self) -> str | None:
+        """The hash of the thresholds that the verdict states; None where it states none."""
+        stated = (self.verdict or {}).get("provenance", {}).get("criteria")
+        return None if stated is None else str(stated["hash"])
+
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
         return {"schema": "flagdata.filing/1", **asdict(self)}

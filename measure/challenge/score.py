@@ -99,6 +99,7 @@ class Sheet:
         power: against impact, by class; None where no library effect acted alone.
         by_noise, by_rate: the same, with groups by marker noise in millimetres and by frame rate, over every set in
             which something acted.
+        criteria: hashes of the thresholds that the verdicts were made by, sorted; one where all were made alike.
     """
 
     title: str
@@ -106,6 +107,7 @@ class Sheet:
     power: Power | None
     by_noise: Power | None
     by_rate: Power | None
+    criteria: tuple[str, ...] = ()
 
     def of_kind(self, *kinds: Kind) -> list[Outcome]:
         """Outcomes of sets of these kinds."""
@@ -277,7 +279,8 @@ def score(
         outcomes.append(outcome)
         if progress is not None:
             progress(1)
-    return graded(manifest["title"], outcomes)
+    found = graded(manifest["title"], outcomes)
+    return replace(found, criteria=tuple(sorted({h for one in filed.values() if (h := one.criteria) is not None})))
 
 
 def graded(title: str, outcomes: Sequence[Outcome]) -> Sheet:

@@ -32,6 +32,7 @@ def as_dict(sheet: Sheet) -> dict[str, Any]:
         "schema": "flagdata.score/1",
         "title": sheet.title,
         "code_version": code_version(),
+        "criteria": list(sheet.criteria),
         "sets": {kind.value: len(sheet.of_kind(kind)) for kind in Kind},
         "strong": len(sheet.strong),
         "gates": [gate.as_dict() for gate in sheet.gates],

@@ -16,6 +16,7 @@ from flagdata.commands.durations import DURATION
 from flagdata.commands.ranges import RANGE
 from flagdata.console import document, json_option, progress, say
 from flagdata.errors import ConflictError, RefusedError, UsageError
+from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -202,9 +203,7 @@ class _Job:
             )  # fmt: skip
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
-        for finding in measured.findings:
-            if finding.severity != "note":
-                say(f"{finding.severity.value}: {finding.what}")
+        _warn(measured.findings)
         shown = self.anyway or not measured.verdict.refused
         refinement = None
         if self.options.refine is not None and shown:
@@ -212,6 +211,7 @@ class _Job:
                 measured, subject, estimator, budget=self.options.refine, cropped=self.reading.crop is not None,
                 cache=self.cache,
             )  # fmt: skip
+            _warn(refinement.findings)
         told = None if refinement is None else refinement.as_dict()
         artifact = None
         if self.lake is not None and self.commit and shown:
@@ -303,6 +303,12 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
             f"all {len(done)} clips are unlike what the model was trained on", where="--query",
             fix="look at one with --report, or at all with --anyway",
         )  # fmt: skip
+
+
+def _warn(findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        if finding.severity is not Severity.NOTE:
+            say(f"{finding.severity.value}: {finding.what}")
 
 
 def _tell(done: _Done, *, series: bool) -> None:

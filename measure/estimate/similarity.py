@@ -195,11 +195,11 @@ def sizes(
     prior = prior if prior is not None else SizePrior(median=trained.length)
     if given is not None:
         own = given.scale(trained)
-        needed = frames_rate / math.sqrt(own)
-        if rate < RATE_SLACK * needed:
+        needed = RATE_SLACK * frames_rate / math.sqrt(own)
+        if rate < needed:
             raise InputError(
                 f"the film has {rate:.4g} frames a second, a {trained.noun} of {given.length:g} m needs {needed:.4g}",
-                where="frame rate", fix=f"film at {RATE_SLACK * needed:.3g} frames a second or more",
+                where="frame rate", fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more",
             )  # fmt: skip
         return Sizes(
             given=given, scale=np.array([own]), draws=np.full((1, draws), own), findings=given.findings(trained)

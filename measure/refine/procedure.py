@@ -300,6 +300,14 @@ class _Run:
                         what=f"{share:.0%} of the wind's probability lies at the ends of the range that is searched",
                     )
                 )  # fmt: skip
+        out.append(
+            Finding(
+                kind="damping-assumed", severity=Severity.WARNING,
+                what="clips were simulated with the material's own damping: the intervals are too narrow for a cloth "
+                "that is damped more",
+                fix="rely on the model's own interval, which allows for any damping, where that is not known",
+            )
+        )  # fmt: skip
         if not all(knows_view(target) for target in self.targets):
             out.append(
                 Finding(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,21 @@ def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: Vie
         otherwise: the view of a recording that states no ζ.
     """
     content = json.loads(recording.parameters) if recording.parameters else {}
-    stated = of_parameters(content, where=f"recording {recording.name!r}") if content else None
-    return Target(name=recording.name, clip=clip, view=stated or otherwise, truth=_truth(content, space))
+    return as_stated(recording.name, clip, content, otherwise=otherwise, space=space)
+
+
+def as_stated(
+    name: str, clip: NDArray[np.uint8], parameters: Mapping[str, Any], *, otherwise: View, space: Space
+) -> Target:
+    """A target of which `parameters` state what recordings of simulated flags state, or nothing.
+
+    Args:
+        clip: (frame, height, width).
+        parameters: name → value [SI], ζ and the camera among them if it is simulated.
+        otherwise: the view of one that states no ζ.
+    """
+    stated = of_parameters(parameters, where=f"target {name!r}") if parameters else None
+    return Target(name=name, clip=clip, view=stated or otherwise, truth=_truth(parameters, space))
 
 
 def knows_view(target: Target) -> bool:
@@ -56,7 +70,7 @@ def knows_view(target: Target) -> bool:
     return isinstance(target.view, FixedView)
 
 
-def _truth(content: Mapping[str, float], space: Space) -> dict[str, float]:
+def _truth(content: Mapping[str, Any], space: Space) -> dict[str, float]:
     names = [*(f"bending.{index}" for index in range(BENDING)), "density", "wind_speed"]
     if any(name not in content for name in names):
         return {name: float(content[name]) for name in ("density", "wind_speed") if name in content}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +14,6 @@ from flagdata.commands.ranges import RANGE
 from flagdata.console import document, json_option, lake_option, progress, say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
     from models.estimator import Estimator
@@ -24,6 +21,7 @@ if TYPE_CHECKING:
     from models.evaluation.evaluation import Evaluation
     from models.evaluation.predictions import Predictions
     from models.training.inputs import Prepared
+    from models.training.recipe import DataSpec
 
 
 @click.command()
@@ -104,22 +102,27 @@ class _Desk:
         self, names: Sequence[str], *, side: str, reference: str | None, tsne: str | None, handmade: bool
     ) -> Evaluation:
         from models.evaluation.evaluation import evaluate as scored
+        from models.training.recipe import DataSpec
 
         told: list[Predictions] = []
-        learning: list[tuple[int, Predictions]] = []
+        learned: list[tuple[int, Predictions]] = []
+        curves: set[str] = set()
         for row, estimator in self._models(names):
             predictions = self._predictions(estimator, side)
-            sequences = estimator.card["recipe"]["data"]["sequences"] if row is not None else None  # pyright: ignore[reportIndexIssue]
-            if sequences is None:
+            data = DataSpec.of_identity(_card(estimator)["recipe"]["data"])
+            if data.sequences is None or row is None:
                 told.append(predictions)
             else:
-                learning.append((int(sequences), predictions))
+                curves.add(predictions.label)
+            if row is not None:
+                learned.append((data.sequences or self._sequences(data), predictions))
         if handmade:
             told += self._handmade(side)
         return scored(
-            told or [predictions for _, predictions in learning],
+            told or [predictions for _, predictions in learned],
             data=f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}",
-            seed=self._seed, reference=reference, tsne_of=tsne, learning=_points(learning, told, self._all_sequences()),
+            seed=self._seed, reference=reference, tsne_of=tsne,
+            learning=_points([point for point in learned if point[1].label in curves]),
         )  # fmt: skip
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
@@ -145,14 +148,17 @@ class _Desk:
         return found
 
     def _side(self, side: str) -> Pairs:
-        from flagdata.dataset import ExplicitSplit
         from models.training.recipe import DataSpec
 
         if side not in self._pairs:
-            spec = DataSpec(datasets=(self._dataset,))
-            split = ExplicitSplit(where={name: spec.where(name) for name in {"train", side}})
-            self._pairs[side] = self._source.pairs(at=self._at, split=side, split_by=split)
+            self._pairs[side] = self._of(DataSpec(datasets=(self._dataset,)), side)
         return self._pairs[side]
+
+    def _of(self, data: DataSpec, side: str) -> Pairs:
+        from flagdata.dataset import ExplicitSplit
+
+        split = ExplicitSplit(where={name: data.where(name) for name in {"train", side}})
+        return self._source.pairs(at=self._at, split=side, split_by=split)
 
     def _clips(self, side: str, estimator: Estimator) -> Prepared:
         from models.training.inputs import prepare_clips
@@ -160,7 +166,7 @@ class _Desk:
         key = (side, estimator.front_end.hash)
         if key not in self._prepared:
             pairs = self._side(side)
-            with _bar(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
+            with progress(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
                 self._prepared[key] = prepare_clips(
                     pairs, estimator.front_end, estimator.cropping, folder=self._cache, workers=self._workers,
                     advance=advance,
@@ -186,19 +192,29 @@ class _Desk:
         _, low, high = self._known
         return f", area weight known to lie in {low:g} to {high:g} kg/m² (which only distributions use)"
 
-    def _all_sequences(self) -> int:
-        return len(set(self._side("train").table.seed.tolist()))
+    def _sequences(self, data: DataSpec) -> int:
+        """How many a model of these data sets was trained on."""
+        return len(set(self._of(data, "train").table.seed.tolist()))
 
     def _handmade(self, side: str) -> list[Predictions]:
         from models.evaluation.handmade import predictions
 
         return predictions(
-            self._side("train"), self._side(side), cache=self._cache, workers=self._workers, seed=self._seed, bars=_bar
+            self._side("train"),
+            self._side(side),
+            cache=self._cache,
+            workers=self._workers,
+            seed=self._seed,
+            bars=progress,
         )
 
 
+def _card(estimator: Estimator) -> Any:
+    return estimator.card
+
+
 def _note(estimator: Estimator) -> str:
-    card: Any = estimator.card
+    card = _card(estimator)
     shape = estimator.front_end
     size = f"{shape.frames}×{shape.size}×{shape.size}"
     best = card.get("best") or {}
@@ -206,27 +222,19 @@ def _note(estimator: Estimator) -> str:
     return f"{size}, {shape.maps}{epochs}, seed {card['seed']}"
 
 
-def _points(
-    learning: Sequence[tuple[int, Predictions]], told: Sequence[Predictions], everything: int
-) -> list[LearningPoint]:
-    """RMSE of wind against the number of sequences; the models of all of them are its last points."""
+def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
+    """RMSE of wind against the number of sequences, of each run."""
     from flagdata.rng import stream
     from models.evaluation.bootstrap import Resamples, estimate
     from models.evaluation.curves import LearningPoint
     from models.evaluation.predictions import WIND
     from models.evaluation.scores import SCORES
 
-    labels = {predictions.label for _, predictions in learning}
-    rows = [*learning, *((everything, own) for own in told if own.label in labels)]
     points = []
-    for sequences, own in sorted(rows, key=lambda row: (row[1].label, row[0])):
+    for sequences, own in sorted(learned, key=lambda point: (point[1].label, point[0])):
         resamples = Resamples.of(own.group, generator=stream(0, "learning"))
         found = estimate(SCORES["rmse"].values(own, WIND, resamples), clips=len(own.group), groups=resamples.groups)
         points.append(
             LearningPoint(label=own.label, sequences=sequences, rmse=found.value, interval=(found.low, found.high))
         )
     return points
-
-
-def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
-    return progress(total, label=label, unit=unit)

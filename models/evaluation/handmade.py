@@ -5,50 +5,65 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
-from models.boosting import fit_boosting
+from models.boosting import Boosting, fit_boosting
 from models.crops import Cropping
 from models.evaluation.predict import DRAWS, milliseconds
 from models.evaluation.predictions import Predictions
 from models.frontend import FrontEnd
 from models.handmade import FEATURES, features
-from models.ridge import fit_ridge
+from models.ridge import Ridge, fit_ridge
 from models.training.inputs import Prepared, prepare_clips, prepare_films
 
 TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
 _FRONT_END = FrontEnd(maps="handmade")
+_CROPPING = Cropping()
 _VARIANTS = 4
 
 Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
 
-def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
-    """Ridge and gradient boosting, fitted on crops of the training side's films, for the clips of another side."""
-    cropping = Cropping()
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted:
+    """Both models, fitted on the same crops of a data set's films; what they tell is `TARGETS`, in this order."""
+
+    ridge: Ridge
+    boosting: Boosting
+
+    def quantiles(self, film: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """What boosting tells of a clip (frame, height, width), (level, target)."""
+        return self.boosting.predict_quantiles(_features(film).double().numpy())[0]
+
+
+def fitted(train: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
+    """Ridge and gradient boosting, fitted on crops of the training side's films."""
     with bars(len(set(train.table.recording.tolist())), "hand-made features to fit on", "film") as advance:
         known = prepare_films(
-            train, _FRONT_END, cropping, variants=_VARIANTS, folder=cache, workers=workers, advance=advance
+            train, _FRONT_END, _CROPPING, variants=_VARIANTS, folder=cache, workers=workers, advance=advance
         )
-    with bars(len(judged), "hand-made features to judge", "clip") as advance:
-        asked = prepare_clips(judged, _FRONT_END, cropping, folder=cache, workers=workers, advance=advance)
     x, y = _table(known, _VARIANTS), np.tile(known.truth(TARGETS), (_VARIANTS, 1))
     group = np.tile(known.sequence, _VARIANTS)
+    return Fitted(
+        ridge=fit_ridge(x, y, group=group), boosting=fit_boosting(x, y, seed=child_seed(seed, "boosting") % 2**32)
+    )
+
+
+def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
+    """What both say of the clips of another side."""
+    models = fitted(train, cache=cache, workers=workers, seed=seed, bars=bars)
+    ridge, boosting = models.ridge, models.boosting
+    with bars(len(judged), "hand-made features to judge", "clip") as advance:
+        asked = prepare_clips(judged, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance)
     wanted, truth = _table(asked, 1), asked.truth(TARGETS)
-
-    def work(clip: NDArray[np.uint8]) -> None:
-        film = clip[0]
-        cut = cropping.cut(film, cropping.whole((film.shape[0], film.shape[1], film.shape[2])))
-        features(cut[None].float(), rate=_FRONT_END.rate)
-
-    spent = milliseconds(work, judged)
-    ridge = fit_ridge(x, y, group=group)
-    boosting = fit_boosting(x, y, seed=child_seed(seed, "boosting") % 2**32)
+    spent = milliseconds(lambda clip: _features(clip[0]), judged)
     common = {"targets": TARGETS, "truth": truth, "group": asked.sequence, "embedding": None}
     note = f"{len(FEATURES)} hand-made features, {_VARIANTS} crops of each film"
     return [
@@ -61,6 +76,12 @@ def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed:
             milliseconds=spent, note=note, parameters=0, **common,
         ),
     ]  # fmt: skip
+
+
+def _features(film: NDArray[np.uint8]) -> Tensor:
+    """(1, feature) of a clip."""
+    cut = _CROPPING.cut(film, _CROPPING.whole((film.shape[0], film.shape[1], film.shape[2])))
+    return features(cut[None].float(), rate=_FRONT_END.rate)
 
 
 def _table(prepared: Prepared, variants: int) -> NDArray[np.float64]:

@@ -67,7 +67,7 @@ def train(
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
     report = trained(
         loaded, Path(lake_path), at=at, cache=folder, run=run, workers=workers or os.cpu_count() or 1, device=device,
-        branch=branch, bars=_bar,
+        branch=branch, bars=progress,
     )  # fmt: skip
     if report is None:  # another rank of a torchrun reports
         return
@@ -168,7 +168,3 @@ def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | Non
 
     split = ExplicitSplit(where={name: recipe.data.where(name) for name in ("train", "validation", "test")})
     return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)
-
-
-def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Callable[[int], None]]:
-    return progress(total, label=label, unit=unit)

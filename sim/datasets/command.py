@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from flagdata.console import document, json_option, lake_option, progress, say, 
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
-    from sim.datasets.build import Advance
     from sim.datasets.plan import Plan
 
 
@@ -81,7 +79,7 @@ def build(
     lake = _lake(lake_path) or _made(lake_path)
     with connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
-            lake=lake, recipe=loaded, client=client, bars=_bar, say=_beside_bar, branch=branch, device=device
+            lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device
         ).run()
     written = write_card(lake, loaded, branch=branch, path=card)
     if as_json:
@@ -94,10 +92,6 @@ def build(
         f"in {report.seconds:.0f} s; {report.clips} clips"
     )
     click.echo(written)
-
-
-def _bar(total: int, label: str, unit: str) -> AbstractContextManager[Advance]:
-    return progress(total, label=label, unit=unit)
 
 
 def _beside_bar(text: str) -> None:

@@ -67,6 +67,7 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the commands of start.md ran."""
     folder = tmp_path_factory.mktemp("started")
     write_small_field(folder, RECIPE)
+    shutil.copy(folder / "flag.mp4", folder / "cloth.mp4")  # what is measured as a cloth: the command is tested
     with pytest.MonkeyPatch.context() as patch:
         enter(folder, patch, "start.md")
         assert "export FLAGDATA_LAKE=field.lake" in commands("start.md")

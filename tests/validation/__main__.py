@@ -26,6 +26,7 @@ VALIDATIONS = {
     "robot-held": "tests.validation.robot_held",
     "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
+    "wave-ablation": "tests.validation.wave_ablation",
 }
 
 if __name__ == "__main__":

@@ -4,8 +4,12 @@ Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, F
 FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how many evaluations each method has (50),
 FLAGDATA_REFINE_PEERS which optimisers (all, separated by commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped
 one), FLAGDATA_REFINE_CACHE a folder for evaluations, so that an interrupted run goes on. Without a lake it is left out.
+With FLAGDATA_REFINE_LAKE=changed the targets are flags of another mesh, integrator and step than any that was learned
+from, with textures that none had; half of them are rendered by Cycles (in the environment that FLAGDATA_BLENDER names).
 With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of the reference simulator (../shared/data/arcsim), filmed by our
 rasteriser: six runs, of two views each for 12 targets.
+FLAGDATA_REFINE_HANDMADE names a lake with flagsim-wide that gradient boosting on hand-made features learns from, at
+FLAGDATA_REFINE_AT, with the features kept beside it; without it that peer is left out.
 Writes `refinement.md` beside the JSON.
 """
 
@@ -22,7 +26,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.dataset import Source
+from flagdata.console import progress
+from flagdata.dataset import ExplicitSplit, Source
 from flagdata.rng import child_seed, stream
 from measure.refine import start
 from measure.refine.command import RENDERS, scene_of
@@ -32,17 +37,33 @@ from measure.refine.peers.registry import PEERS, minimise
 from measure.refine.procedure import Settings, refine
 from measure.refine.refinement import Refinement
 from measure.refine.space import DENSITY, DIMENSION, WIND, Space
-from measure.refine.target import Target, of_recording
+from measure.refine.target import Target, as_stated, of_recording
 from measure.refine.trace import Trace
 from measure.refine.view import DrawnView
 from models import estimator as models
 from models.estimator import Estimator
+from models.evaluation.handmade import TARGETS, Fitted, fitted
+from models.training.recipe import DataSpec
 from sim.assets import Assets
 from sim.render.prior import named
-from tests.validation.transfer import REFERENCE_RUNS, reference_clips
+from tests.validation.transfer import (
+    REFERENCE_RUNS,
+    by_cycles,
+    filmed,
+    finer_mesh,
+    implicit,
+    other_textures,
+    reference_clips,
+    unseen,
+)  # fmt: skip
 
+_OF = {
+    "arcsim": "the reference simulator's runs, filmed by our rasteriser by cameras that are not told",
+    "changed": "flags of another mesh, integrator, step and texture than any learned from, half of them by Cycles",
+}
+"""What the targets are, where they are of no lake."""
 LEVEL = 0.9
-ARCSIM = "arcsim"
+ARCSIM, CHANGED = _OF
 _RESAMPLES = 2000
 _OWN, _REGRESSION = "refine", "regression alone"
 
@@ -85,11 +106,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     scene = scene_of(estimator)
     space = Space.of(scene)
     at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
+    handmade = _handmade(at, seed)
     scores: list[Score] = []
     stages: dict[str, list[float]] = {}
     own: list[Refinement] = []
     if lake == ARCSIM:
         targets = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
+    elif lake == CHANGED:
+        targets = _changed(count, space, frames=estimator.front_end.frames, seed=seed)
     else:
         targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
     for number, target in enumerate(targets):
@@ -99,6 +123,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         )  # fmt: skip
         own.append(found)
         scores += [_regression(target, estimator, space, seed), _of_own(target, found)]
+        if handmade is not None:
+            scores.append(_boosting(target, handmade))
         for stage, spent in found.seconds.items():
             stages.setdefault(stage, []).append(spent / found.evaluations)
         for peer in peers:
@@ -138,6 +164,22 @@ def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> lis
     return found
 
 
+def _changed(count: int, space: Space, *, frames: int, seed: int) -> list[Target]:
+    """Flags of another mesh, integrator, step and texture, the second half rendered by Cycles."""
+    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    found: list[Target] = []
+    for renderer, flags in (("raster", count - count // 2), ("cycles", count // 2)):
+        if not flags:
+            continue
+        recipe = other_textures(implicit(finer_mesh(unseen(flags, child_seed(seed, renderer)))))
+        recipe = by_cycles(recipe) if renderer == "cycles" else recipe
+        found += [
+            as_stated(f"{renderer} {number}", film[:frames], stated, otherwise=otherwise, space=space)
+            for number, (film, stated) in enumerate(filmed(recipe))
+        ]
+    return found
+
+
 def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
     """Runs of the reference simulator, of as many views as there must be; how they were filmed is not told."""
     data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
@@ -171,6 +213,32 @@ def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -
         method=_REGRESSION, wind_error=abs(middle[0] - wind), density_error=abs(middle[1] - density),
         wind_inside=bool(low[0] <= wind <= high[0]), density_inside=bool(low[1] <= density <= high[1]),
         evaluations=0, seconds=seconds,
+    )  # fmt: skip
+
+
+def _handmade(at: str, seed: int) -> Fitted | None:
+    lake = os.environ.get("FLAGDATA_REFINE_HANDMADE")
+    if lake is None:
+        return None
+    spec = DataSpec(datasets=("flagsim-wide",))
+    split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
+    train = Source.open(lake).pairs(at=at, split="train", split_by=split)
+    return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
+
+
+def _boosting(target: Target, models: Fitted) -> Score:
+    begun = time.perf_counter()
+    quantiles = models.quantiles(target.clip)
+    seconds = time.perf_counter() - begun
+    level = models.boosting.levels
+    low, middle, high = (quantiles[level.index(p)] for p in (0.05, 0.5, 0.95))
+    wind, density = (TARGETS.index(name) for name in ("wind_speed", "density"))
+    true = target.truth
+    return Score(
+        method="boosting on hand-made features", wind_error=abs(middle[wind] - true["wind_speed"]),
+        density_error=abs(middle[density] - true["density"]),
+        wind_inside=bool(low[wind] <= true["wind_speed"] <= high[wind]),
+        density_inside=bool(low[density] <= true["density"] <= high[density]), evaluations=0, seconds=seconds,
     )  # fmt: skip
 
 
@@ -229,7 +297,7 @@ def _resampled(values: NDArray[np.float64], of: Callable[..., Any], seed: int, *
 
 def _sheet(result: dict[str, Any]) -> str:
     about = (
-        f"{len(result['targets'])} clips of the test side of `{result['lake']}` ({result['at']}), model "
+        f"{len(result['targets'])} clips of {_OF.get(result['lake'], _of_lake(result))}, model "
         f"`{result['model']}`, {result['budget']} simulated clips for each method; medians with 90 % bootstrap "
         f"intervals over targets, coverage of {result['level']:.0%} intervals. Peers report their nearest evaluation "
         "and have no interval."
@@ -248,6 +316,10 @@ def _sheet(result: dict[str, Any]) -> str:
     stages = ", ".join(f"{stage} {spent:.2f} s" for stage, spent in result["seconds_per_evaluation"].items())
     lines += ["", f"Time of an evaluation of `{_OWN}`: {stages}.", ""]
     return "\n".join(lines)
+
+
+def _of_lake(result: dict[str, Any]) -> str:
+    return f"the test side of `{result['lake']}` ({result['at']})"
 
 
 def _span(values: list[float] | None, digits: int) -> str:

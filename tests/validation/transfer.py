@@ -56,8 +56,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     model = estimator.shipped()
     result: dict[str, Any] = {"model": model.name, "level": LEVEL, "false_alarm": FALSE_ALARM, "of": {}}
     for name, change in CHANGES.items():
-        recipe = change(_smaller(load(_BASE), FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))
-        result["of"][name] = _scores(model, list(_filmed(recipe)), seed)
+        recipe = change(unseen(FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))
+        result["of"][name] = _scores(model, [_clip(frames, stated) for frames, stated in filmed(recipe)], seed)
     data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
     runs = Path(data) / "arcsim"
     if runs.is_dir():
@@ -74,20 +74,32 @@ Clip = tuple[NDArray[np.uint8], float, float]
 """Frames (n, height, width) gray, the true wind speed [m/s] and area weight [kg/m²]."""
 
 
-def _smaller(recipe: DatasetRecipe, flags: int, seed: int) -> DatasetRecipe:
+def unseen(flags: int, seed: int) -> DatasetRecipe:
     """One side of so many flags, one film each, of seeds that no data set has."""
     side = Side(name="test", sequences=flags, renders=flags)
-    return replace(recipe, name="transfer", seed=child_seed(seed, "transfer"), sides=(side,))
+    return replace(load(_BASE), name="transfer", seed=child_seed(seed, "transfer"), sides=(side,))
 
 
-def _mesh(recipe: DatasetRecipe) -> DatasetRecipe:
+def finer_mesh(recipe: DatasetRecipe) -> DatasetRecipe:
+    """925 vertices a flag."""
     simulation = recipe.simulation
     return replace(recipe, simulation=replace(simulation, scene=replace(simulation.scene, columns=36)))
 
 
-def _implicit(recipe: DatasetRecipe) -> DatasetRecipe:
+def implicit(recipe: DatasetRecipe) -> DatasetRecipe:
+    """Backward Euler by steps of 2.5 ms."""
     spec = IntegratorSpec(name="implicit", step=0.0025)
     return replace(recipe, simulation=replace(recipe.simulation, integrator=spec))
+
+
+def other_textures(recipe: DatasetRecipe) -> DatasetRecipe:
+    """Stripes, checks and prints instead of the national flags that were learned from."""
+    return replace(recipe, prior=replace(recipe.prior, textures=("stripes", "checks", "print")))
+
+
+def by_cycles(recipe: DatasetRecipe) -> DatasetRecipe:
+    """Blender's path tracer instead of our rasteriser."""
+    return replace(recipe, renderer="cycles")
 
 
 def _noisy(recipe: DatasetRecipe) -> DatasetRecipe:
@@ -101,17 +113,16 @@ def _noisy(recipe: DatasetRecipe) -> DatasetRecipe:
 
 CHANGES: dict[str, Callable[[DatasetRecipe], DatasetRecipe]] = {
     "as trained, other seeds": lambda recipe: recipe,
-    "mesh of 925 vertices": _mesh,
-    "backward Euler at 2.5 ms": _implicit,
-    "stripes, checks and prints instead of national flags": lambda recipe: replace(
-        recipe, prior=replace(recipe.prior, textures=("stripes", "checks", "print"))
-    ),
+    "mesh of 925 vertices": finer_mesh,
+    "backward Euler at 2.5 ms": implicit,
+    "stripes, checks and prints instead of national flags": other_textures,
     "noise beyond the training's, coarser H.264": _noisy,
-    "rendered by Cycles": lambda recipe: replace(recipe, renderer="cycles"),
+    "rendered by Cycles": by_cycles,
 }
 
 
-def _filmed(recipe: DatasetRecipe) -> Iterator[Clip]:
+def filmed(recipe: DatasetRecipe) -> Iterator[tuple[NDArray[np.uint8], dict[str, Any]]]:
+    """Frames (n, height, width) of each flag's film, and the parameters that its recording states."""
     (cast,) = casts(recipe)
     indices = range(cast.simulation.count)
     sequences: dict[int, MeshSequence] = {}
@@ -123,17 +134,19 @@ def _filmed(recipe: DatasetRecipe) -> Iterator[Clip]:
     members = tuple((cast, index, f"{index:032x}") for index in sequences)
     few = replace(recipe, sides=(replace(recipe.sides[0], renders=len(members)),))
     for film in Sequences(recipe=few, side="test", members=members).films():
-        yield _clip(few, film, sequences[film.index])
+        yield _frames(few, film, sequences[film.index])
 
 
-def _clip(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> Clip:
+def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     done = jobs.film(recipe, film, sequence, "cpu")
-    truth = json.loads(done.parameters)
     with tempfile.NamedTemporaryFile(suffix=".mcap") as kept:
         kept.write(done.data)
         kept.flush()
-        frames = Record.open(Path(kept.name)).frames(0, len(sequence))
-    return frames, truth["wind_speed"], truth["density"]
+        return Record.open(Path(kept.name)).frames(0, len(sequence)), json.loads(done.parameters)
+
+
+def _clip(frames: NDArray[np.uint8], stated: dict[str, Any]) -> Clip:
+    return frames, stated["wind_speed"], stated["density"]
 
 
 def reference_clips(folder: Path, seed: int, frames: int, *, views: int) -> Iterator[tuple[str, Clip]]:

@@ -6,6 +6,7 @@ is taken without asking. What is in doubt is named with the one thing to say, an
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,6 +19,7 @@ from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
     COMPONENTS,
+    NO_ANGLE,
     Column,
     Wind,
     beaufort,
@@ -33,10 +35,15 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
 from flagdata.ingest.anemometer.unitcheck import FASTEST
+from flagdata.units import spelled
 from flagdata.units import unit as unit_of
 
 CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
 """Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
+_STATED = re.compile(
+    r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
+)
+"""How lines above a heading state a unit."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
 
 
@@ -124,7 +131,7 @@ def draft(
         )  # fmt: skip
     labels = tuple(one.label for one in winds)
     chosen = next((one for one in winds if one.label == wind), None)
-    doubts = list(_doubts(layout, time, winds, chosen))
+    doubts = list(_doubts(lines, layout, time, winds, chosen))
     if wind is not None and chosen is None and mixed is not None and winds:
         # A site that the first rows do not hold.
         label, _, rest = wind.partition(":")
@@ -134,6 +141,12 @@ def draft(
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
     chosen = chosen or (winds[0] if winds else None)
+    if layout.short:
+        shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
+        warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
+    if time is not None and time.unnamed:
+        shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
+        warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
@@ -166,11 +179,16 @@ def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
     return tuple(found)
 
 
-def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None) -> list[Doubt]:
+def _doubts(
+    lines: Sequence[str], layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None
+) -> list[Doubt]:
     found: list[Doubt] = []
     names = ", ".join(repr(name) for name in layout.names if name) or "no names"
     if time is None:
-        fix = "write a recipe with [time] columns and format, and name it: --recipe FILE.toml"
+        fix = (
+            "if a column is the time, write a recipe with [time] columns and format, and name it: --recipe FILE.toml; "
+            "if none is and the rows came at a steady rate: --start TIME --rate HZ"
+        )
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
         found.append(Doubt(what=time.doubt, fix=time.fix))
@@ -178,6 +196,10 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     if not winds and classes:
         what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
         found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
+    elif not winds and (directions := _directions(layout)):
+        what = f"column {directions[0]!r} is a direction of the wind, but no column is its speed"
+        fix = "log the speed beside it; if a column is the speed all the same, name it: --wind COLUMN --unit m/s"
+        found.append(Doubt(what=what, fix=fix))
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
@@ -189,7 +211,7 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     for wind in (chosen,) if chosen is not None else winds:
         missing = wind.without_unit()
         if missing:
-            found.append(_unit_doubt(layout, wind, missing))
+            found.append(_unit_doubt(lines, layout, wind, missing))
             break
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
@@ -199,7 +221,28 @@ def _doubts(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chos
     return found
 
 
-def _unit_doubt(layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
+def _directions(layout: Layout) -> list[str]:
+    return [name for name in layout.names if understand(name).channel.endswith("wind_direction")]
+
+
+def _stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
+    """The one unit of speed that lines above the heading state, as "Units: mph", the line's number and the words."""
+    found: dict[str, tuple[str, int, str]] = {}
+    for number, line in enumerate(lines, start=1):
+        for match in _STATED.finditer(line):
+            name = spelled(match[1])
+            if name is not None and unit_of(name).si == "m/s":
+                found.setdefault(name, (name, number, match[0]))
+    return next(iter(found.values())) if len(found) == 1 else None
+
+
+def _unit_doubt(lines: Sequence[str], layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
+    above = _stated_unit(lines[: layout.preamble])
+    if above is not None:
+        name, number, words = above
+        heading = layout.names[wind.columns[missing[0]].index]
+        what = f"the unit of column {heading!r} is not stated in its heading; line {number} says {words!r}"
+        return Doubt(what=what, fix=f"if that is the unit of the wind, give it: --unit {name}")
     column = wind.columns[missing[0]].index
     value = numbers(layout.column(column), decimal=layout.decimal).value
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
@@ -334,6 +377,15 @@ def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
     return (other,) if other is not None and alone else ()
 
 
+def _near_a_thousand(layout: Layout, wind: Wind | None) -> bool:
+    """Whether a pressure of the table may be as large as a code for "no direction"."""
+    column = wind.columns.get("air_pressure") if wind is not None else None
+    if column is None:
+        return False
+    value = numbers(layout.column(column.index), decimal=layout.decimal).value
+    return bool(np.nanmedian(np.abs(value)) > 700)
+
+
 def _codes(layout: Layout, wind: Wind | None) -> list[float]:
     """Codes for "no value": those that no quantity here can have, and those above every other value of the wind."""
     codes = list(CODES)
@@ -345,6 +397,8 @@ def _codes(layout: Layout, wind: Wind | None) -> list[float]:
             codes = [code for code in codes if abs(code) * unit_of(column.unit).scale > FASTEST]
         if channel.endswith("direction") and bool(np.any((known < 0) & ~np.isin(known, CODES))):
             codes = [code for code in codes if code < -180]
+        if channel.endswith("direction") and not _near_a_thousand(layout, wind):
+            codes.extend(code for code in NO_ANGLE if code in known)
         for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
             others = known[known != code]
             if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:

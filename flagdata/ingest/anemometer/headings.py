@@ -305,6 +305,8 @@ def _known(words: str) -> str | None:
         return None
     if text.lower() in ("ms", "m/s/1", "m_s"):
         return "m/s"
+    if text.lower() == "km/h/1":
+        return "km/h"
     return spelled(text)
 
 

@@ -31,6 +31,10 @@ _NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
 """Words beside which a heading is still that of a site."""
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
+NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
+"""Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
+_CALM = frozenset({"calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr"})
+"""What stands in a column of compass points where there is no direction."""
 _UNREADABLE = 0.1
 
 
@@ -129,7 +133,7 @@ def find_winds(
 
 def _points(cells: Sequence[str]) -> NDArray[np.float64] | None:
     """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
-    filled = [cell for cell in cells if cell_kind(cell) != "missing"]
+    filled = [cell for cell in cells if cell_kind(cell) != "missing" and cell.lower() not in _CALM]
     if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):
         return None
     return np.array([POINTS.get(cell.upper(), np.nan) for cell in cells])
@@ -383,6 +387,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         return None
     if heading.unit == "gon":
         return channel, Column(index=index, unit="gon", told="in gon by its heading", towards=heading.towards)
+    coded = np.isin(known, NO_ANGLE)
+    known = known[~coded] if float(coded.mean() if len(known) else 0.0) < 0.5 else known
     if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
         found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
         return None

@@ -21,6 +21,7 @@ from typing import Any
 
 from flagdata.errors import LimitError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
@@ -29,6 +30,15 @@ WIDEST = 2000
 _DEEPEST = 8
 """Objects within objects that are looked into."""
 _LOOKED_AT = 50
+_PLATFORM = frozenset(
+    {"lat", "latitude", "lon", "lng", "longitude", "position", "sog", "cog", "heading", "navigation", "course"}
+)
+"""Words of members that tell where a platform is, or how it moves."""
+_REPEAT = "sequence_num"
+"""The number of a repeat of one radio message, from 0, as rtl_433 writes it."""
+_NUMBERED = re.compile(r"[0-9]{1,9}")
+_RECEPTION = frozenset({_REPEAT, "rssi", "snr", "noise", "freq", "freq1", "freq2"})
+"""Members that tell how a radio message was received, not what it says."""
 _LINE = re.compile(r"\s*(?P<before>[^\s{\[][^{]{0,300}?)?[\s,;]*(?P<object>\{.*\})[\s,]*")
 _TEMPEST = {
     "obs_st": (
@@ -54,7 +64,7 @@ def matches(lines: Sequence[str]) -> bool:
         return bool(re.match(r"\s*\"[^\"]*\"\s*:", "".join(filled[1:])))
     objects = [match for line in filled if (match := _LINE.fullmatch(line)) is not None and _object(match["object"])]
     messages = sum('"pgn":' in match["object"] for match in objects)
-    return len(objects) > len(filled) / 2 > messages
+    return 2 * len(objects) >= len(filled) > 2 * messages
 
 
 def as_table(source: TextFile) -> TableText | None:
@@ -80,19 +90,63 @@ def as_table(source: TextFile) -> TableText | None:
             raise LimitError(f"JSON with more than {WIDEST} kinds of members", where=str(source.path), fix=fix)
     if not names:
         return None
+    table, repeats = _once(table)
+    kept, others = _of_wind(table, tuple(names))
+    if others:
+        names = dict.fromkeys(name for name in names if any(name in row for row in kept))
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerows(before)
     writer.writerow(names)
-    writer.writerows([row.get(name, "") for name in names] for row in table if row)
+    writer.writerows([row.get(name, "") for name in names] for row in kept)
     text = f"JSON, read as a table of {len(names)} columns; lines are counted with its heading as the first"
     found = [Finding(kind="json-table", severity=Severity.NOTE, what=text)]
+    if others:
+        text = f"{others} objects have no member of the wind that others have: messages of another kind; left out"
+        found.append(Finding(kind="other-messages", severity=Severity.NOTE, count=others, what=text))
+    if repeats:
+        text = f"{repeats} objects are repeats of the same radio message ({_REPEAT}); left out"
+        found.append(Finding(kind="repeated-messages", severity=Severity.NOTE, count=repeats, what=text))
     if broken:
         text = f"{broken} lines are no JSON objects; left out"
         found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=broken, what=text))
     lines = tuple(out.getvalue().splitlines())
     plain = TextFile(path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *found))
     return TableText(**{**vars(plain), "text": lines})
+
+
+def _once(table: Sequence[dict[str, str]]) -> tuple[list[dict[str, str]], int]:
+    """The rows without those that repeat the radio message before them, and the number of these.
+
+    A sender repeats each message in case it is lost; a receiver that numbers the repeats writes them under one stamp.
+    """
+    kept: list[dict[str, str]] = []
+    last: dict[str, str] = {}
+    for row in table:
+        numbers = [_NUMBERED.fullmatch(each.get(_REPEAT, "")) for each in (last, row)]
+        if all(numbers) and int(row[_REPEAT]) > int(last[_REPEAT]):
+            same = {k: v for k, v in row.items() if k not in _RECEPTION}
+            if same == {k: v for k, v in last.items() if k not in _RECEPTION}:
+                last = row
+                continue
+        kept.append(row)
+        last = row
+    return kept, len(table) - len(kept)
+
+
+def _of_wind(table: Sequence[dict[str, str]], names: Sequence[str]) -> tuple[list[dict[str, str]], int]:
+    """The rows that hold the wind or where the platform is, and the number of the others; all where no row holds it.
+
+    A logger writes messages of several kinds, with and without wind; those without are no missing readings.
+    """
+    filled = [row for row in table if row]
+    headings = {name: understand(name) for name in names}
+    windy = {name for name in names if "wind" in headings[name].quantity}
+    if not windy:
+        return filled, 0
+    wanted = windy | {name for name in names if set(words_of(name)) & _PLATFORM}
+    kept = [row for row in filled if not wanted.isdisjoint(row)]
+    return kept, len(filled) - len(kept)
 
 
 def _whole(source: TextFile) -> Any:

@@ -39,6 +39,11 @@ def matches(lines: Sequence[str]) -> bool:
     return _heading(lines) is not None
 
 
+def stamped(lines: Sequence[str]) -> bool:
+    """Whether a stamp stands before any of the lines."""
+    return any(cut is not None and bool(cut[1]) for cut in map(_cut, lines))
+
+
 def as_table(source: TextFile) -> TableText | None:
     """The numbers below the words before them; `None` where another format knows the lines."""
     from flagdata.ingest.anemometer.sniff import recognise  # it imports the module that asks for this one

@@ -57,6 +57,7 @@ class Layout:
         suffixes: of the columns, the unit behind every number ("4.3 mph"); "" where there is none.
         unit_columns: of the columns, the index of the next one where that spells their unit in every row; else `None`.
         strange: what of the heading is not understood.
+        short: how many columns the heading names, where rows have more and it is taken for the first of them; else 0.
     """
 
     delimiter: str
@@ -71,6 +72,7 @@ class Layout:
     suffixes: tuple[str, ...] = ()
     unit_columns: tuple[int | None, ...] = ()
     strange: tuple[str, ...] = ()
+    short: int = 0
 
     def column(self, index: int) -> list[str]:
         """Cells of a column, trimmed, without the unit behind their numbers."""
@@ -108,6 +110,10 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     rows = tuple(tuple(cells) for _, cells in kept)
     full = Counter(len(cells) for (_, cells), fit in zip(table, fits, strict=True) if fit).most_common(1)[0][0]
     names, units, at, by_name, strange = _heading(lines, start, delimiter, (width, full), interest)
+    short = _short(lines, at, delimiter, width)
+    if short and _shifted(table, names, kept, short, interest):
+        strange = (*strange, f"line {(at or 0) + 1} names {short} columns, but rows have {width}, and do not fit it")
+        names, units, at, by_name, short = ("",) * width, ("",) * width, None, False, 0
     suffixes = tuple(_suffix([row[index] for row in rows]) for index in range(width))
     beside = tuple(_unit_column(rows, index) if index in typed else None for index in range(width))
     units = tuple(
@@ -119,7 +125,37 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         delimiter=delimiter, decimal=decimal, preamble=start if at is None else at,
         header=0 if at is None else start - at, names=names, units=units, by_name=by_name, rows=rows,
         lines=tuple(number + 1 for number, _ in kept), suffixes=suffixes, unit_columns=beside, strange=strange,
+        short=short,
     )  # fmt: skip
+
+
+def _short(lines: Sequence[str], at: int | None, delimiter: str, width: int) -> int:
+    """How many columns a heading names that has fewer cells than the rows; 0 where it has as many."""
+    if at is None or delimiter == " ":
+        return 0
+    found = len(cut(lines[at].lstrip("\ufeff"), delimiter))
+    return found if 1 < found < width - 1 else 0  # one less is a heading of R, which leaves out that of the row names
+
+
+def _shifted(
+    table: Sequence[tuple[int, list[str]]],
+    names: Sequence[str],
+    rows: Sequence[tuple[int, list[str]]],
+    short: int,
+    interest: Callable[[str], int],
+) -> bool:
+    """Whether a heading that is shorter than the rows is of other rows: they are there, or its quantities are words.
+
+    Args:
+        short: the number of cells of the heading.
+    """
+    own = [cells for _, cells in table if len(cells) == short]
+    if any(sum(cell_kind(cell) in ("number", "stamp") for cell in cells) > short / 2 for cells in own):
+        return True
+    return any(
+        interest(name) and sum(cell_kind(cells[index]) == "text" for _, cells in rows) > 0.5 * len(rows)
+        for index, name in enumerate(names)
+    )
 
 
 def cut(line: str, delimiter: str) -> list[str]:
@@ -168,12 +204,22 @@ def _suffix(cells: Sequence[str]) -> str:
 
 
 def _unit_column(rows: Sequence[Sequence[str]], index: int) -> int | None:
-    """The column next to a column of numbers, where all its cells spell one unit of what a log measures."""
+    """The column next to a column of numbers, where all its cells spell one unit of what a log measures.
+
+    Units side by side are a list of those of the whole row, not the unit of the number before them.
+    """
     if index + 1 >= len(rows[0]):
         return None
-    cells = {row[index + 1].strip() for row in rows} - {""}
-    name = spelled(cells.pop()) if len(cells) == 1 else None
+    name, beyond = _unit_of_all(rows, index + 1), _unit_of_all(rows, index + 2)
+    if beyond is not None:
+        return None
     return index + 1 if name is not None and UNITS[name].si in _BEHIND and name != "1" else None
+
+
+def _unit_of_all(rows: Sequence[Sequence[str]], index: int) -> str | None:
+    """The unit that all cells of a column spell, in the table's name."""
+    cells = {row[index].strip() for row in rows} - {""} if index < len(rows[0]) else set()
+    return spelled(cells.pop()) if len(cells) == 1 else None
 
 
 def _first(rows: Sequence[Sequence[str]], index: int) -> str:
@@ -276,7 +322,11 @@ def _heading(
     if not candidates:
         return nothing, nothing, None, False, tuple(strange)
     scored = [(sum(map(interest, set(cells))), number, cells, plain) for number, cells, plain in candidates]
-    worded = [item for item in scored if _worded(item[2])]
+    worded = [item for item in scored if _worded(item[2]) and not all(map(is_unit, filter(None, item[2])))]
+    if not worded and any(_are_units(cells) for _, cells, _ in candidates):
+        at = next(number for number, cells, _ in candidates if _are_units(cells))
+        units = next(tuple(cells) for number, cells, _ in candidates if number == at)
+        return nothing, units, at, False, tuple(strange)
     if not worded:
         return nothing, nothing, None, False, tuple(strange)
     _, at, names, plain = max(worded, key=lambda item: (item[0], item[3], -item[1]))
@@ -295,7 +345,9 @@ def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] 
         return plain, True
     bare = _MARK.sub("", line.strip())
     ways = [cut(bare, delimiter), re.split(r"\t+|\s{2,}", bare), *(cut(bare, other) for other in (",", ";", "\t", " "))]
-    for way in ways:
+    # A heading that is divided as the rows are is not divided by anything else, such as the blanks in its names.
+    alike = delimiter != " " and len(cut(bare, delimiter)) > 2
+    for way in ways[:1] if alike else ways:
         cells = _trimmed(way, width)
         if len(cells) == width:
             return cells, False

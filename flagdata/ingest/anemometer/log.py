@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import platform, possible, quality, zero, zones
+from flagdata.ingest.anemometer import platform, possible, quality, untimed, zero, zones
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
@@ -41,7 +41,11 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     options = options or WindOptions()
     recipe = recipes.load(options.recipe) if options.recipe is not None else None
     encoding = options.encoding or (recipe.file.encoding if recipe else None)
-    source = restate(open_text(path, limits=options.limits, encoding=encoding), recipe)
+    source = open_text(path, limits=options.limits, encoding=encoding)
+    if options.rate is not None:
+        source = untimed.timed(source, rate=options.rate, start=options.start)
+        options = replace(options, start=None, rate=None)
+    source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()
     unused = options.given() - reader.uses

@@ -20,7 +20,10 @@ DAY = 86_400 * NANOSECONDS
 # The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
 _TRUST = ("ZDA", "RMC", "GGA", "GLL")
 NO_TIME = "the stream carries no time"
-NO_TIME_FIX = "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line"
+NO_TIME_FIX = (
+    "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; "
+    "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
+)
 FEW = 10
 """Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
 DISORDER = 2 * NANOSECONDS

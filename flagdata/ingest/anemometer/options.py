@@ -11,7 +11,7 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.clock import ClockChoice
 from flagdata.units import unit
 
-_LATER = frozenset({"clock", "unit", "start", "wind"})
+_LATER = frozenset({"clock", "unit", "start", "wind", "rate"})
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
 and change nothing, or subtract what they show."""
@@ -57,6 +57,7 @@ class WindOptions:
             it ("last"); `None` where nobody said.
         unit: of the wind's speed, for a file that does not state it; of a file that does, the user's word counts.
         start: instant of the first row [UTC ns], for stamps that count from a start.
+        rate: readings a second [Hz] of a file whose rows carry no time; needs `start`.
         wind: which anemometer of a file that holds several, by the label that `sniff` gives it.
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
@@ -74,6 +75,7 @@ class WindOptions:
     clock: ClockChoice | None = None
     unit: str | None = None
     start: int | None = None
+    rate: float | None = None
     wind: str | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
@@ -89,15 +91,17 @@ class WindOptions:
             raise UsageError(f"azimuth {self.azimuth} is not in radians", where="azimuth", fix="give -2π to 2π")
         if self.unit is not None and unit(self.unit, where="unit").si != "m/s":
             raise UsageError(f"{self.unit} is no unit of speed", where="unit", fix="give m/s, km/h, mph, kn or ft/s")
+        if self.rate is not None and not 1e-6 <= self.rate <= 1e5:
+            raise UsageError(f"a rate of {self.rate:g} Hz", where="rate", fix="give readings a second, 1e-6 to 1e5")
         check_zero_offset(self.zero_offset, where="zero_offset")
 
     def given(self) -> frozenset[str]:
         """Names of the options that a format has to heed.
 
-        Limits and encoding are settled before it; zero offset, a clock set anew and the platform after it, for every
-        format alike.
+        Limits, encoding and a rate are settled before it; zero offset, a clock set anew and the platform after it, for
+        every format alike.
         """
-        apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform"}
+        apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate"}
         return frozenset(f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) is not None)
 
     def as_dict(self) -> Mapping[str, Any]:

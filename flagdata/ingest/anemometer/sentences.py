@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import xor
 
+from flagdata.ingest.anemometer.stamps import whole_year
+
 # A talker is two letters, or, from canboat's n2kd, the device's address on NMEA 2000 as two hexadecimal digits.
 _SENTENCE = re.compile(r"[$!]([A-Z]{2}|[0-9A-F]{2}|P)([A-Z]{3})((?:,[^,*$!]*)*)(?:\*([0-9A-Fa-f]{2}))?\s*$")
 _TAG = re.compile(r"^\\([^\\]*)\*([0-9A-Fa-f]{2})\\")
@@ -115,7 +117,7 @@ def _rmc(fields: Sequence[str]) -> TimeMark | None:
     if time is None:
         return None
     match = _DATE.match(fields[8])
-    date = (2000 + int(match[3]), int(match[2]), int(match[1])) if match and fields[1] == "A" else None
+    date = (whole_year(int(match[3])), int(match[2]), int(match[1])) if match and fields[1] == "A" else None
     return TimeMark(clock=time, date=date)
 
 

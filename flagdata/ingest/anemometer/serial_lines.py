@@ -2,7 +2,8 @@
 
 The instruments do not know the time: it is the stamp that the logging computer wrote before each line, ISO 8601 or Unix
 seconds or milliseconds, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the
-connection's name between stamp and sentence. Each instrument's file says what its lines mean; the rest is here.
+connection's name between stamp and sentence, other programs what they have to say about it. Each instrument's file says
+what its lines mean; the rest is here.
 """
 
 from __future__ import annotations
@@ -34,8 +35,10 @@ from flagdata.signals import Sensor
 
 _STAMP = re.compile(
     r"\s*[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
-    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!]))?(?P<raw>\S.*)"
+    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
 )
+_AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})\s.*")
+"""What a program wrote behind a sentence."""
 _EPOCH = re.compile(
     r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?[\s,;>|]+"
     r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!]))?(?P<raw>\S.*)"
@@ -104,7 +107,8 @@ def split_stamp(line: str) -> tuple[str, str]:
     match = _STAMP.match(line)
     if match is not None:
         stamp = f"{match['date']}T{match['time']}{match['zone'] or ''}"
-        return stamp, _unquoted(match["raw"])
+        raw = _unquoted(match["raw"])
+        return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
     match = _MONTH.match(line)
     if match is not None and match["month"].lower() in MONTHS:
         month = MONTHS.index(match["month"].lower()) + 1

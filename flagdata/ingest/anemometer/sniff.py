@@ -13,6 +13,7 @@ from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
+from flagdata.ingest.anemometer.untimed import ADVICE
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
@@ -45,6 +46,10 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         source = restate(open_text(path, limits=Limits()))
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
+    if source.head(1) == ["FORMAT-1"]:
+        text = "profiles of a SODAR, in blocks whose stamp stands above them (Scintec, APRun, FORMAT-1)"
+        fix = "write a table of one height with the program that reads them: one row a time, with speed and direction"
+        return (Guess(format="SODAR profiles", score=0.0, reasons=(text,), kind="other", fix=fix),)
     guesses = recognise(source)
     if guesses:
         return guesses
@@ -60,11 +65,17 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
         what, recipe = table
-        fix = "name time and wind in a recipe: flagdata ingest --sniff prints one to complete, then --recipe FILE.toml"
+        fix = (
+            "name time and wind in a recipe: flagdata ingest --sniff prints one to complete, then --recipe FILE.toml; "
+            f"{ADVICE}"
+        )
         reason = f"{what}; which of them are the time and the wind, nothing tells"
         return (Guess(format="unknown", score=0.0, reasons=(reason,), kind="other", fix=fix, draft=recipe),)
     text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
-    fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
+    fix = (
+        "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml; "
+    )
+    fix += ADVICE
     return (Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix),)
 
 

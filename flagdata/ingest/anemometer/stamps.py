@@ -3,7 +3,7 @@
 Directives: %Y %y %m %d %j %H %I %p %M %S %b, and %f, which here stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
 optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p". A blank stands
-for any run of blanks or a "T". Two-digit years are 2000 to 2099.
+for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -44,6 +44,8 @@ _ISO = (
 )
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""
+_CENTURY = YEARS[0] % 100
+"""The first year of two digits that is of the 1900s: no log is of the years to come, and some are of the 1990s."""
 PLAIN_FORMS = ("iso", "%Y-%m-%d %H:%M:%S%f")
 """Forms of which 2021-05-14 00:00:00.05 is one."""
 EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000}
@@ -66,6 +68,11 @@ class Stamps:
     valid: NDArray[np.bool_]
     distant: NDArray[np.bool_]
     step: int
+
+
+def whole_year(year: int) -> int:
+    """The year of which `year` is the last two digits: 1970 to 2069."""
+    return year + (2000 if year < _CENTURY else 1900)
 
 
 @functools.cache
@@ -125,7 +132,7 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     written = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
     valid = written.copy()
     part = functools.partial(_part, found)
-    year = part("Y") if part("Y") is not None else _plus(part("y"), 2000)
+    year = part("Y") if part("Y") is not None else _whole_year(part("y"))
     hour, ok = _hour(found, part)
     valid &= ok
     minute, second = part("M"), part("S")
@@ -195,8 +202,8 @@ def _part(found: pa.StructArray, name: str) -> NDArray[np.int64] | None:
     return pc.cast(filled, pa.int64()).to_numpy(zero_copy_only=False)
 
 
-def _plus(values: NDArray[np.int64] | None, number: int) -> NDArray[np.int64] | None:
-    return None if values is None else values + number
+def _whole_year(values: NDArray[np.int64] | None) -> NDArray[np.int64] | None:
+    return None if values is None else np.where(values < _CENTURY, 2000, 1900) + values
 
 
 def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

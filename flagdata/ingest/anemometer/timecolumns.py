@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +27,8 @@ _CLOCKS = (
     "%I:%M %p",
     "%I:%M:%S%p",
     "%I:%M%p",
+    "%I:%M:%S%f %p",
+    "%I:%M:%S%f%p",
     "%H%M%S",
     "%H%M",
     "%H.%M.%S",
@@ -44,10 +47,13 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
+_TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
+_SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
 _DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|dd|day|dom|tag", 1, 31),
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|da|dd|day|dom|tag", 1, 31),
     ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 23),
     ("%M", r"mi|min|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
 )  # fmt: skip
@@ -66,6 +72,7 @@ class TimeChoice:
         fix: what the user can say.
         score: how well it fits, for the choice among several.
         counts: whether it counts from a start, by a unit that may not be known.
+        unnamed: whether it is told by its numbers alone, since no line names the columns.
     """
 
     columns: tuple[int, ...]
@@ -76,6 +83,7 @@ class TimeChoice:
     doubt: str | None = None
     fix: str | None = None
     counts: bool = False
+    unnamed: bool = False
 
 
 def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | None:
@@ -145,7 +153,9 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             found = _whole(layout, (date, clock), texts, order) if texts else None
             if found is not None:
                 yield found
-    parts = _parts(layout, columns)
+    if not clocks:
+        yield from _days(layout, columns, dates)
+    parts = _parts(layout, columns) or _unnamed_parts(layout, columns)
     if parts is not None:
         yield parts
     for index in clocks:
@@ -232,6 +242,19 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
     return None
 
 
+def _days(layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int]) -> Iterator[TimeChoice]:
+    """Dates without a time of day, one a row: means of days."""
+    for index in dates:
+        texts = [cell for cell in columns[index] if cell]
+        if len(texts) > 1 and len(set(texts)) == len(texts):
+            name = layout.names[index] or f"number {index + 1}"
+            yield TimeChoice(
+                columns=(index,), form=None, zone=None, zoned=False, score=0.9,
+                doubt=f"column {name!r} holds dates without a time of day: each row stands for a whole day",
+                fix="export the log with the times of its readings; means of days are no wind at a flag",
+            )  # fmt: skip
+
+
 def _order_of(heading: str) -> Order | None:
     """The order of a date that its heading spells, as "DATE (MM/DD/YYYY)"."""
     found = re.search(r"\b(?P<first>dd?|mm?|yyyy)[-/. ](?P<second>mm?|dd?)[-/. ](?:y|dd?\b)", heading.lower())
@@ -315,6 +338,52 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     return None
 
 
+def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, month, day, hour, minute and second side by side where no line names the columns.
+
+    Whole numbers that are a year, a month, a day, an hour and a minute and rise from row to row are nothing else; what
+    follows is a second only where it is written or moves as one, since a speed looks much the same.
+    """
+    if any(layout.names):
+        return None
+    for index, cells in enumerate(columns):
+        if not _share(_YEAR, cells):
+            continue
+        chosen, form = [index], "%Y"
+        for (directive, _, low, high), at in zip(_PARTS[:4], range(index + 1, len(columns)), strict=False):
+            if not _share(_TWO_DIGITS, columns[at]) or not _whole_numbers(columns[at], low, high):
+                break
+            chosen, form = [*chosen, at], f"{form} {directive}"
+        if "%M" not in form:
+            continue
+        after = chosen[-1] + 1
+        if after < len(columns) - 1 and _seconds(columns[after], [columns[at] for at in chosen]):
+            chosen, form = [*chosen, after], f"{form} %S%f"
+        texts = [" ".join(row) for row in zip(*(columns[i] for i in chosen), strict=True)]
+        found, _ = parse_with_bare_dates(texts, form)
+        if _fits(found) and bool(np.all(np.diff(found.ns[found.valid]) >= 0)):
+            return replace(_choice(layout, tuple(chosen), form, found, 2.2), unnamed=True)
+    return None
+
+
+def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
+    """Whether a column behind that of the minutes, which nothing names, is of the seconds."""
+    if not _share(_SECONDS_OF_MINUTE, cells) or not _whole_numbers([cell.split(".")[0] for cell in cells], 0, 59):
+        return False
+    padded = any(len(cell) > 1 and cell[0] == "0" for column in before for cell in column)
+    if padded and any(len(cell.split(".")[0]) < 2 for cell in cells):
+        return False  # all of the date is written in two digits, this is not
+    if any(re.match(r"0\d", cell) for cell in cells):
+        return True
+    stamps = list(zip(*before, strict=True))
+    same = np.array([one == other for one, other in itertools.pairwise(stamps)], dtype=bool)
+    steps = np.diff(numbers(cells).value)
+    if same.any():
+        return bool(np.all(steps[same] > 0))
+    # Rows minutes apart: the second of a steady clock stays or drifts, a speed does not.
+    return padded and len(steps) > 2 and bool(np.all(np.abs(steps) <= 2))
+
+
 def _part_at(names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]) -> bool:
     if at >= len(names):
         return False
@@ -341,7 +410,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
-        for form, low, high in (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
+        daily = float(np.median(steps[steps > 0])) > 0.5  # seconds of the day rise by one, days by fractions of one
+        for form, low, high in () if daily else (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
                 yield _choice(layout, (index,), form, counted.parse(texts, form), 1.5)
                 return

@@ -9,6 +9,7 @@ import pytest
 import torch
 from click.testing import CliRunner
 
+from measure.challenge import history
 from measure.challenge.command import challenge
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.run import IN_THIS_PROCESS, run
@@ -35,11 +36,13 @@ def test_what_is_made_can_be_judged_and_graded(invoke, tmp_path: Path) -> None:
     # All are judged: nothing is left to do, and no fitter is asked.
     again = invoke("run", str(folder), "--json")
     assert json.loads(again.stdout)["filed"] == []
-    graded = invoke("score", str(folder), "--json", "--out", str(tmp_path / "sheet"))
+    kept = tmp_path / "history.csv"
+    graded = invoke("score", str(folder), "--json", "--out", str(tmp_path / "sheet"), "--history", str(kept))
     # Who finds nothing does not meet the gates.
     assert graded.exit_code == 3
     assert json.loads(graded.stdout)["schema"] == "flagdata.score/1"
     assert sorted(p.suffix for p in (tmp_path / "sheet").iterdir()) == [".json", ".md", ".png"]
+    assert [(row["challenge"], row["sets"]) for row in history.rows(kept)] == [("made", "2")]
 
 
 def test_the_page_on_stdout_is_the_one_that_is_written(invoke, tiny: ChallengeFolder, tmp_path: Path) -> None:

@@ -111,6 +111,12 @@ def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
 
 
+def test_the_shipped_model_of_hanging_cloth_tells_weights_of_its_range(film: Path) -> None:
+    found = answer(film, "--flag-size", "1x1", "--model", "wave-cloth", "--anyway")
+    low, high = found["quantities"]["density"]["interval"]  # type: ignore[index]
+    assert 0.079 <= low < high <= 0.454
+
+
 def test_a_folder_of_images_and_the_video_of_them_say_the_same(film: Path, model_folder: Path, tmp_path: Path) -> None:
     folder = tmp_path / "images"
     folder.mkdir()

@@ -74,7 +74,7 @@ def test_what_no_simulation_looks_like_is_never_at_the_floor(
     found = refine(replace(target, clip=noise), estimator, recipe, settings=SETTINGS)
     assert not found.reached
     assert found.stopped == "the budget is spent"
-    assert "above-noise-floor" in {finding.kind for finding in found.findings}
+    assert {"above-noise-floor", "damping-assumed"} <= {finding.kind for finding in found.findings}
 
 
 def test_two_clips_share_a_cloth_and_have_a_wind_each(recipe: Recipe, estimator: Estimator, target: Target) -> None:

@@ -1,0 +1,153 @@
+"""Logs whose rows carry no time at all, put on the clock that the user gives: a start and a rate.
+
+A serial print, a tunnel's recording or a boat's stream of wind sentences without a clock can be used where its owner
+knows when it began and how many readings a second the instrument sends. Rows that were lost are not seen: each loss
+moves all that follows.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import labelled
+from flagdata.ingest.anemometer.headings import interest
+from flagdata.ingest.anemometer.layout import Layout, cut, lay_out
+from flagdata.ingest.anemometer.serial_lines import split_stamp
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES
+from flagdata.ingest.anemometer.source import TableText, TextFile
+from flagdata.ingest.anemometer.timecolumns import find_time
+from flagdata.timebase import NANOSECONDS, iso
+
+_NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
+_WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
+_TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
+
+
+ADVICE = "where nothing is a time, and the readings came at a steady rate that is known: "
+ADVICE += "--as delimited --wind COLUMN --unit m/s --start TIME --rate HZ"
+
+
+def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
+    """The file with a time in every row.
+
+    Args:
+        rate: readings a second.
+        start: instant of the first reading [UTC ns].
+
+    Raises:
+        UsageError: no start, or rows that say when they were.
+    """
+    where = str(source.path)
+    if start is None:
+        fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
+        raise UsageError("a rate without a start", where=where, fix=fix)
+    lines = source.head(HEAD_LINES)
+    if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
+        _refuse_times(any(_TIMED.search(line) for line in lines), where)
+        text = list(_sentences(source, rate, start))
+    else:
+        _refuse_times(any(split_stamp(line)[0] for line in lines), where)
+        _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
+        stamped = list(_stamped(source, rate, start))
+        text = stamped if labelled.matches(stamped[:HEAD_LINES]) else _table(source, rate, start, where)
+    what = (
+        f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
+    )
+    found = Finding(kind="rate-given", severity=Severity.WARNING, what=what)
+    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, found))
+    return TableText(**{**vars(base), "text": tuple(text)})
+
+
+def _refuse_times(said: bool, where: str) -> None:
+    if said:
+        raise UsageError("the rows say when they were: --rate is not used", where=where, fix="leave it out")
+
+
+def _all_lines(source: TextFile) -> Iterator[str]:
+    for _, lines in source.blocks():
+        yield from lines
+
+
+def _sentences(source: TextFile, rate: float, start: int) -> Iterator[str]:
+    """Sentences with a stamp that moves on with each wind sentence of the most frequent kind."""
+    keys = Counter(_key(match["key"]) for line in _all_lines(source) if (match := _WIND.search(line)) is not None)
+    main = keys.most_common(1)[0][0]
+    count = -1
+    for line in _all_lines(source):
+        match = _WIND.search(line)
+        count += match is not None and _key(match["key"]) == main
+        if line.strip():
+            yield f"{_stamp(start, max(count, 0), rate)} {line.strip()}"
+
+
+def _key(text: str) -> str:
+    """Talker, sentence and reference of a wind sentence, without its angle."""
+    return re.sub(r",[^,]*,", ",", text)
+
+
+def _stamped(source: TextFile, rate: float, start: int) -> Iterator[str]:
+    filled = (line for line in _all_lines(source) if line.strip())
+    for count, line in enumerate(filled):
+        yield f"{_stamp(start, count, rate)} {line.strip()}"
+
+
+def _stamp(start: int, count: int, rate: float) -> str:
+    return iso(start + round(count * NANOSECONDS / rate))
+
+
+def _table(source: TextFile, rate: float, start: int, where: str) -> list[str]:
+    """A table with a column of instants behind its own, whose numbers stay what they are."""
+    lines = source.head(HEAD_LINES)
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
+        return _single(source, rate, start, where)
+    _refuse_times(find_time(layout) is not None, where)
+    first = layout.lines[0]
+    rows = (cut(line, layout.delimiter) for line in _lines_from(source, first))
+    width = layout.number_of_columns()
+    cells = (
+        [*_points(row[:width], layout), _stamp(start, at, rate)] for at, row in enumerate(rows) if len(row) >= width
+    )
+    return _written(_names(layout.names, layout.units), cells)
+
+
+def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
+    """A column of numbers and nothing else, below its heading if it has one."""
+    filled = [line.strip() for line in _all_lines(source) if line.strip()]
+    heading = filled[0] if filled and not _NUMBER.fullmatch(filled[0]) else ""
+    rows = filled[1:] if heading else filled
+    if not rows or sum(bool(_NUMBER.fullmatch(row)) for row in rows) < 0.9 * len(rows):
+        raise UsageError("neither a table nor sentences of wind: --rate is not used", where=where, fix="leave it out")
+    cells = ([row.replace(",", "."), _stamp(start, at, rate)] for at, row in enumerate(rows))
+    return _written(_names([heading], [""]), cells)
+
+
+def _lines_from(source: TextFile, first: int) -> Iterator[str]:
+    for number, lines in source.blocks():
+        yield from (line for at, line in enumerate(lines, start=number) if at >= first and line.strip())
+
+
+def _points(row: Sequence[str], layout: Layout) -> list[str]:
+    """Cells with decimal points."""
+    if layout.decimal == ".":
+        return list(row)
+    return [re.sub(r"^([-+]?\d+),(\d+)", r"\1.\2", cell) for cell in row]
+
+
+def _names(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    named = [name or f"column {at}" for at, name in enumerate(names, start=1)]
+    return [*(f"{name} [{unit}]" if unit else name for name, unit in zip(named, units, strict=True)), "time"]
+
+
+def _written(names: Sequence[str], rows: Iterator[list[str]]) -> list[str]:
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(rows)
+    return out.getvalue().splitlines()
