@@ -140,6 +140,8 @@ def trained(
             device=torch.device(device), bars=bars,
         )  # fmt: skip
         done = training.complete()
+        if several:
+            ranks.barrier()  # no rank leaves while another still talks to it
         if not first:
             return None
         artifact = publish(source.lake, recipe, data, done, batches=training.batches.state(), branch=branch)

@@ -269,6 +269,8 @@ if count > 1:
 TrainingRecipe.learner = small_learner
 own = recipe(Loss.REGRESSION, epochs=2)
 done = training(Path(sys.argv[3]) / f"run-{{count}}", own, checkpoint_seconds=1e9).complete()
+if count > 1:
+    ranks.barrier()  # as `models.training.command` has it: no rank leaves while another still talks to it
 if rank == 0:
     state = {{name: value.double().tolist() for name, value in done.learner.state_dict().items()}}
     (Path(sys.argv[3]) / f"weights-{{count}}.json").write_text(json.dumps(state))
