@@ -89,7 +89,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
     help="Folder of null recordings that were simulated before for such recordings.",
 )
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              help="Significance level of the global test; 0.03 by default.")  # fmt: skip
+              help="Significance level of the global test; 0.05 by default.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls.")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",

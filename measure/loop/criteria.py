@@ -23,8 +23,8 @@ class Criteria:
         level: of the global test, and of the same test of what a model with effects leaves: rejected at p ≤ level.
         interval: level of all intervals.
         fewest_kinds: kinds of numerics below which their spread cannot be told.
-        simulated_kinds: kinds of numerics that are simulated at least where no bank is given. A level of 0.03 can be
-            tested by 33; of 40, one at which a fifth of the groups are as far does not save the base model.
+        simulated_kinds: kinds of numerics that are simulated at least where no bank is given. A level of 0.05 can be
+            tested by 19; of 40, one kind whose groups are all as far does not save the base model.
         alike_noise: difference of the markers' noise up to which nulls stand for the data [m]: it moves statistics
             little beside the 20 mm that meshes do.
         refitted: candidates that are refitted at least, of each of two orders (held-out gain, statistic); all that are
@@ -43,7 +43,7 @@ class Criteria:
         UsageError: a level or share that is not between 0 and 1.
     """
 
-    level: float = 0.03
+    level: float = 0.05
     interval: float = 0.9
     fewest_kinds: int = 4
     simulated_kinds: int = 40

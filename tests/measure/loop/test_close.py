@@ -168,7 +168,7 @@ def test_a_level_that_the_bank_cannot_test_is_said_to_be_so(specimen: Specimen, 
     verdict = close_loop(data, Options(bank=bank))
     assert verdict.conclusion is Conclusion.UNTESTED
     assert verdict.test.p_value.value >= 1 / 13
-    assert "cannot be tested at a level of 0.03" in verdict.words
+    assert "cannot be tested at a level of 0.05" in verdict.words
     assert "At least 33 kinds" in verdict.words
     assert len(verdict.parameters) == 3
 
