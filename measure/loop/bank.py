@@ -34,7 +34,11 @@ from sim.integrate.split import SplitEuler
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
 differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
-_ADDED = {"anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"}
+_VERSION = 2
+"""Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm."""
+_ADDED = {
+    "version", "anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"
+}  # fmt: skip
 """What batches of older versions lack, some of it or all."""
 _SEGMENTS = (
     "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
@@ -154,10 +158,10 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
     own = nulls.statistics
     buffer = BytesIO()
     np.savez(
-        buffer, columns=np.array(names()), recording=own.recording, r=own.r, response=own.response, error=own.error,
-        marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds, calibration=nulls.calibration,
-        noise=nulls.noise,
-        period=nulls.period, cloth=nulls.cloth, duration=np.array(duration),
+        buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
+        response=own.response, error=own.error, marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds,
+        calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
+        duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_told), turned=_moments(own).r, turning=_moments(own).response,
         moment=_moments(own).error, course=_course(own).score, course_curvature=_course(own).curvature,
     )  # fmt: skip
@@ -196,6 +200,8 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
         raise CorruptError(f"not a batch of nulls: {error}", where=str(path), fix=rebuild) from None
     if not set(content) >= {*_ADDED, *_SEGMENTS, "columns", "duration"}:
         raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
+    if content["version"].ravel().tolist() != [_VERSION]:
+        raise CorruptError("its arrays are those of another version", where=str(path), fix="build the bank again")
     if tuple(content["columns"].ravel().tolist()) != names():
         raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
     segments = content["recording"].size

@@ -224,6 +224,7 @@ def arrays() -> dict[str, np.ndarray]:
     return {
         **dict.fromkeys(bank._SEGMENTS, rows), "recording": np.arange(2), "columns": np.array(["a", "b"]),
         "cloth": np.array(["x", "y"]), "duration": np.array(1.0), "anchors_told": np.array(True),
+        "version": np.array(bank._VERSION),
     }  # fmt: skip
 
 
@@ -244,6 +245,13 @@ def test_a_damaged_bank_of_nulls_is_refused(tmp_path: Path, monkeypatch: pytest.
                 np.testing.assert_array_equal(content[name], values)
 
     law()
+
+
+def test_a_bank_of_an_earlier_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bank, "names", lambda: ("a", "b"))
+    np.savez(tmp_path / "nulls-0000.npz", **arrays() | {"version": np.array(bank._VERSION - 1)})
+    with pytest.raises(CorruptError, match=r"another version.*build the bank again"):
+        bank._content(tmp_path / "nulls-0000.npz")
 
 
 @pytest.mark.parametrize("name", sorted(arrays()))
