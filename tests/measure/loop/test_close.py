@@ -169,7 +169,7 @@ def test_a_level_that_the_bank_cannot_test_is_said_to_be_so(specimen: Specimen, 
     assert verdict.conclusion is Conclusion.UNTESTED
     assert verdict.test.p_value.value >= 1 / 13
     assert "cannot be tested at a level of 0.05" in verdict.words
-    assert "At least 33 kinds" in verdict.words
+    assert "At least 19 kinds" in verdict.words  # K + 1 ≥ 1/0.05
     assert len(verdict.parameters) == 3
 
 
