@@ -17,7 +17,7 @@ METHOD = {
     "alignment": {"_CALM"},
     "artifacts": {"_FORMAT"},
     "attribution": {"GUST_COLUMN"},
-    "bank": {"WINDS", "FILE_LIMIT", "_DENSITY", "_BENDING", "_DAMPING", "_STRETCHING"},
+    "bank": {"WINDS", "FILE_LIMIT", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING", "_STRETCHING"},
     "close": {"_FLOOR_COPIES", "_LOOKS"},
     "columns": {
         "_DENSITY",
