@@ -115,7 +115,7 @@ def find_winds(
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        if heading.quantity.endswith("direction") and (degrees := _points(layout.column(index))) is not None:
+        if heading.quantity.endswith("direction") and (degrees := compass_points(layout.column(index))) is not None:
             found.values[index] = degrees
             found.headings[index] = replace(heading, unit="points")
         elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
@@ -131,7 +131,7 @@ def find_winds(
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
 
 
-def _points(cells: Sequence[str]) -> NDArray[np.float64] | None:
+def compass_points(cells: Sequence[str]) -> NDArray[np.float64] | None:
     """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
     filled = [cell for cell in cells if cell_kind(cell) != "missing" and cell.lower() not in _CALM]
     if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):

@@ -80,7 +80,7 @@ def pattern(form: str) -> str:
     """The regular expression of a format.
 
     Raises:
-        UsageError: an unknown directive, one given twice, or no date or no time in it.
+        UsageError: an unknown directive, one given twice, or no whole date in it. A date alone is its midnight.
     """
     if form == "iso":
         return _ISO
@@ -112,9 +112,16 @@ def pattern(form: str) -> str:
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
     dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
     dated = dated or {"y", "b", "d"} <= set(used)
-    if not (dated or {"Y", "j"} <= set(used)) or not {"H", "I"} & set(used):
-        raise UsageError("no whole date and hour in it", where=f"time format {form!r}", fix="name them all")
+    if not (dated or {"Y", "j"} <= set(used)):
+        raise UsageError("no whole date in it", where=f"time format {form!r}", fix="name year, month and day")
+    if not {"H", "I"} & set(used) and {"M", "S", "f", "p"} & set(used):
+        raise UsageError("no hour in it", where=f"time format {form!r}", fix="name the hour, or the date alone")
     return "^" + "".join(out) + "$"
+
+
+def is_date_alone(form: str) -> bool:
+    """Whether a format has directives of a date, but none of the time of day."""
+    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSf")
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
@@ -146,7 +153,7 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     fraction, digits = _fraction(found)
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
     offset, utc = _offset(found, len(text))
-    step = NANOSECONDS if np.any(second[valid]) else 60 * NANOSECONDS
+    step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else 60 * NANOSECONDS
     step = 10 ** (9 - digits) if digits else step
     return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
 
@@ -211,6 +218,8 @@ def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[
     if hour is not None:
         return hour, np.ones(len(hour), dtype=bool)
     twelve = part("I")
+    if twelve is None:
+        return np.zeros(len(found), dtype=np.int64), np.ones(len(found), dtype=bool)
     ok = (twelve >= 1) & (twelve <= 12)
     half = _field(found, "p")
     if half is None:

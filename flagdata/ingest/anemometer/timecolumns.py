@@ -20,7 +20,7 @@ from flagdata.ingest.anemometer.stamps import Stamps
 
 _SHARE = 0.9
 """Share of rows that must fit for a column to be what it seems."""
-_CLOCKS = (
+CLOCKS = (
     "%H:%M:%S%f",
     "%H:%M",
     "%I:%M:%S %p",
@@ -34,6 +34,7 @@ _CLOCKS = (
     "%H.%M.%S",
     "%H",
 )
+"""How a time of day may be written."""
 _MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
@@ -100,6 +101,18 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     return best
 
 
+def time_as(layout: Layout, columns: tuple[int, ...], form: str) -> TimeChoice | None:
+    """These columns as a time written as `form`; `None` where nine rows of ten are not.
+
+    Raises:
+        UsageError: see `stamps.pattern`.
+    """
+    texts = [" ".join(cells) for cells in zip(*(layout.column(index) for index in columns), strict=True)]
+    texts = [text for text in texts if text.strip()]
+    found = counted.parse(texts, form) if counted.is_time_of_day(form) else _parsed(texts, form)
+    return _choice(layout, columns, form, found, 2.0) if _fits(found) else None
+
+
 def _without_false_epochs(layout: Layout, choices: Sequence[TimeChoice]) -> list[TimeChoice]:
     """The choices without those that count seconds since 1970 to another year than the dates in the same rows."""
     dated = {
@@ -154,13 +167,13 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             if found is not None:
                 yield found
     if not clocks:
-        yield from _days(layout, columns, dates)
+        yield from _days(layout, columns, dates, order)
     parts = _parts(layout, columns) or _unnamed_parts(layout, columns)
     if parts is not None:
         yield parts
     for index in clocks:
         texts = [cell for cell in columns[index] if cell]
-        for form in _CLOCKS[:4]:
+        for form in CLOCKS[:4]:
             if _fits(counted.parse(texts, form)):
                 yield _choice(layout, (index,), form, counted.parse(texts, form), 1.0)
                 break
@@ -235,24 +248,32 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
             doubt=f"dates may be {form!r} or {swapped!r}, and nothing in the first rows tells which",
             fix="say which number is the day: --date-order dmy or mdy",
         )  # fmt: skip
-    for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in _CLOCKS):
+    for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in CLOCKS):
         found, _ = parse_with_bare_dates(texts, form)
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)
     return None
 
 
-def _days(layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int]) -> Iterator[TimeChoice]:
+def _days(
+    layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int], order: Order | None
+) -> Iterator[TimeChoice]:
     """Dates without a time of day, one a row: means of days."""
     for index in dates:
         texts = [cell for cell in columns[index] if cell]
-        if len(texts) > 1 and len(set(texts)) == len(texts):
-            name = layout.names[index] or f"number {index + 1}"
-            yield TimeChoice(
-                columns=(index,), form=None, zone=None, zoned=False, score=0.9,
-                doubt=f"column {name!r} holds dates without a time of day: each row stands for a whole day",
-                fix="export the log with the times of its readings; means of days are no wind at a flag",
-            )  # fmt: skip
+        if len(texts) < 2 or len(set(texts)) < len(texts):
+            continue
+        forms = ["%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in _MONTHS)]
+        try:
+            forms.append(decide(texts, told=order or _order_of(layout.names[index]), where="").directives())
+        except TimeError as error:
+            if "may be" in error.what:
+                doubt, fix = error.what, error.fix
+                yield TimeChoice(
+                    columns=(index,), form=None, zone=None, zoned=False, score=0.9, doubt=doubt, fix=fix
+                )
+        found = (choice for form in forms if (choice := time_as(layout, (index,), form)) is not None)
+        yield from (replace(choice, score=0.9) for choice in itertools.islice(found, 1))
 
 
 def _order_of(heading: str) -> Order | None:
@@ -275,7 +296,7 @@ def _dated(texts: Sequence[str], first: str, second: str, zoned: str) -> Iterato
     if parts is None:
         return
     year = "%Y" if len(parts[2]) == 4 else "%y"
-    for clock in _CLOCKS:
+    for clock in CLOCKS:
         form = f"{first}{parts[1]}{second}{parts[1]}{year} {clock}{zoned}"
         found, _ = parse_with_bare_dates(texts, form)
         yield (form, found) if _fits(found) else None
@@ -296,7 +317,7 @@ def _compact(shape: str) -> tuple[str, ...]:
 
 def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
     dates = [form.format(s=sign) for sign in "- /" for form in _MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
-    for form in (f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in _CLOCKS[:6]):
+    for form in (f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in CLOCKS[:6]):
         found, _ = parse_with_bare_dates(texts[:20], form)
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)
@@ -327,7 +348,7 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
         if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and _share(_DIGITS, clock):
             chosen, form = [*chosen, at], f"{form} %H%M"
         elif form == "%Y %m %d" and clock and _share(_CLOCK, clock):
-            known = next((found for found in _CLOCKS if _fits(counted.parse(clock, found))), None)
+            known = next((found for found in CLOCKS if _fits(counted.parse(clock, found))), None)
             chosen, form = [*chosen, at], f"{form} {known}" if known else form
         if "%H" not in form and "%I" not in form:
             continue

@@ -15,9 +15,10 @@ from collections.abc import Iterator, Sequence
 
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import labelled
+from flagdata.ingest.anemometer import labelled, stated_columns
 from flagdata.ingest.anemometer.headings import interest
 from flagdata.ingest.anemometer.layout import Layout, cut, lay_out
+from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.serial_lines import split_stamp
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
 from flagdata.ingest.anemometer.source import TableText, TextFile
@@ -30,15 +31,16 @@ _TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
 
 
 ADVICE = "where nothing is a time, and the readings came at a steady rate that is known: "
-ADVICE += "--as delimited --wind COLUMN --unit m/s --start TIME --rate HZ"
+ADVICE += "add --start TIME --rate HZ"
 
 
-def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
+def timed(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
     """The file with a time in every row.
 
     Args:
         rate: readings a second.
         start: instant of the first reading [UTC ns].
+        columns: what the columns of a table are, by the user's word; where it names no time, no column is one.
 
     Raises:
         UsageError: no start, or rows that say when they were.
@@ -48,6 +50,10 @@ def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
         fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
         raise UsageError("a rate without a start", where=where, fix=fix)
     lines = source.head(HEAD_LINES)
+    if columns is not None:
+        _refuse_times(stated_columns.names_time(columns), where)
+        source = restate(source)
+        return _counted(source, _table(source, rate, start, where, told=True), rate, start)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(any(_TIMED.search(line) for line in lines), where)
         text = list(_sentences(source, rate, start))
@@ -56,6 +62,11 @@ def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
         stamped = list(_stamped(source, rate, start))
         text = stamped if labelled.matches(stamped[:HEAD_LINES]) else _table(source, rate, start, where)
+    return _counted(source, text, rate, start)
+
+
+def _counted(source: TextFile, text: Sequence[str], rate: float, start: int) -> TextFile:
+    """The file with these lines, and the finding that says whose clock they are on."""
     what = (
         f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
     )
@@ -101,13 +112,17 @@ def _stamp(start: int, count: int, rate: float) -> str:
     return iso(start + round(count * NANOSECONDS / rate))
 
 
-def _table(source: TextFile, rate: float, start: int, where: str) -> list[str]:
-    """A table with a column of instants behind its own, whose numbers stay what they are."""
+def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool = False) -> list[str]:
+    """A table with a column of instants behind its own, whose numbers stay what they are.
+
+    Args:
+        told: whether the user says that no column is a time.
+    """
     lines = source.head(HEAD_LINES)
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return _single(source, rate, start, where)
-    _refuse_times(find_time(layout) is not None, where)
+    _refuse_times(not told and find_time(layout) is not None, where)
     first = layout.lines[0]
     rows = (cut(line, layout.delimiter) for line in _lines_from(source, first))
     width = layout.number_of_columns()
