@@ -66,7 +66,9 @@ class Delimited:
     def _by_draft(self, source: TextFile, options: WindOptions, where: str) -> Reading:
         proposal = drafted(source, options)
         if proposal is None:
-            raise UsageError("no table in its first lines", where=where, fix="describe it by a recipe: --recipe FILE.toml")
+            raise UsageError(
+                "no table in its first lines", where=where, fix="describe it by a recipe: --recipe FILE.toml"
+            )
         if proposal.doubts:
             what = "; ".join(doubt.what for doubt in proposal.doubts)
             open_needs = [need.fix for need in proposal.needs if need.without(options)]

@@ -134,7 +134,7 @@ def draft(
         named = () if winds else winds_by_name(layout, time=of_time, told=unit)
         winds = winds or named
         if wind is not None and not named and wind not in {one.label for one in winds}:
-            said, odd = named_wind(layout, wind, told=unit)
+            said, odd = named_wind(layout, wind, time=of_time, told=unit)
             winds, warnings = (*winds, *said), (*warnings, *odd)
         if time is None and not winds:
             return None
@@ -232,7 +232,7 @@ def _doubts(
             break
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
-        fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
+        fix = f"if it is the wind, name it: --wind '{unsure[0]}'; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         found.append(Doubt(what=what, fix=fix))
     return found

@@ -195,10 +195,11 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
             raise InputError(f"{said} cannot be read as {form}", where=where, fix=fix)
         return choice
     choice = find_time(_only(layout, entries), order=order)
+    choice = choice if choice is not None and set(choice.columns) == set(columns) else None
     if choice is None and known and forms.count(None) == 1:
         tried = (" ".join(form or clock for form in forms) for clock in CLOCKS)
         choice = next((found for form in tried if (found := time_as(layout, columns, form)) is not None), None)
-    if choice is None or set(choice.columns) != set(columns):
+    if choice is None:
         fix = (
             f"state the format in brackets, such as time[%d.%m.%Y %H:%M], time[epoch-s] or time[elapsed-ms]; the first "
             f"is {first!r}"
@@ -308,21 +309,23 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         for channel, column in wind.columns.items():
             name = _TOWARDS if column.towards else channel
             found.setdefault(column.index, f"{name}[{column.unit or '?'}]")
+    timed = time is not None
     for at, name in enumerate(layout.names):
         if at in found:
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = understand(name, layout.units[at])
-        if time is None and kinds and kinds[0] == "stamp":
+        if not timed and kinds and kinds[0] == "stamp":
             found[at] = "time"
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
-        elif not winds and "number" in kinds and not heading.quantity:
+        elif heading.quantity:
+            continue
+        elif (not winds and "number" in kinds) or (not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])):
             found[at] = "?"
     return found
 
 
 def _guessed(channel: str) -> str:
     return "deg" if CHANNELS[channel].unit == "rad" else "?"
-

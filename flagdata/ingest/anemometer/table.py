@@ -164,7 +164,10 @@ class _Clock:
         if is_date_alone(self.form):
             what = "the stamps are dates without a time of day: each row stands for a whole day, put at its midnight"
             fix = "a mean of a day is no wind at a flag: export the log with the times of its readings"
-            found = (*found, Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix))
+            found = (
+                *found,
+                Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),
+            )
         if self.bare_dates:
             what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
             bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)

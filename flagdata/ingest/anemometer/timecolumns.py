@@ -13,7 +13,7 @@ from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dates import Order, decide
-from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
+from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.stamps import Stamps
@@ -166,8 +166,8 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             found = _whole(layout, (date, clock), texts, order) if texts else None
             if found is not None:
                 yield found
-    if not clocks:
-        yield from _days(layout, columns, dates, order)
+    days = [] if clocks else list(_days(layout, columns, dates, order))
+    yield from days
     parts = _parts(layout, columns) or _unnamed_parts(layout, columns)
     if parts is not None:
         yield parts
@@ -178,7 +178,8 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
                 yield _choice(layout, (index,), form, counted.parse(texts, form), 1.0)
                 break
     for index, cells in enumerate(columns):
-        yield from _counts(layout, index, [cell for cell in cells if cell])
+        if not any(index in choice.columns for choice in days):
+            yield from _counts(layout, index, [cell for cell in cells if cell])
 
 
 def _share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:
@@ -269,9 +270,7 @@ def _days(
         except TimeError as error:
             if "may be" in error.what:
                 doubt, fix = error.what, error.fix
-                yield TimeChoice(
-                    columns=(index,), form=None, zone=None, zoned=False, score=0.9, doubt=doubt, fix=fix
-                )
+                yield TimeChoice(columns=(index,), form=None, zone=None, zoned=False, score=0.9, doubt=doubt, fix=fix)
         found = (choice for form in forms if (choice := time_as(layout, (index,), form)) is not None)
         yield from (replace(choice, score=0.9) for choice in itertools.islice(found, 1))
 
@@ -428,6 +427,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
+    if "wind" in understand(name, layout.units[index]).quantity:
+        return  # the s of m/s is none of seconds
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
