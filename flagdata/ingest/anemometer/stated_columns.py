@@ -1,4 +1,4 @@
-"""What the columns of a table are, as its user says in one line: `--columns "date,time,wind_speed[km/h],,wind_direction"`.
+"""What the columns of a table are, as its user says in one line: "date,time,wind_speed[km/h],,wind_direction[deg]".
 
     ENTRY,ENTRY,…              one entry a column, in the order of the file; a blank entry is a column that is not read
     COLUMN=ENTRY,COLUMN=ENTRY  or only those that are read, each after its heading or number (from 1)
@@ -24,7 +24,7 @@ from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, W
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.recipe import COLUMNS_LIMIT
 from flagdata.ingest.anemometer.stamps import EPOCH
-from flagdata.ingest.anemometer.timecolumns import CLOCKS, TimeChoice, find_time, time_as
+from flagdata.ingest.anemometer.timecolumns import CLOCKS, TimeChoice, date_forms, find_time, time_as
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
@@ -128,6 +128,7 @@ def stated(layout: Layout, text: str, *, unit: str | None, order: Order | None, 
         UsageError, UnknownNameError: see `parse`; more entries than columns, a column that is not there, a quantity
             that is another.
         InputError: a column that does not hold what is said.
+        TimeError: a date whose order nothing tells.
     """
     entries = [(_index(layout, entry.column), entry) for entry in parse(text)]
     columns = [index for index, _ in entries]
@@ -197,7 +198,9 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
     choice = find_time(_only(layout, entries), order=order)
     choice = choice if choice is not None and set(choice.columns) == set(columns) else None
     if choice is None and known and forms.count(None) == 1:
-        tried = (" ".join(form or clock for form in forms) for clock in CLOCKS)
+        index, entry = entries[forms.index(None)]
+        missing = CLOCKS if entry.name == "time" else date_forms(layout, index, order)
+        tried = (" ".join(form or other for form in forms) for other in missing)
         choice = next((found for form in tried if (found := time_as(layout, columns, form)) is not None), None)
     if choice is None:
         fix = (

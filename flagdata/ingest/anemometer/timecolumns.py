@@ -264,15 +264,30 @@ def _days(
         texts = [cell for cell in columns[index] if cell]
         if len(texts) < 2 or len(set(texts)) < len(texts):
             continue
-        forms = ["%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in _MONTHS)]
         try:
-            forms.append(decide(texts, told=order or _order_of(layout.names[index]), where="").directives())
+            forms = date_forms(layout, index, order)
         except TimeError as error:
-            if "may be" in error.what:
-                doubt, fix = error.what, error.fix
-                yield TimeChoice(columns=(index,), form=None, zone=None, zoned=False, score=0.9, doubt=doubt, fix=fix)
+            doubt, fix = error.what, error.fix
+            yield TimeChoice(columns=(index,), form=None, zone=None, zoned=False, score=0.9, doubt=doubt, fix=fix)
+            continue
         found = (choice for form in forms if (choice := time_as(layout, (index,), form)) is not None)
         yield from (replace(choice, score=0.9) for choice in itertools.islice(found, 1))
+
+
+def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ...]:
+    """The formats in which the dates of a column may be written.
+
+    Raises:
+        TimeError: their numbers may be day and month, or month and day.
+    """
+    named = ("%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in _MONTHS))
+    try:
+        numbered = decide(layout.column(index), told=order or _order_of(layout.names[index]), where="").directives()
+    except TimeError as error:
+        if "may be" in error.what:
+            raise
+        return named
+    return (*named, numbered)
 
 
 def _order_of(heading: str) -> Order | None:

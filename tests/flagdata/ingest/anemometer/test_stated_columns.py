@@ -56,6 +56,8 @@ def test_columns_are_named_by_place_number_or_heading(read: Read, columns: str) 
         ("12:00:0{at};01.05.2026", "time[%H:%M:%S],date[%d.%m.%Y],"),
         ("26;5;1;12000{at}", "year,month,day,time,"),
         ("1;May;2026;12;0;{at}", "day,month,year,hour,minute,second,"),
+        ("12;0;{at};01/05/26", "hour,minute,second,date[%d/%m/%y],"),
+        ("12;0;{at};2026-05-01", "hour,minute,second,date,"),
         ("2026;121;12;0;{at}", "year,day_of_year,hour,minute,second,"),
         ("177763680{at}", "time[epoch-s],"),
         ("2026/05/01T12h00m0{at}", "time[%Y/%m/%dT%Hh%Mm%S],"),
