@@ -206,7 +206,8 @@ def _doubts(
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
-        found.append(Doubt(what=time.doubt, fix=time.fix))
+        offered = f"; {stated_columns.offer(layout, time, winds)}" if time.counts else ""
+        found.append(Doubt(what=time.doubt, fix=f"{time.fix}{offered}"))
     classes = beaufort(layout)
     if not winds and classes:
         what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
@@ -218,7 +219,7 @@ def _doubts(
         found.append(Doubt(what=what, fix=fix))
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
-        fix += "" if time is None else f"; or {stated_columns.offer(layout, time, winds)}"
+        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
     for wind in winds if chosen is None else (chosen,):
         changing = mixed_units(layout, next(iter(wind.columns.values())).index)

@@ -9,6 +9,7 @@ from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import excel
 from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
+from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
@@ -70,11 +71,13 @@ def unknown(source: TextFile) -> Guess:
         fix = f"{offered}; {ADVICE}"
         reason = f"{what}; which of them are the time and the wind, nothing tells"
         return Guess(format="unknown", score=0.0, reasons=(reason,), kind="other", fix=fix, draft=recipe)
+    filled = [line for line in source.head(HEAD_LINES) if line.strip()]
+    if sum(cell_kind(line) == "number" for line in filled) >= max(2, 0.9 * len(filled)):
+        text = "one number a line, and nothing tells what it is or when"
+        fix = 'if it is the wind at a steady rate: --columns "wind_speed[m/s]" --start TIME --rate HZ'
+        return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
     text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
-    fix = (
-        "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml; "
-    )
-    fix += ADVICE
+    fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
 
 

@@ -442,7 +442,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
-    if "wind" in understand(name, layout.units[index]).quantity:
+    if not names_time(name) and "wind" in understand(name, layout.units[index]).quantity:
         return  # the s of m/s is none of seconds
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
@@ -467,8 +467,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         yield TimeChoice(
             columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
             doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely})",
-            fix='save the draft, complete format = "elapsed-s", "elapsed-ms" or "elapsed-us" '
-            f"({likely}), and name it: --recipe FILE.toml --start TIME",
+            fix=f"say what it counts, elapsed-s, elapsed-ms or elapsed-us ({likely}), and --start TIME",
         )  # fmt: skip
         return
     yield choice

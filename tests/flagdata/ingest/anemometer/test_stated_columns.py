@@ -191,6 +191,21 @@ def test_a_table_of_which_nothing_is_known_is_offered_too(log_file: Write) -> No
     assert '--columns "?,?,?"' in (guess.fix or "")
 
 
+def test_numbers_alone_are_offered_as_the_wind_at_a_rate(log_file: Write) -> None:
+    path = log_file("5.2\n5.4\n5.6\n5.1\n")
+    assert '--columns "wind_speed[m/s]" --start TIME --rate HZ' in (sniff(path)[0].fix or "")
+    log = read_log(path, WindOptions(columns="wind_speed[m/s]", start=_START, rate=2.0))
+    assert log.series.channels["wind_speed"].tolist() == [5.2, 5.4, 5.6, 5.1]
+
+
+def test_a_count_whose_unit_is_not_told_is_offered_with_it_open(log_file: Write) -> None:
+    rows = "".join(f"{100_000 * at},{3 + at / 10},{at % 3}\n" for at in range(12))
+    path = log_file(f"timestamp,wind_speed [m/s],x\n{rows}")
+    assert '--columns "time[?],wind_speed[m/s],"' in refused(path).fix
+    log = read_log(path, WindOptions(columns="time[elapsed-us],wind_speed[m/s]", start=_START))
+    assert (log.series.time[-1] - _START) / 1e9 == pytest.approx(1.1)
+
+
 def test_the_entries_of_a_line() -> None:
     assert parse("date[%d,%m,%Y], ,wind_speed[km/h]") == (
         Entry(column=0, name="date", detail="%d,%m,%Y"),
