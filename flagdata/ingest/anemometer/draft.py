@@ -233,7 +233,8 @@ def _doubts(
             break
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
-        fix = f"if it is the wind, name it: --wind '{unsure[0]}'; or {stated_columns.offer(layout, time, winds)}"
+        fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
+        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         found.append(Doubt(what=what, fix=fix))
     return found

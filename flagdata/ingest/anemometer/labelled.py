@@ -25,6 +25,8 @@ _STAMP = re.compile(
     r"|(?P<parts>\d{2}:\d{2}:\d{2}):(?P<clock>\d{2}:\d{2}:\d{2}(?:\.\d+)?)"
     r"|\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?|\d{10}(?:\.\d+)?|\d{13})(?![\d:])"
 )
+_FRACTION = re.compile(r"(?P<seconds>:\d{2}),(?=\d)")
+"""The comma before the fraction of a second, as Python's logging writes it."""
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?!\d)")
 _UNIT = re.compile(r"\s?(?P<unit>[^\s\d,;:|=()\[\]]{1,10})")
 _WORDS = re.compile(r"[^\W\d_]")
@@ -111,5 +113,5 @@ def _cut(line: str) -> tuple[tuple[str, ...], str, list[str]] | None:
     elif stamp["parts"]:
         when = f"{stamp['parts'].replace(':', '-')} {stamp['clock']}"
     else:
-        when = stamp["stamp"].replace(",", " ")
+        when = _FRACTION.sub(r"\g<seconds>.", stamp["stamp"]).replace(",", " ")
     return words, when, [number[0] for number in numbers]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError, ZoneMissingError
+from flagdata.errors import InputError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform, possible, quality, untimed, zero, zones
 from flagdata.ingest.anemometer import recipe as recipes
@@ -45,6 +45,11 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     if options.rate is not None:
         source = untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
         options = replace(options, start=None, rate=None)
+    if recipe is None and options.columns is None and untimed.clocked(source):
+        if options.date is None:
+            what = "the lines of an instrument stand after times of day without a date"
+            raise TimeError(what, where=str(path), fix="give the day of the first: --date 2026-05-01, and its --zone")
+        source, options = untimed.dated(source, options.date), replace(options, date=None)
     source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()

@@ -160,7 +160,8 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
     if count == 0 and gathered.unstamped:
         raise TimeError(
             f"the lines of {instrument.name} carry no time", where=f"{where}, line {gathered.unstamped[0]}",
-            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE",
+            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE; if the readings came at a "
+            "steady rate that is known: --start TIME --rate HZ, with the instant of the first",
         )  # fmt: skip
     if count == 0:
         bad = sum(len(places) for places in gathered.defects.values())

@@ -442,7 +442,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
-    if not names_time(name) and "wind" in understand(name, layout.units[index]).quantity:
+    heading = understand(name, layout.units[index])
+    if "wind" in heading.quantity and (heading.sure or not names_time(name)):
         return  # the s of m/s is none of seconds
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start

@@ -8,6 +8,7 @@ moves all that follows.
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import io
 import re
 from collections import Counter
@@ -20,7 +21,7 @@ from flagdata.ingest.anemometer.headings import interest
 from flagdata.ingest.anemometer.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.serial_lines import split_stamp
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.source import TableText, TextFile
 from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.timebase import NANOSECONDS, iso
@@ -28,7 +29,12 @@ from flagdata.timebase import NANOSECONDS, iso
 _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
 _WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
 _TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
-
+_CLOCK_BEFORE = re.compile(
+    r"\s*[\[(<\"]?(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+(?P<rest>\S.*)$"
+)
+"""A time of day before a line."""
+_TABLES = frozenset({"delimited", "host-stamped"})
+"""Formats of tables, which have a way of their own."""
 
 ADVICE = "where nothing is a time, and the readings came at a steady rate that is known: "
 ADVICE += "add --start TIME --rate HZ"
@@ -61,8 +67,56 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
         stamped = list(_stamped(source, rate, start))
-        text = stamped if labelled.matches(stamped[:HEAD_LINES]) else _table(source, rate, start, where)
+        known = labelled.matches(stamped[:HEAD_LINES]) or _of_an_instrument(stamped[:HEAD_LINES])
+        text = stamped if known else _table(restate(source), rate, start, where)
     return _counted(source, text, rate, start)
+
+
+def _of_an_instrument(lines: Sequence[str]) -> bool:
+    """Whether stamped lines are those of an instrument whose format is known."""
+    from flagdata.ingest.anemometer.formats import FORMATS, Format  # the formats import modules that import this one
+
+    head = Head(lines=tuple(lines))
+    for name in FORMATS:
+        reader: Format = FORMATS[name]()
+        found = None if name in _TABLES else reader.recognise(head)
+        if found is not None and found.score >= SURE:
+            return True
+    return False
+
+
+def clocked(source: TextFile) -> bool:
+    """Whether the lines are those of an instrument, each after a time of day without a date, and say no other time."""
+    lines = [line for line in source.head(HEAD_LINES) if line.strip()]
+    timed = [match for line in lines if (match := _CLOCK_BEFORE.match(line)) is not None]
+    if not timed or 2 * len(timed) < len(lines) or any(_TIMED.search(match["rest"]) for match in timed):
+        return False
+    return _of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
+
+
+def dated(source: TextFile, date: dt.date) -> TextFile:
+    """The lines of an instrument, each after a time of day, with the date before it.
+
+    Args:
+        date: of the first line; the next day begins where the time of day falls by half a day.
+    """
+    text: list[str] = []
+    day, last = date, ""
+    for line in _all_lines(source):
+        match = _CLOCK_BEFORE.match(line)
+        if match is None:
+            text.append(line)
+            continue
+        clock = match["time"].replace(",", ".").rjust(8, "0")
+        if last and int(clock[:2]) + 12 < int(last[:2]):
+            day += dt.timedelta(days=1)
+        last = clock
+        text.append(f"{day.isoformat()}T{clock} {match['rest']}")
+    days = (day - date).days
+    what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
+    found = Finding(kind="date-given", severity=Severity.NOTE, what=what)
+    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, found))
+    return TableText(**{**vars(base), "text": tuple(text)})
 
 
 def _counted(source: TextFile, text: Sequence[str], rate: float, start: int) -> TextFile:

@@ -1,0 +1,124 @@
+"""Readings of several lines, dictionaries, and lines after times of day: what prints of programs look like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import reduce
+from operator import xor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.signals import WindLog
+
+Read = Callable[..., WindLog]
+Write = Callable[[str], Path]
+_START = 1_777_636_800 * 10**9
+"""2026-05-01T12:00:00Z."""
+_DAY = np.datetime64("2026-05-01").astype(object)
+
+
+def since_start(log: WindLog) -> list[float]:
+    return ((log.series.time - _START) / 1e9).tolist()
+
+
+def sentence(text: str) -> str:
+    return f"${text}*{reduce(xor, text.encode(), 0):02X}\n"
+
+
+@pytest.mark.parametrize("rule", ["", "\n", "------------\n", "*** new reading ***\n"])
+@pytest.mark.parametrize("sign", [": ", " = ", ":\t"])
+def test_a_reading_of_several_lines_is_a_row(read: Read, sign: str, rule: str) -> None:
+    text = "".join(
+        f"{rule}Time{sign}2026-05-01 12:00:{at:02d}\nWind Speed{sign}{3 + at / 10:.1f} km/h\nWind Direction{sign}{231 + at}\n"
+        for at in range(8)
+    )
+    log = read(text, zone="UTC")
+    assert since_start(log) == [float(at) for at in range(8)]
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([(3 + at / 10) / 3.6 for at in range(8)])
+    assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx([231.0 + at for at in range(8)])
+
+
+def test_the_stamp_of_the_first_line_is_that_of_the_reading(read: Read) -> None:
+    text = "".join(
+        f"12:00:{at:02d}.250 -> Wind Speed: {3 + at / 10:.1f} m/s\n12:00:{at:02d}.900 -> Humidity: 51 %\n"
+        for at in range(8)
+    )
+    assert since_start(read(text, zone="UTC", date=_DAY)) == [at + 0.25 for at in range(8)]
+
+
+def test_a_line_that_is_missing_from_a_reading_moves_no_other(read: Read) -> None:
+    text = "".join(
+        f"Time: 2026-05-01 12:00:{at:02d}\nWind Speed: {3 + at} m/s\n"
+        + ("" if at == 3 else f"Wind Direction: {231 + at}\n")
+        for at in range(8)
+    )
+    found = np.degrees(read(text, zone="UTC").series.channels["wind_direction"]).tolist()
+    assert found == pytest.approx([231, 232, 233, np.nan, 235, 236, 237, 238], nan_ok=True)
+
+
+def test_readings_of_several_lines_without_a_time_are_counted(read: Read) -> None:
+    text = "".join(f"Wind Speed: {3 + at / 10:.1f} m/s\nWind Direction: {231 + at}\n\n" for at in range(8))
+    assert since_start(read(text, start=_START, rate=2.0)) == [at / 2 for at in range(8)]
+
+
+def test_settings_of_a_program_are_no_readings(log_file: Write) -> None:
+    text = "".join(f"name{at} = 3\nwind speed {'abcdefgh'[at]} = 4\n" for at in range(8))
+    with pytest.raises(FlagdataError, match="known format"):
+        read_log(log_file(text))
+
+
+def test_the_stamp_that_pythons_logging_writes_has_a_fraction(read: Read) -> None:
+    text = "".join(f"2026-05-01 12:00:{at:02d},250 - INFO - wind speed {3 + at / 10:.1f} m/s\n" for at in range(8))
+    assert since_start(read(text, zone="UTC")) == [at + 0.25 for at in range(8)]
+
+
+def test_a_stamp_of_two_words_before_an_object_keeps_its_date(read: Read) -> None:
+    text = "".join(f'2026-05-01 12:00:{at:02d} rtl/1 {{"wind_avg_km_h": {36 + at}}}\n' for at in range(8))
+    log = read(text, zone="UTC")
+    assert since_start(log) == [float(at) for at in range(8)]
+    assert log.series.channels["wind_speed"][0] == pytest.approx(10.0)
+
+
+def test_dictionaries_are_read_as_python_prints_them(read: Read) -> None:
+    text = "".join(
+        f"{{'time': '2026-05-01 12:00:{at:02d}', 'wind_speed': {3 + at}, 'ok': True, 'x': None}}\n" for at in range(8)
+    )
+    log = read(text, zone="UTC", unit="m/s")
+    assert since_start(log) == [float(at) for at in range(8)]
+    assert log.series.channels["wind_speed"].tolist() == [3.0 + at for at in range(8)]
+
+
+_LINES = {
+    "nmea": lambda at: sentence(f"WIMWV,{100 + at}.0,R,{4 + at}.0,M,A").strip(),
+    "vaisala": lambda at: f"0R1,Dn=236D,Dm=283D,Dx=031D,Sn=0.0M,Sm={4 + at}.0M,Sx=9.2M",
+}
+
+
+@pytest.mark.parametrize("kind", sorted(_LINES))
+@pytest.mark.parametrize("before", ["{} ", "[{}] ", "{}.500,", "{} > "])
+def test_lines_of_an_instrument_after_a_time_of_day_are_put_on_its_day(read: Read, kind: str, before: str) -> None:
+    clocks = ["23:59:58", "23:59:59", "00:00:00", "00:00:01"]
+    text = "".join(f"{before.format(clock)}{_LINES[kind](at)}\n" for at, clock in enumerate(clocks))
+    log = read(text, zone="UTC", date=_DAY)
+    first = 43_198.0 + 0.5 * (".5" in before)
+    assert since_start(log) == pytest.approx([first + at for at in range(4)])
+    name = "apparent_wind_speed" if kind == "nmea" else "wind_speed"
+    assert log.series.channels[name].tolist() == pytest.approx([4.0, 5.0, 6.0, 7.0])
+
+
+@pytest.mark.parametrize("kind", sorted(_LINES))
+def test_lines_of_an_instrument_after_a_time_of_day_ask_for_the_day(log_file: Write, kind: str) -> None:
+    text = "".join(f"12:00:0{at} {_LINES[kind](at)}\n" for at in range(4))
+    with pytest.raises(FlagdataError) as caught:
+        read_log(log_file(text), WindOptions(zone="UTC"))
+    assert "--date" in (caught.value.fix or "")
+
+
+def test_lines_of_an_instrument_without_a_stamp_are_counted(read: Read) -> None:
+    log = read("".join(f"{_LINES['vaisala'](at)}\n" for at in range(4)), start=_START, rate=4.0)
+    assert log.format == "vaisala"
+    assert since_start(log) == [0.0, 0.25, 0.5, 0.75]
