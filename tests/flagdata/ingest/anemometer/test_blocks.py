@@ -33,7 +33,8 @@ def sentence(text: str) -> str:
 @pytest.mark.parametrize("sign", [": ", " = ", ":\t"])
 def test_a_reading_of_several_lines_is_a_row(read: Read, sign: str, rule: str) -> None:
     text = "".join(
-        f"{rule}Time{sign}2026-05-01 12:00:{at:02d}\nWind Speed{sign}{3 + at / 10:.1f} km/h\nWind Direction{sign}{231 + at}\n"
+        f"{rule}Time{sign}2026-05-01 12:00:{at:02d}\n"
+        f"Wind Speed{sign}{3 + at / 10:.1f} km/h\nWind Direction{sign}{231 + at}\n"
         for at in range(8)
     )
     log = read(text, zone="UTC")
@@ -50,14 +51,34 @@ def test_the_stamp_of_the_first_line_is_that_of_the_reading(read: Read) -> None:
     assert since_start(read(text, zone="UTC", date=_DAY)) == [at + 0.25 for at in range(8)]
 
 
-def test_a_line_that_is_missing_from_a_reading_moves_no_other(read: Read) -> None:
-    text = "".join(
-        f"Time: 2026-05-01 12:00:{at:02d}\nWind Speed: {3 + at} m/s\n"
-        + ("" if at == 3 else f"Wind Direction: {231 + at}\n")
+def blocks(rule: str = "") -> list[list[str]]:
+    return [
+        [f"{rule}Time: 2026-05-01 12:00:{at:02d}", f"Wind Speed: {3 + at} m/s", f"Wind Direction: {231 + at}"]
         for at in range(8)
-    )
-    found = np.degrees(read(text, zone="UTC").series.channels["wind_direction"]).tolist()
+    ]
+
+
+def test_a_line_that_is_missing_from_a_reading_moves_no_other(read: Read) -> None:
+    readings = blocks()
+    del readings[3][2]
+    log = read("\n".join(line for reading in readings for line in reading), zone="UTC")
+    found = np.degrees(log.series.channels["wind_direction"]).tolist()
     assert found == pytest.approx([231, 232, 233, np.nan, 235, 236, 237, 238], nan_ok=True)
+
+
+def test_a_first_line_that_is_missing_moves_no_other(read: Read) -> None:
+    readings = blocks()
+    del readings[3][0]
+    log = read("\n".join(line for reading in readings for line in reading), zone="UTC")
+    assert since_start(log) == [0.0, 1.0, 2.0, 4.0, 5.0, 6.0, 7.0]
+    assert log.series.channels["wind_speed"].tolist() == [3.0, 4.0, 5.0, 7.0, 8.0, 9.0, 10.0]
+
+
+def test_a_file_that_begins_within_a_reading_mixes_none(read: Read) -> None:
+    lines = [line for reading in blocks(rule="--\n") for line in reading][2:]
+    log = read("\n".join(lines), zone="UTC")
+    assert since_start(log) == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+    assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx([232.0 + at for at in range(7)])
 
 
 def test_readings_of_several_lines_without_a_time_are_counted(read: Read) -> None:
