@@ -37,7 +37,10 @@ _SHARE = 0.8
 
 
 def matches(lines: Sequence[str]) -> bool:
-    """Most lines have the same words, some of them before numbers, and one of these is a wind."""
+    """Most lines have the same words, some of them before numbers, and one of these is a wind.
+
+    Lines of a program's log, each after a stamp, may be of several kinds: then those of one are of the wind.
+    """
     return _heading(lines) is not None
 
 
@@ -51,10 +54,14 @@ def as_table(source: TextFile) -> TableText | None:
     from flagdata.ingest.anemometer.sniff import recognise  # it imports the module that asks for this one
     from flagdata.ingest.anemometer.sniffing import SURE
 
-    heading = _heading(source.head())
-    if heading is None or any(guess.score >= SURE and not guess.doubts for guess in recognise(source)):
+    lines = source.head()
+    heading = _heading(lines)
+    if heading is None:
         return None
     words, names = heading
+    alone = _usual(lines) == words
+    if any((guess.score >= SURE and not guess.doubts) or (guess.winds and not alone) for guess in recognise(source)):
+        return None
 
     def row(line: str) -> list[str] | None:
         cut = _cut(line)
@@ -68,14 +75,30 @@ def as_table(source: TextFile) -> TableText | None:
 
 
 def _heading(lines: Sequence[str]) -> tuple[tuple[str, ...], list[str]] | None:
-    """The words of most lines, and the names of their columns with units; `None` where they name no wind."""
+    """The words of the lines of the wind, and the names of their columns with units; `None` where there are none."""
     filled = [line for line in lines if line.strip()]
     cuts = [cut for line in filled if (cut := _cut(line)) is not None]
     if len(cuts) < 3:
         return None
-    words, count = Counter(cut[0] for cut in cuts).most_common(1)[0]
-    if count < _SHARE * len(filled):
+    if (usual := _usual(lines)) is not None:
+        return _named(usual)
+    stamped = Counter(cut[0] for cut in cuts if cut[1])
+    if stamped.total() < _SHARE * len(filled):
         return None
+    kinds = (words for words, count in stamped.most_common() if count >= 3)
+    return next((found for words in kinds if (found := _named(words)) is not None), None)
+
+
+def _usual(lines: Sequence[str]) -> tuple[str, ...] | None:
+    """The words of most lines; `None` where none are."""
+    filled = [line for line in lines if line.strip()]
+    counts = Counter(cut[0] for line in filled if (cut := _cut(line)) is not None)
+    words, count = counts.most_common(1)[0] if counts else ((), 0)
+    return words if count and count >= _SHARE * len(filled) else None
+
+
+def _named(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[str]] | None:
+    """The words of a line, and the names of its columns with units; `None` where they name no wind."""
     names: list[str] = []
     label, unit = words[0], None
     for text in words[1:]:

@@ -283,7 +283,8 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     """The option with which the user says what the columns are, as far as they are known; "?" where they are not."""
     width = layout.number_of_columns()
     known = _known(layout, time, winds)
-    if width > _WIDE:
+    named = "?" in known.values() or any("wind" in entry for entry in known.values())
+    if width > _WIDE or not named:
         listed = [f"{at + 1}={entry}" for at, entry in sorted(known.items()) if "?" not in entry.split("[")[0]]
         entries = {entry.split("[")[0] for entry in known.values()}
         listed += ["?=time"] if time is None and not {"time", "date"} & entries else []

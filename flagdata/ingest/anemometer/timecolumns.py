@@ -45,9 +45,10 @@ _CLOCK = re.compile(
 )
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
-    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
 _YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
 _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
@@ -331,7 +332,10 @@ def _compact(shape: str) -> tuple[str, ...]:
 
 def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
     dates = [form.format(s=sign) for sign in "- /" for form in _MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
-    for form in (f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in CLOCKS[:6]):
+    forms = [f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in CLOCKS[:6]]
+    if _DAY_OF_WEEK.match(texts[0]):
+        forms = [f"%a {form}" for form in ("%b %d %H:%M:%S%f %Y", *forms)]
+    for form in forms:
         found, _ = parse_with_bare_dates(texts[:20], form)
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)

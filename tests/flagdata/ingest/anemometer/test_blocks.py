@@ -143,3 +143,28 @@ def test_lines_of_an_instrument_without_a_stamp_are_counted(read: Read) -> None:
     log = read("".join(f"{_LINES['vaisala'](at)}\n" for at in range(4)), start=_START, rate=4.0)
     assert log.format == "vaisala"
     assert since_start(log) == [0.0, 0.25, 0.5, 0.75]
+
+
+def test_the_lines_of_the_wind_are_taken_out_of_a_programs_log(read: Read) -> None:
+    text = "".join(
+        f"[2026-05-01 12:00:{at:02d}][D][sensor]: 'Wind Speed': Sending state {36 + at} km/h\n"
+        f"[2026-05-01 12:00:{at:02d}][D][sensor]: 'Temperature': Sending state 21.{at} C\n"
+        f"[2026-05-01 12:00:{at:02d}][D][wifi]: signal -6{at} dBm of {at} tries\n"
+        for at in range(8)
+    )
+    log = read(text, zone="UTC")
+    assert since_start(log) == [float(at) for at in range(8)]
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([(36 + at) / 3.6 for at in range(8)])
+    assert [(f.severity.name, f.count) for f in log.findings if f.kind == "malformed-lines"] == [("WARNING", 16)]
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        "Fri May  1 12:00:{:02d} 2026", '"Fri, 01 May 2026 12:00:{:02d} GMT"', "Friday May 01 2026 12:00:{:02d}",
+        "1 May 2026 12:00:{:02d}", '"Fri., 1 May 2026 12:00:{:02d}"',
+    ],
+)  # fmt: skip
+def test_a_stamp_may_name_its_month_and_its_day_of_the_week(read: Read, stamp: str) -> None:
+    text = "".join(f"{stamp.format(at)},{3 + at}\n" for at in range(8))
+    assert since_start(read(f"date,wind speed [m/s]\n{text}", zone="UTC")) == [float(at) for at in range(8)]
