@@ -13,9 +13,11 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.headings import interest, understand
+from flagdata.ingest.anemometer.layout import lay_out
 from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
+from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.units import spelled
 
 _STAMP = re.compile(
@@ -44,6 +46,11 @@ def matches(lines: Sequence[str]) -> bool:
     return _heading(lines) is not None
 
 
+def alike(lines: Sequence[str]) -> bool:
+    """Whether the lines are all of one kind, the wind among what they name."""
+    return _usual(lines) is not None and matches(lines)
+
+
 def stamped(lines: Sequence[str]) -> bool:
     """Whether a stamp stands before any of the lines."""
     return any(cut is not None and bool(cut[1]) for cut in map(_cut, lines))
@@ -59,9 +66,11 @@ def as_table(source: TextFile) -> TableText | None:
     if heading is None:
         return None
     words, names = heading
-    alone = _usual(lines) == words
-    if any((guess.score >= SURE and not guess.doubts) or (guess.winds and not alone) for guess in recognise(source)):
+    if any(guess.score >= SURE and not guess.doubts for guess in recognise(source)):
         return None
+    layout = lay_out(lines, interest=interest) if _usual(lines) is None else None
+    if layout is not None and find_time(layout) is not None:
+        return None  # a table
 
     def row(line: str) -> list[str] | None:
         cut = _cut(line)

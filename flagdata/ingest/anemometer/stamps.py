@@ -2,8 +2,8 @@
 
 Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which here stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %a for a day of the week, which is not read, %p for "AM", "p.m." or a bare "a" or "p". A blank stands
-for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p", %a for a day of
+the week, which is not read. A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -28,7 +28,8 @@ DAY = 86_400 * NANOSECONDS
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
-    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)", "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
+    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
+    "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
     "z": r"\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")

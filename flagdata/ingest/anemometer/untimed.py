@@ -67,7 +67,7 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
         stamped = list(_stamped(source, rate, start))
-        known = labelled.matches(stamped[:HEAD_LINES]) or _of_an_instrument(stamped[:HEAD_LINES])
+        known = labelled.alike(stamped[:HEAD_LINES]) or _of_an_instrument(stamped[:HEAD_LINES])
         text = stamped if known else _table(restate(source), rate, start, where)
     return _counted(source, text, rate, start)
 
