@@ -18,14 +18,14 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from flagdata.ingest.anemometer.headings import understand
 from flagdata.ingest.anemometer.layout import cell_kind
-from flagdata.ingest.anemometer.restated import table
+from flagdata.ingest.anemometer.restated import LOOKED_AT, table
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 _LINE = re.compile(
     r"\s*(?:(?P<stamp>(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ]+)?\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?Z?)"
     r"\s*(?:->|[>\])|,;-])?\s*)?"
-    r"(?P<name>[^\W\d_][^:=\t\d]{0,40}?)\s*[:=\t]\s*(?P<value>[^:=\s](?:[^=]{0,60}\S)?)\s*"
+    r"(?P<name>[^\W\d_](?:[^:=\t\d]|(?<=[^\W_])\d){0,40}?)\s*[:=\t]\s*(?P<value>[^:=\s](?:[^=]{0,60}\S)?)\s*"
 )
 _SHARE = 0.6
 """Of the lines with a letter or digit in them; the others are titles."""
@@ -39,13 +39,16 @@ def matches(lines: Sequence[str]) -> bool:
     """Most lines are a name and its value, the names come again, and one of them is a speed of the wind."""
     filled = [line for line in lines if re.search(r"[^\W_]", line)]
     found = [match for line in filled if (match := _LINE.fullmatch(line)) is not None]
-    if len(found) < 2 * _LEAST or len(found) < _SHARE * len(filled):
+    whole = 2 <= len(found) == len(filled) and len(lines) < LOOKED_AT  # a short file of nothing else
+    if not whole and (len(found) < 2 * _LEAST or len(found) < _SHARE * len(filled)):
         return False
     rows = list(_rows(lines, _first(lines)))
     names = {name for row in rows for name in row}
-    if len(rows) < _LEAST or not 2 <= len(names - {""}) <= _MOST:
+    if len(rows) < (1 if whole else _LEAST) or not 2 <= len(names - {""}) <= _MOST:
         return False
     winds = {name for name in names if (said := understand(name)).sure and said.channel.endswith("wind_speed")}
+    if len(rows) < _LEAST and len(winds) != 1:  # settings, rather
+        return False
     return any(sum(cell_kind(row.get(name, "")) == "number" for row in rows) > len(rows) / 2 for name in winds)
 
 
@@ -58,8 +61,14 @@ def as_table(source: TextFile) -> TableText | None:
     cells = [[*([row.get("", "")] if stamped else []), *(row.get(name, "") for name in names)] for row in rows]
     return table(
         source, [*(["logged time"] if stamped else []), *names], cells, kind="blocks",
-        what="readings of several lines, a name and its value in each",
+        what="readings of several lines, a name and its value in each", left_out=_words(source),
     )  # fmt: skip
+
+
+def _words(source: TextFile) -> int:
+    """Lines with words that are neither a name and its value nor a rule: what they say is not read."""
+    lines = (line for _, block in source.blocks() for line in block)
+    return sum(bool(re.search(r"[^\W_]", line)) and _LINE.fullmatch(line) is None for line in lines)
 
 
 def _first(lines: Sequence[str]) -> str:

@@ -368,6 +368,13 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
             channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices
         }
         first = indices["wind_x"]
+        own = [
+            at for at in found.of("wind_direction") if found.headings[at].height in (None, found.headings[first].height)
+        ]
+        if own and not speeds:
+            names = ", ".join(repr(found.name(at)) for at in own)
+            fix = "to read it and the speed of its own column, say what the columns are (--columns)"
+            found.remarks.append(f"the direction {names} is left out beside the components; {fix}")
         winds.append(Wind(label=found.name(first), height=found.headings[first].height, columns=columns, sure=True))
     return winds
 

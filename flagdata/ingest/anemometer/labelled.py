@@ -22,10 +22,10 @@ from flagdata.units import spelled
 
 _STAMP = re.compile(
     r"[\s\[(\"]*(?P<stamp>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
-    r"(?:\s?Z|[+-]\d{2}:?\d{2})?"
-    r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+    r"(?:\s?[AaPp]\.?[Mm]\b\.?|\s?Z|[+-]\d{2}:?\d{2})?"
+    r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp]\.?[Mm]\b\.?)?"
     r"|(?P<parts>\d{2}:\d{2}:\d{2}):(?P<clock>\d{2}:\d{2}:\d{2}(?:\.\d+)?)"
-    r"|\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?|\d{10}(?:\.\d+)?|\d{13})(?![\d:])"
+    r"|\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:\s?[AaPp]\.?[Mm]\b\.?)?|\d{10}(?:\.\d+)?|\d{13})(?![\d:])"
 )
 _FRACTION = re.compile(r"(?P<seconds>:\d{2}),(?=\d)")
 """The comma before the fraction of a second, as Python's logging writes it."""

@@ -248,8 +248,8 @@ def _column(layout: Layout, index: int, channel: str, detail: str, unit: str | N
         how = f"in {name} by its heading" if name else ""
         if CHANNELS[channel].unit == "m/s" and unit is not None:
             name, how = unit, f"in {unit}, as you said"
-        elif name is None and CHANNELS[channel].unit == "rad" and compass_points(cells) is not None:
-            name, how = "points", "as points of the compass, 22.5° apart"
+    if name in (None, "deg") and CHANNELS[channel].unit == "rad" and compass_points(cells) is not None:
+        name, how = "points", "as points of the compass, 22.5° apart"
     if name is None and CHANNELS[channel].unit != "m/s":
         fix = f"write it in brackets: {channel}[{_unit_like(channel)}]"
         raise UsageError(f"no unit for {channel}, {named(layout, index)}", where=_WHERE, fix=fix)
@@ -322,6 +322,9 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         if not timed and kinds and kinds[0] == "stamp":
             found[at] = "time"
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
+            if compass_points(layout.column(at)) is not None:
+                found[at] = heading.channel
+                continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:

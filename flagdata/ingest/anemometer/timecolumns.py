@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +43,8 @@ _DATE = re.compile(
 _CLOCK = re.compile(
     r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
 )
+_HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
+"""Before or after noon, in a column of its own."""
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
@@ -147,6 +149,8 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     if layout.decimal == ",":
         columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
     dates, clocks = [], []
+    halves = {at for at, cells in enumerate(columns) if (texts := [cell for cell in cells if cell])
+              and _share(_HALF, texts)}  # fmt: skip
     for index, cells in enumerate(columns):
         texts = [cell for cell in cells if cell]
         if not texts:
@@ -156,15 +160,18 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
         elif _share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
                                        and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
             clocks.append(index)
-        found = _whole(layout, (index,), texts, order)
+        if index + 1 in halves:
+            texts = _joined(columns, (index, index + 1))
+        found = _whole(layout, _with_half((index,), halves), texts, order)
         if found is not None:
             yield found
     for date in dates:
         for clock in clocks:
             if clock == date:
                 continue
-            texts = [f"{a} {b}" for a, b in zip(columns[date], columns[clock], strict=True) if a and b]
-            found = _whole(layout, (date, clock), texts, order) if texts else None
+            both = _with_half((date, clock), halves)
+            texts = _joined(columns, both)
+            found = _whole(layout, both, texts, order) if texts else None
             if found is not None:
                 yield found
     days = [] if clocks else list(_days(layout, columns, dates, order))
@@ -173,14 +180,25 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     if parts is not None:
         yield parts
     for index in clocks:
-        texts = [cell for cell in columns[index] if cell]
+        clock = _with_half((index,), halves)
+        texts = _joined(columns, clock)
         for form in CLOCKS[:4]:
             if _fits(counted.parse(texts, form)):
-                yield _choice(layout, (index,), form, counted.parse(texts, form), 1.0)
+                yield _choice(layout, clock, form, counted.parse(texts, form), 1.0)
                 break
     for index, cells in enumerate(columns):
         if not any(index in choice.columns for choice in days):
             yield from _counts(layout, index, [cell for cell in cells if cell])
+
+
+def _with_half(columns: tuple[int, ...], halves: Collection[int]) -> tuple[int, ...]:
+    """Columns of a time, with the one behind them that says whether it is before or after noon, if any."""
+    return (*columns, columns[-1] + 1) if columns[-1] + 1 in halves else columns
+
+
+def _joined(columns: Sequence[Sequence[str]], chosen: tuple[int, ...]) -> list[str]:
+    rows = zip(*(columns[at] for at in chosen), strict=True)
+    return [" ".join(cells) for cells in rows if all(cells)]
 
 
 def _share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:

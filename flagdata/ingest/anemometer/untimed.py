@@ -12,7 +12,7 @@ import datetime as dt
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity
@@ -59,7 +59,8 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
     if columns is not None:
         _refuse_times(stated_columns.names_time(columns), where)
         source = restate(source)
-        return _counted(source, _table(source, rate, start, where, told=True), rate, start)
+        text, short = _table(source, rate, start, where, told=True)
+        return _counted(source, text, rate, start, short=short)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(any(_TIMED.search(line) for line in lines), where)
         text = list(_sentences(source, rate, start))
@@ -68,7 +69,11 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
         stamped = list(_stamped(source, rate, start))
         known = labelled.alike(stamped[:HEAD_LINES]) or _of_an_instrument(stamped[:HEAD_LINES])
-        text = stamped if known else _table(restate(source), rate, start, where)
+        if not known:
+            source = restate(source)
+            text, short = _table(source, rate, start, where)
+            return _counted(source, text, rate, start, short=short)
+        text = stamped
     return _counted(source, text, rate, start)
 
 
@@ -119,13 +124,20 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     return TableText(**{**vars(base), "text": tuple(text)})
 
 
-def _counted(source: TextFile, text: Sequence[str], rate: float, start: int) -> TextFile:
-    """The file with these lines, and the finding that says whose clock they are on."""
+def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, *, short: int = 0) -> TextFile:
+    """The file with these lines, and the finding that says whose clock they are on.
+
+    Args:
+        short: lines that were left out, since they have fewer columns than the table.
+    """
     what = (
         f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
     )
-    found = Finding(kind="rate-given", severity=Severity.WARNING, what=what)
-    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, found))
+    found = [Finding(kind="rate-given", severity=Severity.WARNING, what=what)]
+    if short:
+        what = f"{short} lines have fewer columns than the table; left out, each counted as a reading"
+        found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=short, what=what))
+    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, *found))
     return TableText(**{**vars(base), "text": tuple(text)})
 
 
@@ -166,8 +178,8 @@ def _stamp(start: int, count: int, rate: float) -> str:
     return iso(start + round(count * NANOSECONDS / rate))
 
 
-def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool = False) -> list[str]:
-    """A table with a column of instants behind its own, whose numbers stay what they are.
+def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool = False) -> tuple[list[str], int]:
+    """A table with a column of instants behind its own, whose numbers stay what they are; and lines too short for it.
 
     Args:
         told: whether the user says that no column is a time.
@@ -175,15 +187,19 @@ def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool 
     lines = source.head(HEAD_LINES)
     layout = lay_out(lines, interest=interest)
     if layout is None:
-        return _single(source, rate, start, where)
+        return _single(source, rate, start, where), 0
     _refuse_times(not told and find_time(layout) is not None, where)
     first = layout.lines[0]
-    rows = (cut(line, layout.delimiter) for line in _lines_from(source, first))
     width = layout.number_of_columns()
-    cells = (
-        [*_points(row[:width], layout), _stamp(start, at, rate)] for at, row in enumerate(rows) if len(row) >= width
-    )
-    return _written(_names(layout.names, layout.units), cells)
+    kept: list[list[str]] = []
+    short = 0
+    for at, line in enumerate(_lines_from(source, first)):
+        row = cut(line, layout.delimiter)
+        if len(row) >= width:
+            kept.append([*_points(row[:width], layout), _stamp(start, at, rate)])
+        else:
+            short += 1
+    return _written(_names(layout.names, layout.units), kept), short
 
 
 def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
@@ -214,7 +230,7 @@ def _names(names: Sequence[str], units: Sequence[str]) -> list[str]:
     return [*(f"{name} [{unit}]" if unit else name for name, unit in zip(named, units, strict=True)), "time"]
 
 
-def _written(names: Sequence[str], rows: Iterator[list[str]]) -> list[str]:
+def _written(names: Sequence[str], rows: Iterable[list[str]]) -> list[str]:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(names)

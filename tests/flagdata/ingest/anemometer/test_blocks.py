@@ -168,3 +168,58 @@ def test_the_lines_of_the_wind_are_taken_out_of_a_programs_log(read: Read) -> No
 def test_a_stamp_may_name_its_month_and_its_day_of_the_week(read: Read, stamp: str) -> None:
     text = "".join(f"{stamp.format(at)},{3 + at}\n" for at in range(8))
     assert since_start(read(f"date,wind speed [m/s]\n{text}", zone="UTC")) == [float(at) for at in range(8)]
+
+
+def test_a_file_of_one_reading_is_a_row_at_the_start(read: Read) -> None:
+    log = read("WindDir   = 79\nWindSpeed = 0.5\nTS4Temp   = 24.4\n", unit="m/s", start=_START, rate=0.5)
+    assert since_start(log) == [0.0]
+    assert log.series.channels["wind_speed"].tolist() == [0.5]
+    assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx([79.0])
+
+
+def test_words_among_readings_are_told(read: Read) -> None:
+    text = "".join(
+        f"$ ./read -v\nWind Speed: {3 + at} m/s\nChecksum: 19\nWind Direction: 231\nreading is not valid!\n"
+        for at in range(6)
+    )
+    found = [f for f in read(text, start=_START, rate=1.0).findings if f.kind == "malformed-lines"]
+    assert [f.count for f in found] == [12]
+
+
+_HALVES = ("11:58:58 AM", "12:03:58 PM", "12:08:58 PM", "12:13:58 PM", "12:18:58 PM", "12:23:58 PM")
+_NOON = [-62.0, 238.0, 538.0, 838.0, 1138.0, 1438.0]
+
+
+@pytest.mark.parametrize(
+    ("heading", "line", "options"),
+    [
+        ("date,time,half,wind_speed", "05/13/2026,{clock},{half},{speed}", {}),
+        ("", "05/13/2026 {clock} {half} {speed}", {"wind": "4"}),
+        ("when,half,wind_speed", "05/13/2026 {clock},{half},{speed}", {}),
+        ("time,half,wind_speed", "{clock},{half},{speed}", {"date": np.datetime64("2026-05-13").astype(object)}),
+        ("", "[05/13/2026 {clock} {half}] {speed}", {"wind": "4"}),
+        ("", "[05/13/2026 {clock} {half}] Wind Speed: {speed}", {}),
+        ("", "[2026-05-13 {clock} {half}] new speed: {speed}", {}),
+    ],
+)
+def test_morning_and_afternoon_may_stand_apart_from_the_clock(
+    read: Read, heading: str, line: str, options: dict[str, object]
+) -> None:
+    rows = [line.format(clock=text[:8], half=text[9:], speed=3 + at / 10) for at, text in enumerate(_HALVES)]
+    log = read("\n".join([*([heading] if heading else []), *rows, ""]), zone="UTC", unit="m/s", **options)
+    day = 12 * 86_400
+    assert [at - day for at in since_start(log)] == _NOON
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([3 + at / 10 for at in range(6)])
+
+
+@pytest.mark.parametrize(
+    "stamp", ["2026-05-01 12:00:{at:02d}", "2026-05-01T12:00:{at:02d}Z", "01.05.2026 12:00:{at:02d},0"]
+)
+def test_stamps_in_brackets_before_a_table(read: Read, stamp: str) -> None:
+    text = "".join(f"[{stamp.format(at=at)}] {3 + at / 10:.1f} 23{at}\n" for at in range(8))
+    columns = (
+        "time,wind_speed[m/s],wind_direction[deg]" if "T" in stamp else "date,time,wind_speed[m/s],wind_direction[deg]"
+    )
+    log = read(text, columns=columns, zone=None if "Z" in stamp else "UTC")
+    assert since_start(log) == [float(at) for at in range(8)]
+    assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx([230.0 + at for at in range(8)])

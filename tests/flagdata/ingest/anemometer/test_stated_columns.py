@@ -215,3 +215,31 @@ def test_the_entries_of_a_line() -> None:
         Entry(column="Wind (km/h)", name="wind_speed", detail="km/h"),
         Entry(column="7", name="time", detail=""),
     )
+
+
+def test_points_of_the_compass_are_offered_and_read_without_a_unit(read: Read, log_file: Write) -> None:
+    text = "Dir;Mean\n" + "".join(
+        f"{point} ;{3 + at},5\n" for at, point in enumerate(("NE", "S", "VRB", "W", "SSW", "N"))
+    )
+    assert '"wind_direction,' in str(refused(log_file(text)).fix)
+    for direction in ("wind_direction", "wind_direction[deg]"):
+        log = read(text, columns=f"{direction},wind_speed[m/s]", start=_START, rate=1.0)
+        assert log.series.channels["wind_speed"].tolist() == [3.5 + at for at in range(6)]
+        degrees = np.degrees(log.series.channels["wind_direction"])
+        assert np.isnan(degrees[2])
+        assert degrees[[0, 1, 3, 4, 5]].tolist() == pytest.approx([45.0, 180.0, 270.0, 202.5, 0.0])
+
+
+def test_lines_too_short_for_the_table_are_told(read: Read) -> None:
+    rows = [f"3.{at} 23{at} 51" for at in range(9)]
+    text = "\n".join([*rows[:5], "new day", *rows[5:], ""])
+    log = read(text, columns="wind_speed[m/s],wind_direction[deg],", start=_START, rate=1.0)
+    assert ((log.series.time - _START) // 10**9).tolist() == [0, 1, 2, 3, 4, 6, 7, 8, 9]
+    assert [f.count for f in log.findings if f.kind == "malformed-lines"] == [1]
+
+
+def test_a_direction_beside_components_is_named_when_left_out(read: Read) -> None:
+    text = "datetime,U,V,W,Winddir\n"
+    text += "".join(f"2026-05-01 12:00:{at:02d}+00:00,1.{at},-3.5,0.1,23{at}\n" for at in range(8))
+    said = " ".join(f.what for f in read(text, unit="m/s").findings)
+    assert "'Winddir' is left out beside the components" in said
