@@ -29,7 +29,7 @@ _STAMP = re.compile(
 )
 _FRACTION = re.compile(r"(?P<seconds>:\d{2}),(?=\d)")
 """The comma before the fraction of a second, as Python's logging writes it."""
-_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?!\d)")
+_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?!\d)|[Nn][Aa][Nn](?!\w))")
 _UNIT = re.compile(r"\s?(?P<unit>[^\s\d,;:|=()\[\]]{1,10})")
 _WORDS = re.compile(r"[^\W\d_]")
 _SERIAL = re.compile(r"\d{3}")

@@ -34,7 +34,7 @@ from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
 
 _STAMP = re.compile(
-    r"\s*[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
+    r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+)?[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
     r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
 )
 _AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})\s.*")

@@ -223,3 +223,23 @@ def test_stamps_in_brackets_before_a_table(read: Read, stamp: str) -> None:
     log = read(text, columns=columns, zone=None if "Z" in stamp else "UTC")
     assert since_start(log) == [float(at) for at in range(8)]
     assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx([230.0 + at for at in range(8)])
+
+
+def test_pairs_of_name_and_value_in_a_line_may_hold_nan(read: Read) -> None:
+    speeds = ("nan", "0.0", "1.2", "3.4", "2.2", "1.1")
+    text = "".join(f"$,winddir={40 + at},windspeedmph={speed},batt_lvl=4.42,#\n" for at, speed in enumerate(speeds))
+    log = read(text, start=_START, rate=1.0)
+    assert since_start(log) == [float(at) for at in range(6)]
+    assert np.isnan(log.series.channels["wind_speed"][0])
+    assert log.series.channels["wind_speed"][1:].tolist() == pytest.approx(
+        [float(speed) * 0.44704 for speed in speeds[1:]]
+    )
+
+
+def test_a_data_systems_words_around_the_stamp_of_a_message(read: Read) -> None:
+    text = "".join(
+        f"MET 2026/05/01 12:00:{at:02d}.250 WXTP PR0,Dm=01{at}D,Sn=2.3M,Sm=12.{at}M,Sx=13.2M\n" for at in range(8)
+    )
+    log = read(text, zone="UTC")
+    assert since_start(log) == [at + 0.25 for at in range(8)]
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([12 + at / 10 for at in range(8)])
