@@ -35,7 +35,25 @@ _FROM_NORTH = frozenset({"twd", "gwd"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
-_CALM = frozenset({"calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr"})
+_CALM = frozenset(
+    {
+        "calm",
+        "still",
+        "none",
+        "variable",
+        "vrb",
+        "var",
+        "calma",
+        "windstille",
+        "calme",
+        "штиль",
+        "cvr",
+        "静穏",
+        "静风",
+        "靜風",
+        "無風",
+    }
+)
 """What stands in a column of compass points where there is no direction."""
 _UNREADABLE = 0.1
 

@@ -289,3 +289,20 @@ def test_messages_numbered_alike_are_not_repeats_unless_they_say_the_same(read: 
     log = read("\n".join(rows) + "\n", zone="UTC")
 
     assert len(log.series.time) == 30
+
+
+@pytest.mark.parametrize(
+    ("heading", "points"),
+    [
+        ("年,月,日,時,風速(m/s),風向", ("南南東", "南東", "東", "北東", "静穏", "西北西")),
+        ("年,月,日,时,风速(m/s),风向", ("南东南", "东南", "东", "东北", "静风", "西西北")),
+    ],
+)
+def test_tables_of_the_far_east_in_parts_and_points(read: Read, heading: str, points: tuple[str, ...]) -> None:
+    rows = "".join(f"2026,5,1,{12 + at},{3 + at / 10:.1f},{point}\n" for at, point in enumerate(points))
+    log = read(f"{heading}\n{rows}", zone="UTC")
+    assert ((log.series.time - log.series.time[0]) // (3600 * 10**9)).tolist() == [0, 1, 2, 3, 4, 5]
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([3 + at / 10 for at in range(6)])
+    degrees = np.degrees(log.series.channels["wind_direction"])
+    assert np.isnan(degrees[4])
+    assert degrees[[0, 1, 2, 3, 5]].tolist() == pytest.approx([157.5, 135.0, 90.0, 45.0, 292.5])
