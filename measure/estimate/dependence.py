@@ -174,15 +174,13 @@ def of_model(model: Estimator) -> Dependence:
 def main(name: str, lake_path: Path, at: str | None, side: str, out: Path) -> None:
     """Measure how alike two windows of one film are to the shipped model NAME, and write it into its card."""
     import flagdata
-    from flagdata.dataset import ExplicitSplit
     from models.estimator import load
     from models.training.recipe import DataSpec
 
     model = load(out / name)
     recipe: Any = model.card["recipe"]
     spec = DataSpec.of_identity(recipe["data"])
-    split = ExplicitSplit(where={part: spec.where(part) for part in {"train", side}})
-    pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=split)
+    pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=spec.split("train", side))
     with progress(len(set(pairs.table.seed.tolist())), label="windows", unit="film") as advance:
         entry = card_entry(errors(model, pairs, advance=advance))
     card = {key: value for key, value in read_card(out / name).items() if key != "format"}

@@ -21,7 +21,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+
+from measure.shares import clopper_pearson
 
 Floats = NDArray[np.float64]
 
@@ -69,11 +70,8 @@ class GroupedConformal:
 
     def interval(self, value: float, *, level: float) -> tuple[float, float]:
         """Of the share of all kinds, simulated or not, that are at least as far: by how many kinds happen to be among
-        the nulls (Clopper and Pearson, Biometrika 26:404, 1934, with sums of shares in place of counts)."""
-        found = self._as_far(value)
-        low = 0.0 if found <= 0 else float(beta.ppf((1 - level) / 2, found, self.count - found + 1))
-        high = 1.0 if found >= self.count else float(beta.ppf((1 + level) / 2, found + 1, self.count - found))
-        return low, high
+        the nulls (Clopper and Pearson's interval, with sums of shares in place of counts)."""
+        return clopper_pearson(self._as_far(value), self.count, level=level)
 
     def quantile(self, share: float) -> float:
         """The value that one more kind does not exceed with a chance of `share` or more; infinite where there are too

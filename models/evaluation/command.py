@@ -155,10 +155,7 @@ class _Desk:
         return self._pairs[side]
 
     def _of(self, data: DataSpec, side: str) -> Pairs:
-        from flagdata.dataset import ExplicitSplit
-
-        split = ExplicitSplit(where={name: data.where(name) for name in {"train", side}})
-        return self._source.pairs(at=self._at, split=side, split_by=split)
+        return self._source.pairs(at=self._at, split=side, split_by=data.split("train", side))
 
     def _clips(self, side: str, estimator: Estimator) -> Prepared:
         from models.training.inputs import prepare_clips

@@ -166,7 +166,5 @@ def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | Non
     Raises:
         NotFoundError, RefusedError: there are none, or the sides leak.
     """
-    from flagdata.dataset import ExplicitSplit
-
-    split = ExplicitSplit(where={name: recipe.data.where(name) for name in ("train", "validation", "test")})
+    split = recipe.data.split("train", "validation", "test")
     return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)

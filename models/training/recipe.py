@@ -20,6 +20,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from flagdata.dataset.splits import ExplicitSplit
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, parsed
@@ -71,6 +72,10 @@ class DataSpec:
     def where(self, side: str) -> str:
         """SQL over the catalog that takes a side."""
         return "(" + " or ".join(f"name like '{dataset}-{side}-%'" for dataset in self.datasets) + ")"
+
+    def split(self, *sides: str) -> ExplicitSplit:
+        """These sides of the data sets, by which pairs are read."""
+        return ExplicitSplit(where={side: self.where(side) for side in sides})
 
     def identity(self) -> dict[str, Any]:
         """JSON values; one data set is named by itself."""

@@ -27,7 +27,7 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.console import progress
-from flagdata.dataset import ExplicitSplit, Source
+from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
 from measure.refine import start
 from measure.refine.command import RENDERS, scene_of
@@ -221,7 +221,7 @@ def _handmade(at: str, seed: int) -> Fitted | None:
     if lake is None:
         return None
     spec = DataSpec(datasets=("flagsim-wide",))
-    split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
+    split = spec.split("train", "test")
     train = Source.open(lake).pairs(at=at, split="train", split_by=split)
     return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
 
