@@ -34,7 +34,7 @@ _EPOCH = 1_600_000_000  # of every file of a set: when it was written would tell
 MODEL_COLUMNS, MODEL_ROWS = 15, 10
 """Cells of the participant's mesh: 176 vertices."""
 HEIGHT = 2.0
-"""Of a flag's lower corner [m]."""
+"""Height of a flag's lower corner [m]."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class ChallengeFolder:
         return json.loads(self.public.read_text(encoding="utf-8"))
 
     def names(self) -> list[str]:
-        """Of the sets, sorted."""
+        """Names of the sets, sorted."""
         return sorted(self.manifest()["sets"])
 
     def chosen(self, only: tuple[str, ...]) -> list[str]:

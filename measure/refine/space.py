@@ -22,7 +22,7 @@ from sim.run.recipe import Recipe, Shape
 BENDING = BENDING_SHAPE[0] * BENDING_SHAPE[1]
 DENSITY, WIND = BENDING, BENDING + 1
 DIMENSION = BENDING + 2
-"""Of θ: bending coefficients 0 to 14 (three directions of five curvatures), density, wind speed."""
+"""Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), density, wind speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class Space:
 
     @property
     def ranges(self) -> tuple[Range, ...]:
-        """Of each of the 17 parameters, in SI."""
+        """The range of each of the 17 parameters, in SI."""
         table = self.material.bending.ravel().tolist()
         low, high = self._factors
         bending = [Range(low=k * low, high=k * high, scale=Scale.LOG) for k in table]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("recipe", metavar="RECIPE")
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake to learn from; by default its head.")
-@click.option("--seed", type=click.IntRange(min=0), help="Of weights, crops and orders, instead of the recipe's.")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of weights, crops and orders, instead of the recipe's.")
 @click.option("--sequences", type=click.IntRange(min=2), metavar="N", help="Simulations to learn from, instead of all.")
 @click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
               help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.")  # fmt: skip
