@@ -106,6 +106,7 @@ def trained(
     from models.training.publish import data_identity, network_artifact, publish
     from models.training.steps import Training
 
+    recipe.check()
     source = flagdata.open(lake_path)
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
