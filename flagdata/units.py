@@ -43,6 +43,13 @@ POINTS |= {
     f"{_SIDES[point[0]]}{sign}{_SIDES[point[1]]}{_SIDES[point[2]]}": POINTS[point]
     for point in _ROSE if len(point) == 3 for sign in (" ", "-")
 }  # fmt: skip
+_KANJI = {"N": "北", "E": "東", "S": "南", "W": "西"}
+# Japanese joins the letters as English does (北東, 東北東); Chinese puts east and west first (东北, 东东北).
+_FAR_EAST = {
+    "".join(_KANJI[letter] for letter in spelled): POINTS[point]
+    for point in _ROSE for spelled in {point, point[:-2] + point[-2:][::-1]}
+}  # fmt: skip
+POINTS |= _FAR_EAST | {name.replace("東", "东"): degrees for name, degrees in _FAR_EAST.items()}
 
 UNITS: dict[str, Unit] = {
     "m/s": Unit(si="m/s", scale=1.0),

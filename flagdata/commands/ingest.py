@@ -89,6 +89,11 @@ from flagdata.errors import UsageError
     "--wind", metavar="LABEL",
     help="Wind: the one anemometer to read of a table that holds several, or the column of its speed.",
 )  # fmt: skip
+@click.option(
+    "--columns", metavar="LIST",
+    help="Wind: what the columns of a table are, in their order or by heading or number, such as "
+    "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'.",
+)  # fmt: skip
 @json_option
 @lake_option
 @click.pass_context
@@ -120,6 +125,7 @@ def ingest(
     encoding: str | None,
     unit: str | None,
     wind: str | None,
+    columns: str | None,
     as_json: bool,
     lake_path: str,
 ) -> None:
@@ -154,7 +160,7 @@ def ingest(
         wind=wind_options(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
-            clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind,
+            clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind, columns=columns,
             rate=rate if "rate" in given else None,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),

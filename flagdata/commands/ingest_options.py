@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 CAMERA_ONLY = ("true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = (
     "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
+    "columns",
 )  # fmt: skip
 LENGTHS = ("unit",)
 """Of meshes and markers, and of the wind's speed."""
@@ -30,7 +31,7 @@ FOREIGN = {
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
     "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
-    "date_order",
+    "date_order", "columns",
 )  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture")
 
@@ -114,6 +115,7 @@ def wind_options(
     start: str | None,
     wind: str | None,
     rate: str | None,
+    columns: str | None,
 ) -> WindIngest:
     """Those of an anemometer; `rate` is `None` where none is given.
 
@@ -158,6 +160,7 @@ def wind_options(
             start=instant,
             rate=_number(rate, "--rate", "readings a second") if rate not in (None, "native") else None,
             wind=wind,
+            columns=columns,
         )
     )
 

@@ -43,8 +43,10 @@ def ingest_sources(
     """
     from flagdata.ingest.classify import classify
 
-    recipe = options.wind.wind.recipe
-    kinds = _told(sources, lambda source: classify(source, format_name=format_name, recipe=recipe))
+    recipe, columns = options.wind.wind.recipe, options.wind.wind.columns
+    kinds = _told(
+        sources, lambda source: classify(source, format_name=format_name, recipe=recipe, columns=columns)
+    )  # fmt: skip
     check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
     if any(not isinstance(kind, FlagdataError) and kind.kind == "camera" for kind in kinds):
         options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None, rate=None)))
@@ -86,6 +88,8 @@ def _completed(source: Path, ranked: tuple[Guess, ...], options: Given) -> tuple
     from flagdata.ingest.anemometer import completed
 
     wind = options.wind.wind
+    if wind.columns is not None and ranked[0].kind in ("anemometer", "other"):
+        return (completed(source, wind) or ranked[0], *ranked[1:])
     said = wind.unit is not None or wind.wind is not None or wind.date_order is not None
     if not said or ranked[0].format != "delimited" or ranked[0].recipe is not None:
         return ranked

@@ -36,13 +36,16 @@ def guesses(path: Path) -> tuple[Guess, ...]:
     return (Guess(format="video", score=0.8, reasons=(reason,), kind="camera"), *found)
 
 
-def classify(path: Path, *, format_name: str | None = None, recipe: str | None = None) -> Guess:
+def classify(
+    path: Path, *, format_name: str | None = None, recipe: str | None = None, columns: str | None = None
+) -> Guess:
     """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes" or "markers".
 
     Args:
         format_name: the user's word for it: "camera", "meshes", "markers" or an anemometer format; goes before the
             content.
         recipe: a sensor recipe the user named, for any source that is no camera's, meshes or markers by its content.
+        columns: what the columns of a table are, by the user's word; likewise.
 
     Raises:
         InputError: something else (one mesh, a record, an archive), with what to do.
@@ -64,6 +67,8 @@ def classify(path: Path, *, format_name: str | None = None, recipe: str | None =
     by_content = best.kind in (CAMERA, MARKERS) or (best.kind == MESHES and path.is_dir())
     if recipe is not None and not by_content:
         return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
+    if columns is not None and not by_content:
+        return Guess(format="delimited", score=1.0, reasons=("its columns were named",))
     if by_content or best.kind == "anemometer":
         return best
     raise InputError(

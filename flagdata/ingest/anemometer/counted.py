@@ -89,7 +89,7 @@ def since_start(
     """UTC nanoseconds of counts since a start; `start` is the instant of the first row.
 
     Raises:
-        TimeError: nobody said when the log starts.
+        TimeError: nobody said when the log starts, or its count starts again.
     """
     if start is None:
         raise TimeError(
@@ -107,9 +107,30 @@ def since_start(
                 kind="counter-overflow", severity=Severity.NOTE, count=int(over.sum()), what=what, where=f"line {at}"
             ))  # fmt: skip
             count = count + np.concatenate(([0], np.cumsum(over))) * span
+    _refuse_restarts(count, line=line, where=where)
     what = f"the stamps count from a start; the first row was at {iso(start)}, as given"
     found.append(Finding(kind="elapsed-time", severity=Severity.NOTE, what=what))
     return count - count[0] + start, tuple(found)
+
+
+def _refuse_restarts(count: NDArray[np.int64], *, line: NDArray[np.int64], where: str) -> None:
+    """Refuse a count that starts again, as after a reset: when the second stretch began, nothing tells."""
+    if len(count) < 3:
+        return
+    steps = np.diff(count)
+    usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 0
+    back = np.flatnonzero((steps < 0) & (count[1:] <= count[0] + 2 * usual)) + 1
+    back = [row for row in back.tolist() if row + 1 < len(count) and count[row] <= count[row + 1] < count[row - 1]]
+    if back:
+        row, times = back[0], f"{len(back)} times" if len(back) > 1 else "once"
+        fix = (
+            "make a file of each stretch and give each its own --start; where a column tells the stretches apart, name "
+            "it as site in --columns, and read each with its --start: --wind VALUE"
+        )
+        raise TimeError(
+            f"the count starts again {times}, first at line {line[row]}, and nothing tells how long after", where=where,
+            fix=fix,
+        )  # fmt: skip
 
 
 def on_days(

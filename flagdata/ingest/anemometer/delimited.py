@@ -23,7 +23,7 @@ from flagdata.ingest.anemometer.table import Given, read_table
 _DRAFTED = 0.55
 """Score of a draft without doubts: it is taken, but any format that knows the file goes before it."""
 _DOUBTED = 0.3
-_ASKED = frozenset({"unit", "date_order", "wind"})
+_ASKED = frozenset({"unit", "date_order", "wind", "columns"})
 """Options that complete a draft; a recipe says these things itself."""
 
 
@@ -66,7 +66,9 @@ class Delimited:
     def _by_draft(self, source: TextFile, options: WindOptions, where: str) -> Reading:
         proposal = drafted(source, options)
         if proposal is None:
-            raise UsageError("the format delimited needs a recipe", where=where, fix="name one by --recipe")
+            raise UsageError(
+                "no table in its first lines", where=where, fix="describe it by a recipe: --recipe FILE.toml"
+            )
         if proposal.doubts:
             what = "; ".join(doubt.what for doubt in proposal.doubts)
             open_needs = [need.fix for need in proposal.needs if need.without(options)]
@@ -107,7 +109,10 @@ def guess(proposal: Draft) -> Guess:
 def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     """The draft of a file's recipe, completed by what the user says."""
     lines = tuple(source.head(HEAD_LINES))
-    return draft(lines, unit=options.unit, order=options.date_order, wind=options.wind)
+    return draft(
+        lines, unit=options.unit, order=options.date_order, wind=options.wind, columns=options.columns,
+        where=str(source.path),
+    )  # fmt: skip
 
 
 def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, unitcheck, zones
+from flagdata.ingest.anemometer import counted, stated_columns, unitcheck, zones
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
@@ -99,7 +99,13 @@ class Draft:
 
 @lru_cache(maxsize=4)
 def draft(
-    lines: tuple[str, ...], *, unit: str | None = None, order: _ORDER | None = None, wind: str | None = None
+    lines: tuple[str, ...],
+    *,
+    unit: str | None = None,
+    order: _ORDER | None = None,
+    wind: str | None = None,
+    columns: str | None = None,
+    where: str = "",
 ) -> Draft | None:
     """What the table is that `lines` seem to begin; `None` where they hold no table, or neither time nor wind.
 
@@ -107,23 +113,34 @@ def draft(
         unit: of the wind, by the user's word.
         order: of dates written with numbers only, by the user's word.
         wind: label of the anemometer to describe, of those that `Draft.winds` lists.
+        columns: what the columns are, by the user's word (see `stated_columns`).
+        where: the file, for messages.
+
+    Raises:
+        UsageError, UnknownNameError, InputError: `columns` do not fit the table.
     """
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
-    time = find_time(layout, order=order)
-    columns = time.columns if time is not None else ()
-    winds, remarks, warnings = find_winds(layout, time=columns, told=unit)
-    named = () if winds else winds_by_name(layout, time=columns, told=unit)
-    winds = winds or named
-    if wind is not None and not named and wind not in {one.label for one in winds}:
-        said, odd = named_wind(layout, wind, told=unit)
-        winds, warnings = (*winds, *said), (*warnings, *odd)
-    if time is None and not winds:
-        return None
-    mixed = None
-    if time is not None and not named:
-        mixed = sites(layout, time=columns, stamps=_stamps(layout, columns))
+    if columns is not None:
+        known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
+        time, winds, remarks, warnings, named = known.time, (known.wind,), (), (), ()
+        of_time = time.columns if time is not None else ()
+        mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
+    else:
+        time = find_time(layout, order=order)
+        of_time = time.columns if time is not None else ()
+        winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
+        named = () if winds else winds_by_name(layout, time=of_time, told=unit)
+        winds = winds or named
+        if wind is not None and not named and wind not in {one.label for one in winds}:
+            said, odd = named_wind(layout, wind, time=of_time, told=unit)
+            winds, warnings = (*winds, *said), (*warnings, *odd)
+        if time is None and not winds:
+            return None
+        mixed = None
+        if time is not None and not named:
+            mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
     if mixed is not None:
         winds = tuple(
             replace(one, site=(mixed[0], site), label=site if len(winds) == 1 else f"{site}:{one.label}")
@@ -185,23 +202,24 @@ def _doubts(
     found: list[Doubt] = []
     names = ", ".join(repr(name) for name in layout.names if name) or "no names"
     if time is None:
-        fix = (
-            "if a column is the time, write a recipe with [time] columns and format, and name it: --recipe FILE.toml; "
-            "if none is and the rows came at a steady rate: --start TIME --rate HZ"
-        )
+        offered = stated_columns.offer(layout, time, winds)
+        fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
-        found.append(Doubt(what=time.doubt, fix=time.fix))
+        offered = f"; {stated_columns.offer(layout, time, winds)}" if time.counts else ""
+        found.append(Doubt(what=time.doubt, fix=f"{time.fix}{offered}"))
     classes = beaufort(layout)
     if not winds and classes:
         what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
         found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
     elif not winds and (directions := _directions(layout)):
         what = f"column {directions[0]!r} is a direction of the wind, but no column is its speed"
-        fix = "log the speed beside it; if a column is the speed all the same, name it: --wind COLUMN --unit m/s"
+        fix = "log the speed beside it; if a column is the speed all the same, or the direction alone is wanted, "
+        fix += stated_columns.offer(layout, time, winds)
         found.append(Doubt(what=what, fix=fix))
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
+        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
     for wind in winds if chosen is None else (chosen,):
         changing = mixed_units(layout, next(iter(wind.columns.values())).index)
@@ -216,6 +234,7 @@ def _doubts(
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
         fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
+        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         found.append(Doubt(what=what, fix=fix))
     return found
@@ -310,8 +329,11 @@ def _reference(layout: Layout, index: int) -> str:
     return _quoted(name) if layout.by_name and name and layout.names.count(name) == 1 else str(index + 1)
 
 
-def skeleton(lines: Sequence[str]) -> tuple[str, str] | None:
-    """What a table is of which nothing is known but its columns, and a recipe to complete; `None` for no table."""
+def skeleton(lines: Sequence[str]) -> tuple[str, str, str] | None:
+    """What a table is of which nothing is known but its columns, what its user can say, and a recipe to complete.
+
+    `None` for no table.
+    """
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
@@ -321,7 +343,7 @@ def skeleton(lines: Sequence[str]) -> tuple[str, str] | None:
         f"a table of {layout.number_of_columns()} columns divided by {delimiter_name(layout.delimiter)!r}, "
         f"{f'called {names}' if names else 'which no line names'}, the first row {first}"
     )
-    return what, _toml(layout, None, None)
+    return what, stated_columns.offer(layout, None, ()), _toml(layout, None, None)
 
 
 def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:

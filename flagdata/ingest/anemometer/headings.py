@@ -238,6 +238,10 @@ def _is_zone(name: str) -> bool:
     return True
 
 
+_SPEED_AND_UNIT = re.compile(r"(\w*(?:speed|spd|gust|velocity))(mph|kmh|kph|kts|knots|mps)")
+"""A speed with its unit in one word, as "windspeedmph"."""
+
+
 def words_of(name: str) -> list[str]:
     """Words of a heading, lower-case."""
     return _words(in_english(name))
@@ -249,7 +253,8 @@ def _words(text: str) -> list[str]:
         if word[0].isdigit():
             found.append(word)
         elif word.isupper() or word.islower():
-            found.append(word.lower())
+            joined = _SPEED_AND_UNIT.fullmatch(word.lower())
+            found.extend(joined.groups() if joined is not None else (word.lower(),))
         else:
             parts = [part.lower() for part in _CAMEL.findall(word)]
             found.extend(parts)

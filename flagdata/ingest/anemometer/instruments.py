@@ -30,10 +30,30 @@ _SITES = frozenset(
 _NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
 """Words beside which a heading is still that of a site."""
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
+_FROM_NORTH = frozenset({"twd", "gwd"})
+"""Directions that instruments of boats compute, from whichever north their compass is set to."""
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
-_CALM = frozenset({"calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr"})
+_CALM = frozenset(
+    {
+        "calm",
+        "still",
+        "none",
+        "variable",
+        "vrb",
+        "var",
+        "calma",
+        "windstille",
+        "calme",
+        "штиль",
+        "cvr",
+        "静穏",
+        "静风",
+        "靜風",
+        "無風",
+    }
+)
 """What stands in a column of compass points where there is no direction."""
 _UNREADABLE = 0.1
 
@@ -109,13 +129,23 @@ def find_winds(
         time: columns that are the time.
         told: unit of the wind by the user's word; it goes before the heading's.
     """
+    found = _gathered(layout, time)
+    winds = [*_speeds(found, told), *_components(found, told)]
+    winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
+    _doubt_headings(found, winds)
+    _check_gusts(found, winds)
+    return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+
+
+def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
+    """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
     headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
     found = _Found(layout=layout, headings=headings)
     for index, heading in enumerate(headings):
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        if heading.quantity.endswith("direction") and (degrees := _points(layout.column(index))) is not None:
+        if heading.quantity.endswith("direction") and (degrees := compass_points(layout.column(index))) is not None:
             found.values[index] = degrees
             found.headings[index] = replace(heading, unit="points")
         elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
@@ -124,14 +154,10 @@ def find_winds(
             found.values[index] = parsed.value
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
-    winds = [*_speeds(found, told), *_components(found, told)]
-    winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
-    _doubt_headings(found, winds)
-    _check_gusts(found, winds)
-    return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+    return found
 
 
-def _points(cells: Sequence[str]) -> NDArray[np.float64] | None:
+def compass_points(cells: Sequence[str]) -> NDArray[np.float64] | None:
     """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
     filled = [cell for cell in cells if cell_kind(cell) != "missing" and cell.lower() not in _CALM]
     if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):
@@ -142,6 +168,10 @@ def _points(cells: Sequence[str]) -> NDArray[np.float64] | None:
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
     """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
     words = [set(words_of(name)) for name in found.layout.names]
+    for name, said in zip(found.layout.names, words, strict=True):
+        if said & _FROM_NORTH:
+            fix = f"say which by --columns, {name}=wind_direction[deg] or {name}=wind_direction_magnetic[deg]"
+            found.remarks.append(f"column {name!r} may be from true or magnetic north: left out; {fix}")
     windy = any("wind" in word for name in words for word in name) or any(found.of("wind_direction", *COMPONENTS))
     for wind in winds:
         speed = wind.columns.get("wind_speed")
@@ -181,8 +211,13 @@ def _day_of_month(layout: Layout, index: int) -> bool:
     return before in ("MM", "MO", "M", "MONTH") or after.startswith("HH")
 
 
-def named_wind(layout: Layout, column: str, *, told: str | None) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
-    """The anemometer whose speed is in the column that the user names by heading or number, if any, and what is odd."""
+def named_wind(
+    layout: Layout, column: str, *, time: Sequence[int], told: str | None
+) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
+    """The anemometer whose speed is in the column that the user names by heading or number, if any, and what is odd.
+
+    Its direction is the one that the table holds, where no other speed may be that direction's.
+    """
     indices = [index for index, name in enumerate(layout.names) if name == column]
     if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
         indices = [int(column) - 1]
@@ -194,7 +229,12 @@ def named_wind(layout: Layout, column: str, *, told: str | None) -> tuple[tuple[
     odd = (_otherwise(name, known, told),) if told is not None and known is not None and told != known else ()
     how = f"in {told}, as you said" if told else f"in {known} by its heading" if known else ""
     speed = Column(index=indices[0], unit=told or known, told=how)
-    return (Wind(label=column, height=stated.height, columns={"wind_speed": speed}, sure=True),), odd
+    found = _gathered(layout, time)
+    columns = {"wind_speed": speed}
+    if len(found.of("wind_direction")) == 1 and not [at for at in found.of(*SPEEDS) if at != indices[0]]:
+        beside = _direction(found, indices[0], "wind_direction")
+        columns |= {} if beside is None else {beside[0]: beside[1]}
+    return (Wind(label=column, height=stated.height, columns=columns, sure=True),), odd
 
 
 def _otherwise(name: str, stated: str, told: str) -> str:
@@ -346,6 +386,13 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
             channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices
         }
         first = indices["wind_x"]
+        own = [
+            at for at in found.of("wind_direction") if found.headings[at].height in (None, found.headings[first].height)
+        ]
+        if own and not speeds:
+            names = ", ".join(repr(found.name(at)) for at in own)
+            fix = "to read it and the speed of its own column, say what the columns are (--columns)"
+            found.remarks.append(f"the direction {names} is left out beside the components; {fix}")
         winds.append(Wind(label=found.name(first), height=found.headings[first].height, columns=columns, sure=True))
     return winds
 

@@ -12,6 +12,7 @@ version 171" (obs_st and rapid_wind are arrays of stated units), and Signal K sp
 
 from __future__ import annotations
 
+import ast
 import csv
 import io
 import json
@@ -29,6 +30,8 @@ WIDEST = 2000
 """Columns of the widest table that is read."""
 _DEEPEST = 8
 """Objects within objects that are looked into."""
+_LONGEST = 20_000
+"""Characters of the longest dictionary that is read as Python prints it."""
 _LOOKED_AT = 50
 _PLATFORM = frozenset(
     {"lat", "latitude", "lon", "lng", "longitude", "position", "sog", "cog", "heading", "navigation", "course"}
@@ -37,6 +40,10 @@ _PLATFORM = frozenset(
 _REPEAT = "sequence_num"
 """The number of a repeat of one radio message, from 0, as rtl_433 writes it."""
 _NUMBERED = re.compile(r"[0-9]{1,9}")
+_DATE_AND_TIME = re.compile(
+    r"\s*\[?(?P<date>\d{4}[-/]\d{1,2}[-/]\d{1,2}),?\s+(?P<time>\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?)\]?(?=\s|$)"
+)
+"""A stamp of two words before an object."""
 _RECEPTION = frozenset({_REPEAT, "rssi", "snr", "noise", "freq", "freq1", "freq2"})
 """Members that tell how a radio message was received, not what it says."""
 _LINE = re.compile(r"\s*(?P<before>[^\s{\[][^{]{0,300}?)?[\s,;]*(?P<object>\{.*\})[\s,]*")
@@ -193,9 +200,13 @@ def _rows(source: TextFile, whole: Any) -> Iterator[dict[str, str] | None]:
 def _before(text: str) -> dict[str, str]:
     """Cells of what stands before an object: a stamp, a topic."""
     found: dict[str, str] = {}
+    stamp = _DATE_AND_TIME.match(text)
+    if stamp is not None:
+        found["logged time"] = f"{stamp['date']} {stamp['time'].replace(',', '.')}"
+        text = text[stamp.end() :]
     for number, word in enumerate(text.split(), start=1):
-        stamp = cell_kind(word) == "stamp" or re.fullmatch(r"\d{10}(\.\d+)?", word)
-        found["logged time" if stamp else f"topic{number}"] = word
+        timed = cell_kind(word) == "stamp" or re.fullmatch(r"\d{10}(\.\d+)?", word)
+        found.setdefault("logged time" if timed else f"topic{number}", word)
     return found
 
 
@@ -208,6 +219,12 @@ def _parsed(text: str) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError):
+        pass
+    if not text.startswith("{'") or len(text) > _LONGEST:
+        return None
+    try:
+        return ast.literal_eval(text)  # a dictionary as Python prints it
+    except (ValueError, SyntaxError, RecursionError, MemoryError):
         return None
 
 

@@ -13,19 +13,23 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.headings import interest, understand
+from flagdata.ingest.anemometer.layout import lay_out
 from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
+from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.units import spelled
 
 _STAMP = re.compile(
     r"[\s\[(\"]*(?P<stamp>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
-    r"(?:\s?Z|[+-]\d{2}:?\d{2})?"
-    r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+    r"(?:\s?[AaPp]\.?[Mm]\b\.?|\s?Z|[+-]\d{2}:?\d{2})?"
+    r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp]\.?[Mm]\b\.?)?"
     r"|(?P<parts>\d{2}:\d{2}:\d{2}):(?P<clock>\d{2}:\d{2}:\d{2}(?:\.\d+)?)"
-    r"|\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?|\d{10}(?:\.\d+)?|\d{13})(?![\d:])"
+    r"|\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:\s?[AaPp]\.?[Mm]\b\.?)?|\d{10}(?:\.\d+)?|\d{13})(?![\d:])"
 )
-_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?!\d)")
+_FRACTION = re.compile(r"(?P<seconds>:\d{2}),(?=\d)")
+"""The comma before the fraction of a second, as Python's logging writes it."""
+_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?!\d)|[Nn][Aa][Nn](?!\w))")
 _UNIT = re.compile(r"\s?(?P<unit>[^\s\d,;:|=()\[\]]{1,10})")
 _WORDS = re.compile(r"[^\W\d_]")
 _SERIAL = re.compile(r"\d{3}")
@@ -35,8 +39,16 @@ _SHARE = 0.8
 
 
 def matches(lines: Sequence[str]) -> bool:
-    """Most lines have the same words, some of them before numbers, and one of these is a wind."""
+    """Most lines have the same words, some of them before numbers, and one of these is a wind.
+
+    Lines of a program's log, each after a stamp, may be of several kinds: then those of one are of the wind.
+    """
     return _heading(lines) is not None
+
+
+def alike(lines: Sequence[str]) -> bool:
+    """Whether the lines are all of one kind, the wind among what they name."""
+    return _usual(lines) is not None and matches(lines)
 
 
 def stamped(lines: Sequence[str]) -> bool:
@@ -49,10 +61,16 @@ def as_table(source: TextFile) -> TableText | None:
     from flagdata.ingest.anemometer.sniff import recognise  # it imports the module that asks for this one
     from flagdata.ingest.anemometer.sniffing import SURE
 
-    heading = _heading(source.head())
-    if heading is None or any(guess.score >= SURE and not guess.doubts for guess in recognise(source)):
+    lines = source.head()
+    heading = _heading(lines)
+    if heading is None:
         return None
     words, names = heading
+    if any(guess.score >= SURE and not guess.doubts for guess in recognise(source)):
+        return None
+    layout = lay_out(lines, interest=interest) if _usual(lines) is None else None
+    if layout is not None and find_time(layout) is not None:
+        return None  # a table
 
     def row(line: str) -> list[str] | None:
         cut = _cut(line)
@@ -66,14 +84,30 @@ def as_table(source: TextFile) -> TableText | None:
 
 
 def _heading(lines: Sequence[str]) -> tuple[tuple[str, ...], list[str]] | None:
-    """The words of most lines, and the names of their columns with units; `None` where they name no wind."""
+    """The words of the lines of the wind, and the names of their columns with units; `None` where there are none."""
     filled = [line for line in lines if line.strip()]
     cuts = [cut for line in filled if (cut := _cut(line)) is not None]
     if len(cuts) < 3:
         return None
-    words, count = Counter(cut[0] for cut in cuts).most_common(1)[0]
-    if count < _SHARE * len(filled):
+    if (usual := _usual(lines)) is not None:
+        return _named(usual)
+    stamped = Counter(cut[0] for cut in cuts if cut[1])
+    if stamped.total() < _SHARE * len(filled):
         return None
+    kinds = (words for words, count in stamped.most_common() if count >= 3)
+    return next((found for words in kinds if (found := _named(words)) is not None), None)
+
+
+def _usual(lines: Sequence[str]) -> tuple[str, ...] | None:
+    """The words of most lines; `None` where none are."""
+    filled = [line for line in lines if line.strip()]
+    counts = Counter(cut[0] for line in filled if (cut := _cut(line)) is not None)
+    words, count = counts.most_common(1)[0] if counts else ((), 0)
+    return words if count and count >= _SHARE * len(filled) else None
+
+
+def _named(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[str]] | None:
+    """The words of a line, and the names of its columns with units; `None` where they name no wind."""
     names: list[str] = []
     label, unit = words[0], None
     for text in words[1:]:
@@ -111,5 +145,5 @@ def _cut(line: str) -> tuple[tuple[str, ...], str, list[str]] | None:
     elif stamp["parts"]:
         when = f"{stamp['parts'].replace(':', '-')} {stamp['clock']}"
     else:
-        when = stamp["stamp"].replace(",", " ")
+        when = _FRACTION.sub(r"\g<seconds>.", stamp["stamp"]).replace(",", " ")
     return words, when, [number[0] for number in numbers]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError, ZoneMissingError
+from flagdata.errors import InputError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform, possible, quality, untimed, zero, zones
 from flagdata.ingest.anemometer import recipe as recipes
@@ -18,7 +18,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.order import in_order
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.restated import restate
-from flagdata.ingest.anemometer.sniff import recognise
+from flagdata.ingest.anemometer.sniff import recognise, unknown
 from flagdata.ingest.anemometer.sniffing import SURE
 from flagdata.ingest.anemometer.source import TextFile, open_text
 from flagdata.schema import CHANNELS, UNUSABLE
@@ -43,8 +43,13 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     encoding = options.encoding or (recipe.file.encoding if recipe else None)
     source = open_text(path, limits=options.limits, encoding=encoding)
     if options.rate is not None:
-        source = untimed.timed(source, rate=options.rate, start=options.start)
+        source = untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
         options = replace(options, start=None, rate=None)
+    if recipe is None and options.columns is None and untimed.clocked(source):
+        if options.date is None:
+            what = "the lines of an instrument stand after times of day without a date"
+            raise TimeError(what, where=str(path), fix="give the day of the first: --date 2026-05-01, and its --zone")
+        source, options = untimed.dated(source, options.date), replace(options, date=None)
     source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()
@@ -88,7 +93,7 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     """A finding where no wind can be used, but the log measured something else.
 
     Raises:
-        InputError: nothing else either; a direction alone is none.
+        InputError: nothing else either; a direction beside speeds that are all missing is none.
     """
     winds = [values for name, values in reading.channels.items() if name in WIND_CHANNELS]
     usable = (reading.flags & UNUSABLE) == 0
@@ -97,7 +102,7 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     others = sorted(
         name
         for name, values in reading.channels.items()
-        if name not in WIND_CHANNELS and CHANNELS[name].unit != "rad" and np.isfinite(values).any()
+        if name not in WIND_CHANNELS and (CHANNELS[name].unit != "rad" or not winds) and np.isfinite(values).any()
     )
     counts = ((flag, int(((reading.flags & flag) != 0).sum())) for flag in UNUSABLE)
     why = ", ".join(f"{count} {flag.name.lower().replace('_', ' ')}" for flag, count in counts if count and flag.name)
@@ -128,15 +133,18 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
     if options.recipe is not None:
         name = "host-stamped" if recipes.load(options.recipe).file.host else "delimited"
         return name, options, (f"the recipe {options.recipe} was named",)
+    if options.columns is not None:
+        return "delimited", options, ("its columns were named",)
     guesses = recognise(source)
     if guesses and guesses[0].score < SURE:
         # A table in doubt is refused by its own reader, which knows what the user has said already.
         guesses = tuple(sorted(guesses, key=lambda guess: not guess.doubts))
     if not guesses or (guesses[0].score < SURE and not guesses[0].doubts):
+        guesses = guesses or (unknown(source),)
         seen = "; ".join(reason for guess in guesses for reason in guess.reasons)
         raise InputError(
             f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),
-            fix=(guesses[0].fix if guesses else None)
+            fix=guesses[0].fix
             or "describe it by a recipe (--recipe FILE.toml of ingest, --sensor FILE.toml of close-loop), or name "
             "its format (--as of ingest)",
         )  # fmt: skip

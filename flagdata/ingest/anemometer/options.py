@@ -11,7 +11,7 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.clock import ClockChoice
 from flagdata.units import unit
 
-_LATER = frozenset({"clock", "unit", "start", "wind", "rate"})
+_LATER = frozenset({"clock", "unit", "start", "wind", "rate", "columns"})
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
 and change nothing, or subtract what they show."""
@@ -59,6 +59,7 @@ class WindOptions:
         start: instant of the first row [UTC ns], for stamps that count from a start.
         rate: readings a second [Hz] of a file whose rows carry no time; needs `start`.
         wind: which anemometer of a file that holds several, by the label that `sniff` gives it.
+        columns: what the columns of a table are, in one line (see `stated_columns`).
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
     """
@@ -77,6 +78,7 @@ class WindOptions:
     start: int | None = None
     rate: float | None = None
     wind: str | None = None
+    columns: str | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
 

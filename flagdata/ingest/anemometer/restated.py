@@ -21,6 +21,8 @@ KINDS = (
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.global_hourly",
     "flagdata.ingest.anemometer.labelled",
+    "flagdata.ingest.anemometer.blocks",
+    "flagdata.ingest.anemometer.bracketed",
 )
 LOOKED_AT = 60
 """Lines by which a kind is told."""

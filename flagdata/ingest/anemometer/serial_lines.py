@@ -34,8 +34,10 @@ from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
 
 _STAMP = re.compile(
-    r"\s*[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
-    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
+    r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+)?"
+    r"[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
+    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+"
+    r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
 )
 _AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})\s.*")
 """What a program wrote behind a sentence."""
@@ -160,13 +162,15 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
     if count == 0 and gathered.unstamped:
         raise TimeError(
             f"the lines of {instrument.name} carry no time", where=f"{where}, line {gathered.unstamped[0]}",
-            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE",
+            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE; if the readings came at a "
+            "steady rate that is known: --start TIME --rate HZ, with the instant of the first",
         )  # fmt: skip
     if count == 0:
         bad = sum(len(places) for places in gathered.defects.values())
         raise InputError(
             f"none of {bad} lines is a reading of {instrument.name}", where=where,
-            fix="look at it with flagdata ingest --sniff",
+            fix="a stamp before each line is known as 2026-05-01T12:00:00 or 2026/05/01 12:00:00: write it so; or "
+            "look at the lines with flagdata ingest --sniff",
         )  # fmt: skip
     stamps = stamps_of(gathered.stamps)
     line = np.array(gathered.line, dtype=np.int64)

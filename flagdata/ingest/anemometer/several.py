@@ -24,7 +24,7 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     if options.wind is not None or options.recipe is not None or options.format not in (None, "delimited"):
         return ()
     source = restate(open_text(Path(path), limits=options.limits, encoding=options.encoding))
-    if options.format is None:
+    if options.format is None and options.columns is None:
         guesses = recognise(source)
         if not guesses or guesses[0].format != "delimited" or guesses[0].recipe is not None:
             return ()

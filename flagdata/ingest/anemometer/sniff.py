@@ -9,6 +9,7 @@ from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import excel
 from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
+from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
@@ -50,33 +51,34 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         text = "profiles of a SODAR, in blocks whose stamp stands above them (Scintec, APRun, FORMAT-1)"
         fix = "write a table of one height with the program that reads them: one row a time, with speed and direction"
         return (Guess(format="SODAR profiles", score=0.0, reasons=(text,), kind="other", fix=fix),)
-    guesses = recognise(source)
-    if guesses:
-        return guesses
+    return recognise(source) or (unknown(source),)
+
+
+def unknown(source: TextFile) -> Guess:
+    """What a text is that no format knows, and what its user can do."""
     start = next((line for line in source.head() if line.strip()), "")
     if start.lstrip("\ufeff \t").startswith(("<?xml", "<gpx", "<html", "<!DOCTYPE")):
         text = "this is XML or HTML, not a table of text"
         fix = "convert it to CSV with one row a reading: its time and its wind (GPX: with the program that wrote it)"
-        return (Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix),)
+        return Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix)
     if sum(bool(_METAR.search(line)) for line in source.head()) > len(source.head()) / 3:
         text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"
         fix = "decode them to a table with one row a report: its time, speed and direction, each with its unit"
-        return (Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix),)
+        return Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix)
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
-        what, recipe = table
-        fix = (
-            "name time and wind in a recipe: flagdata ingest --sniff prints one to complete, then --recipe FILE.toml; "
-            f"{ADVICE}"
-        )
+        what, offered, recipe = table
+        fix = f"{offered}; {ADVICE}"
         reason = f"{what}; which of them are the time and the wind, nothing tells"
-        return (Guess(format="unknown", score=0.0, reasons=(reason,), kind="other", fix=fix, draft=recipe),)
+        return Guess(format="unknown", score=0.0, reasons=(reason,), kind="other", fix=fix, draft=recipe)
+    filled = [line for line in source.head(HEAD_LINES) if line.strip()]
+    if sum(cell_kind(line) == "number" for line in filled) >= max(2, 0.9 * len(filled)):
+        text = "one number a line, and nothing tells what it is or when"
+        fix = 'if it is the wind at a steady rate: --columns "wind_speed[m/s]" --start TIME --rate HZ'
+        return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
     text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
-    fix = (
-        "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml; "
-    )
-    fix += ADVICE
-    return (Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix),)
+    fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
+    return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
 
 
 def recognise(source: TextFile) -> tuple[Guess, ...]:

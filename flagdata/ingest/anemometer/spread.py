@@ -127,6 +127,8 @@ def _spread(reading: Reading, again: NDArray[np.bool_]) -> Reading:
     usual = max(1, int(np.median(runs.rows[inner] if len(runs.rows) > 3 else runs.rows)))
     hold = round(float(np.median(runs.room))) if len(runs.room) else reading.step
     continuity = _continuity(reading, again)
+    if len(runs.room) < 2:  # how long a stamp stands is not known
+        hold = min(hold, reading.step)
     burst = continuity is not None and continuity > BURST and hold > 1.5 * reading.step
     if burst:
         period, hold = reading.step / usual, reading.step

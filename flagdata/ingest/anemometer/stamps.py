@@ -1,9 +1,9 @@
 """From stamps as text to nanoseconds, in bulk: ISO 8601, Unix time and strptime directives.
 
-Directives: %Y %y %m %d %j %H %I %p %M %S %b, and %f, which here stands for an optional fraction with its mark ("" or
+Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which here stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p". A blank stands
-for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p", %a for a day of
+the week, which is not read. A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -28,7 +28,8 @@ DAY = 86_400 * NANOSECONDS
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
-    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)", "b": r"(?P<b>[A-Za-z]{3})",
+    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
+    "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
     "z": r"\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -80,7 +81,7 @@ def pattern(form: str) -> str:
     """The regular expression of a format.
 
     Raises:
-        UsageError: an unknown directive, one given twice, or no date or no time in it.
+        UsageError: an unknown directive, one given twice, or no whole date in it. A date alone is its midnight.
     """
     if form == "iso":
         return _ISO
@@ -112,9 +113,16 @@ def pattern(form: str) -> str:
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
     dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
     dated = dated or {"y", "b", "d"} <= set(used)
-    if not (dated or {"Y", "j"} <= set(used)) or not {"H", "I"} & set(used):
-        raise UsageError("no whole date and hour in it", where=f"time format {form!r}", fix="name them all")
+    if not (dated or {"Y", "j"} <= set(used)):
+        raise UsageError("no whole date in it", where=f"time format {form!r}", fix="name year, month and day")
+    if not {"H", "I"} & set(used) and {"M", "S", "f", "p"} & set(used):
+        raise UsageError("no hour in it", where=f"time format {form!r}", fix="name the hour, or the date alone")
     return "^" + "".join(out) + "$"
+
+
+def is_date_alone(form: str) -> bool:
+    """Whether a format has directives of a date, but none of the time of day."""
+    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSf")
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
@@ -146,7 +154,7 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     fraction, digits = _fraction(found)
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
     offset, utc = _offset(found, len(text))
-    step = NANOSECONDS if np.any(second[valid]) else 60 * NANOSECONDS
+    step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else 60 * NANOSECONDS
     step = 10 ** (9 - digits) if digits else step
     return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
 
@@ -211,6 +219,8 @@ def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[
     if hour is not None:
         return hour, np.ones(len(hour), dtype=bool)
     twelve = part("I")
+    if twelve is None:
+        return np.zeros(len(found), dtype=np.int64), np.ones(len(found), dtype=bool)
     ok = (twelve >= 1) & (twelve <= 12)
     half = _field(found, "p")
     if half is None:

@@ -20,7 +20,7 @@ from flagdata.ingest.anemometer.growing import Growing
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
-from flagdata.ingest.anemometer.stamps import YEARS, Stamps
+from flagdata.ingest.anemometer.stamps import YEARS, Stamps, is_date_alone
 from flagdata.ingest.anemometer.wall import to_utc, zone_advice
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants
@@ -161,6 +161,13 @@ class _Clock:
         elif given.start is not None or given.date is not None:
             option = "--start" if given.start is not None else "--date"
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
+        if is_date_alone(self.form):
+            what = "the stamps are dates without a time of day: each row stands for a whole day, put at its midnight"
+            fix = "a mean of a day is no wind at a flag: export the log with the times of its readings"
+            found = (
+                *found,
+                Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),
+            )
         if self.bare_dates:
             what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
             bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,14 +13,14 @@ from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dates import Order, decide
-from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
+from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.stamps import Stamps
 
 _SHARE = 0.9
 """Share of rows that must fit for a column to be what it seems."""
-_CLOCKS = (
+CLOCKS = (
     "%H:%M:%S%f",
     "%H:%M",
     "%I:%M:%S %p",
@@ -34,6 +34,7 @@ _CLOCKS = (
     "%H.%M.%S",
     "%H",
 )
+"""How a time of day may be written."""
 _MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
@@ -42,11 +43,14 @@ _DATE = re.compile(
 _CLOCK = re.compile(
     r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
 )
+_HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
+"""Before or after noon, in a column of its own."""
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
-    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3} \d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
 _YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
 _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
@@ -100,6 +104,18 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     return best
 
 
+def time_as(layout: Layout, columns: tuple[int, ...], form: str) -> TimeChoice | None:
+    """These columns as a time written as `form`; `None` where nine rows of ten are not.
+
+    Raises:
+        UsageError: see `stamps.pattern`.
+    """
+    texts = [" ".join(cells) for cells in zip(*(layout.column(index) for index in columns), strict=True)]
+    texts = [text for text in texts if text.strip()]
+    found = counted.parse(texts, form) if counted.is_time_of_day(form) else _parsed(texts, form)
+    return _choice(layout, columns, form, found, 2.0) if _fits(found) else None
+
+
 def _without_false_epochs(layout: Layout, choices: Sequence[TimeChoice]) -> list[TimeChoice]:
     """The choices without those that count seconds since 1970 to another year than the dates in the same rows."""
     dated = {
@@ -133,6 +149,8 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     if layout.decimal == ",":
         columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
     dates, clocks = [], []
+    halves = {at for at, cells in enumerate(columns) if (texts := [cell for cell in cells if cell])
+              and _share(_HALF, texts)}  # fmt: skip
     for index, cells in enumerate(columns):
         texts = [cell for cell in cells if cell]
         if not texts:
@@ -142,30 +160,45 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
         elif _share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
                                        and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
             clocks.append(index)
-        found = _whole(layout, (index,), texts, order)
+        if index + 1 in halves:
+            texts = _joined(columns, (index, index + 1))
+        found = _whole(layout, _with_half((index,), halves), texts, order)
         if found is not None:
             yield found
     for date in dates:
         for clock in clocks:
             if clock == date:
                 continue
-            texts = [f"{a} {b}" for a, b in zip(columns[date], columns[clock], strict=True) if a and b]
-            found = _whole(layout, (date, clock), texts, order) if texts else None
+            both = _with_half((date, clock), halves)
+            texts = _joined(columns, both)
+            found = _whole(layout, both, texts, order) if texts else None
             if found is not None:
                 yield found
-    if not clocks:
-        yield from _days(layout, columns, dates)
+    days = [] if clocks else list(_days(layout, columns, dates, order))
+    yield from days
     parts = _parts(layout, columns) or _unnamed_parts(layout, columns)
     if parts is not None:
         yield parts
     for index in clocks:
-        texts = [cell for cell in columns[index] if cell]
-        for form in _CLOCKS[:4]:
+        clock = _with_half((index,), halves)
+        texts = _joined(columns, clock)
+        for form in CLOCKS[:4]:
             if _fits(counted.parse(texts, form)):
-                yield _choice(layout, (index,), form, counted.parse(texts, form), 1.0)
+                yield _choice(layout, clock, form, counted.parse(texts, form), 1.0)
                 break
     for index, cells in enumerate(columns):
-        yield from _counts(layout, index, [cell for cell in cells if cell])
+        if not any(index in choice.columns for choice in days):
+            yield from _counts(layout, index, [cell for cell in cells if cell])
+
+
+def _with_half(columns: tuple[int, ...], halves: Collection[int]) -> tuple[int, ...]:
+    """Columns of a time, with the one behind them that says whether it is before or after noon, if any."""
+    return (*columns, columns[-1] + 1) if columns[-1] + 1 in halves else columns
+
+
+def _joined(columns: Sequence[Sequence[str]], chosen: tuple[int, ...]) -> list[str]:
+    rows = zip(*(columns[at] for at in chosen), strict=True)
+    return [" ".join(cells) for cells in rows if all(cells)]
 
 
 def _share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:
@@ -235,24 +268,45 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
             doubt=f"dates may be {form!r} or {swapped!r}, and nothing in the first rows tells which",
             fix="say which number is the day: --date-order dmy or mdy",
         )  # fmt: skip
-    for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in _CLOCKS):
+    for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in CLOCKS):
         found, _ = parse_with_bare_dates(texts, form)
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)
     return None
 
 
-def _days(layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int]) -> Iterator[TimeChoice]:
+def _days(
+    layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int], order: Order | None
+) -> Iterator[TimeChoice]:
     """Dates without a time of day, one a row: means of days."""
     for index in dates:
         texts = [cell for cell in columns[index] if cell]
-        if len(texts) > 1 and len(set(texts)) == len(texts):
-            name = layout.names[index] or f"number {index + 1}"
-            yield TimeChoice(
-                columns=(index,), form=None, zone=None, zoned=False, score=0.9,
-                doubt=f"column {name!r} holds dates without a time of day: each row stands for a whole day",
-                fix="export the log with the times of its readings; means of days are no wind at a flag",
-            )  # fmt: skip
+        if len(texts) < 2 or len(set(texts)) < len(texts):
+            continue
+        try:
+            forms = date_forms(layout, index, order)
+        except TimeError as error:
+            doubt, fix = error.what, error.fix
+            yield TimeChoice(columns=(index,), form=None, zone=None, zoned=False, score=0.9, doubt=doubt, fix=fix)
+            continue
+        found = (choice for form in forms if (choice := time_as(layout, (index,), form)) is not None)
+        yield from (replace(choice, score=0.9) for choice in itertools.islice(found, 1))
+
+
+def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ...]:
+    """The formats in which the dates of a column may be written.
+
+    Raises:
+        TimeError: their numbers may be day and month, or month and day.
+    """
+    named = ("%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in _MONTHS))
+    try:
+        numbered = decide(layout.column(index), told=order or _order_of(layout.names[index]), where="").directives()
+    except TimeError as error:
+        if "may be" in error.what:
+            raise
+        return named
+    return (*named, numbered)
 
 
 def _order_of(heading: str) -> Order | None:
@@ -275,7 +329,7 @@ def _dated(texts: Sequence[str], first: str, second: str, zoned: str) -> Iterato
     if parts is None:
         return
     year = "%Y" if len(parts[2]) == 4 else "%y"
-    for clock in _CLOCKS:
+    for clock in CLOCKS:
         form = f"{first}{parts[1]}{second}{parts[1]}{year} {clock}{zoned}"
         found, _ = parse_with_bare_dates(texts, form)
         yield (form, found) if _fits(found) else None
@@ -296,7 +350,10 @@ def _compact(shape: str) -> tuple[str, ...]:
 
 def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
     dates = [form.format(s=sign) for sign in "- /" for form in _MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
-    for form in (f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in _CLOCKS[:6]):
+    forms = [f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in CLOCKS[:6]]
+    if _DAY_OF_WEEK.match(texts[0]):
+        forms = [f"%a {form}" for form in ("%b %d %H:%M:%S%f %Y", *forms)]
+    for form in forms:
         found, _ = parse_with_bare_dates(texts[:20], form)
         if _fits(found):
             return _choice(layout, columns, form, found, 2.0)
@@ -327,7 +384,7 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
         if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and _share(_DIGITS, clock):
             chosen, form = [*chosen, at], f"{form} %H%M"
         elif form == "%Y %m %d" and clock and _share(_CLOCK, clock):
-            known = next((found for found in _CLOCKS if _fits(counted.parse(clock, found))), None)
+            known = next((found for found in CLOCKS if _fits(counted.parse(clock, found))), None)
             chosen, form = [*chosen, at], f"{form} {known}" if known else form
         if "%H" not in form and "%I" not in form:
             continue
@@ -407,6 +464,9 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
+    heading = understand(name, layout.units[index])
+    if "wind" in heading.quantity and (heading.sure or not names_time(name)):
+        return  # the s of m/s is none of seconds
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
@@ -430,8 +490,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         yield TimeChoice(
             columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
             doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely})",
-            fix='save the draft, complete format = "elapsed-s", "elapsed-ms" or "elapsed-us" '
-            f"({likely}), and name it: --recipe FILE.toml --start TIME",
+            fix=f"say what it counts, elapsed-s, elapsed-ms or elapsed-us ({likely}), and --start TIME",
         )  # fmt: skip
         return
     yield choice

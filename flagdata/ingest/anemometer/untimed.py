@@ -8,18 +8,20 @@ moves all that follows.
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import labelled
+from flagdata.ingest.anemometer import labelled, stated_columns
 from flagdata.ingest.anemometer.headings import interest
 from flagdata.ingest.anemometer.layout import Layout, cut, lay_out
+from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.serial_lines import split_stamp
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.source import TableText, TextFile
 from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.timebase import NANOSECONDS, iso
@@ -27,18 +29,24 @@ from flagdata.timebase import NANOSECONDS, iso
 _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
 _WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
 _TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
-
+_CLOCK_BEFORE = re.compile(
+    r"\s*[\[(<\"]?(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+(?P<rest>\S.*)$"
+)
+"""A time of day before a line."""
+_TABLES = frozenset({"delimited", "host-stamped"})
+"""Formats of tables, which have a way of their own."""
 
 ADVICE = "where nothing is a time, and the readings came at a steady rate that is known: "
-ADVICE += "--as delimited --wind COLUMN --unit m/s --start TIME --rate HZ"
+ADVICE += "add --start TIME --rate HZ"
 
 
-def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
+def timed(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
     """The file with a time in every row.
 
     Args:
         rate: readings a second.
         start: instant of the first reading [UTC ns].
+        columns: what the columns of a table are, by the user's word; where it names no time, no column is one.
 
     Raises:
         UsageError: no start, or rows that say when they were.
@@ -48,6 +56,11 @@ def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
         fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
         raise UsageError("a rate without a start", where=where, fix=fix)
     lines = source.head(HEAD_LINES)
+    if columns is not None:
+        _refuse_times(stated_columns.names_time(columns), where)
+        source = restate(source)
+        text, short = _table(source, rate, start, where, told=True)
+        return _counted(source, text, rate, start, short=short)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(any(_TIMED.search(line) for line in lines), where)
         text = list(_sentences(source, rate, start))
@@ -55,12 +68,76 @@ def timed(source: TextFile, *, rate: float, start: int | None) -> TextFile:
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
         stamped = list(_stamped(source, rate, start))
-        text = stamped if labelled.matches(stamped[:HEAD_LINES]) else _table(source, rate, start, where)
+        known = labelled.alike(stamped[:HEAD_LINES]) or _of_an_instrument(stamped[:HEAD_LINES])
+        if not known:
+            source = restate(source)
+            text, short = _table(source, rate, start, where)
+            return _counted(source, text, rate, start, short=short)
+        text = stamped
+    return _counted(source, text, rate, start)
+
+
+def _of_an_instrument(lines: Sequence[str]) -> bool:
+    """Whether stamped lines are those of an instrument whose format is known."""
+    from flagdata.ingest.anemometer.formats import FORMATS, Format  # the formats import modules that import this one
+
+    head = Head(lines=tuple(lines))
+    for name in FORMATS:
+        reader: Format = FORMATS[name]()
+        found = None if name in _TABLES else reader.recognise(head)
+        if found is not None and found.score >= SURE:
+            return True
+    return False
+
+
+def clocked(source: TextFile) -> bool:
+    """Whether the lines are those of an instrument, each after a time of day without a date, and say no other time."""
+    lines = [line for line in source.head(HEAD_LINES) if line.strip()]
+    timed = [match for line in lines if (match := _CLOCK_BEFORE.match(line)) is not None]
+    if not timed or 2 * len(timed) < len(lines) or any(_TIMED.search(match["rest"]) for match in timed):
+        return False
+    return _of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
+
+
+def dated(source: TextFile, date: dt.date) -> TextFile:
+    """The lines of an instrument, each after a time of day, with the date before it.
+
+    Args:
+        date: of the first line; the next day begins where the time of day falls by half a day.
+    """
+    text: list[str] = []
+    day, last = date, ""
+    for line in _all_lines(source):
+        match = _CLOCK_BEFORE.match(line)
+        if match is None:
+            text.append(line)
+            continue
+        clock = match["time"].replace(",", ".").rjust(8, "0")
+        if last and int(clock[:2]) + 12 < int(last[:2]):
+            day += dt.timedelta(days=1)
+        last = clock
+        text.append(f"{day.isoformat()}T{clock} {match['rest']}")
+    days = (day - date).days
+    what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
+    found = Finding(kind="date-given", severity=Severity.NOTE, what=what)
+    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, found))
+    return TableText(**{**vars(base), "text": tuple(text)})
+
+
+def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, *, short: int = 0) -> TextFile:
+    """The file with these lines, and the finding that says whose clock they are on.
+
+    Args:
+        short: lines that were left out, since they have fewer columns than the table.
+    """
     what = (
         f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
     )
-    found = Finding(kind="rate-given", severity=Severity.WARNING, what=what)
-    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, found))
+    found = [Finding(kind="rate-given", severity=Severity.WARNING, what=what)]
+    if short:
+        what = f"{short} lines have fewer columns than the table; left out, each counted as a reading"
+        found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=short, what=what))
+    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, *found))
     return TableText(**{**vars(base), "text": tuple(text)})
 
 
@@ -101,20 +178,28 @@ def _stamp(start: int, count: int, rate: float) -> str:
     return iso(start + round(count * NANOSECONDS / rate))
 
 
-def _table(source: TextFile, rate: float, start: int, where: str) -> list[str]:
-    """A table with a column of instants behind its own, whose numbers stay what they are."""
+def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool = False) -> tuple[list[str], int]:
+    """A table with a column of instants behind its own, whose numbers stay what they are; and lines too short for it.
+
+    Args:
+        told: whether the user says that no column is a time.
+    """
     lines = source.head(HEAD_LINES)
     layout = lay_out(lines, interest=interest)
     if layout is None:
-        return _single(source, rate, start, where)
-    _refuse_times(find_time(layout) is not None, where)
+        return _single(source, rate, start, where), 0
+    _refuse_times(not told and find_time(layout) is not None, where)
     first = layout.lines[0]
-    rows = (cut(line, layout.delimiter) for line in _lines_from(source, first))
     width = layout.number_of_columns()
-    cells = (
-        [*_points(row[:width], layout), _stamp(start, at, rate)] for at, row in enumerate(rows) if len(row) >= width
-    )
-    return _written(_names(layout.names, layout.units), cells)
+    kept: list[list[str]] = []
+    short = 0
+    for at, line in enumerate(_lines_from(source, first)):
+        row = cut(line, layout.delimiter)
+        if len(row) >= width:
+            kept.append([*_points(row[:width], layout), _stamp(start, at, rate)])
+        else:
+            short += 1
+    return _written(_names(layout.names, layout.units), kept), short
 
 
 def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
@@ -145,7 +230,7 @@ def _names(names: Sequence[str], units: Sequence[str]) -> list[str]:
     return [*(f"{name} [{unit}]" if unit else name for name, unit in zip(named, units, strict=True)), "time"]
 
 
-def _written(names: Sequence[str], rows: Iterator[list[str]]) -> list[str]:
+def _written(names: Sequence[str], rows: Iterable[list[str]]) -> list[str]:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(names)

@@ -13,7 +13,7 @@ import re
 
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.serial_lines import Defect, Instrument, Sample, guess, read_lines, turned
+from flagdata.ingest.anemometer.serial_lines import Defect, Instrument, Sample, guess, read_lines, split_stamp, turned
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.schema import SampleFlag
@@ -33,6 +33,7 @@ _MESSAGE = re.compile(
     r"[0-9A-Za-z](?P<kind>[Rr])[0-5](?P<fields>(?:,[A-Z][a-z]=-?\d+(?:\.\d+)?[A-Za-z#])+)(?P<crc>.{3})?"
 )
 _FIELD = re.compile(r",([A-Z][a-z])=(-?\d+(?:\.\d+)?)([A-Za-z#])")
+_NAMED = re.compile(r"^[A-Za-z]\w{0,15}[\s,;:]+(?=[0-9A-Za-z][Rr][0-5],[A-Z][a-z]=)")
 _BEGINS = re.compile(r"[0-9A-Za-z][Rr][0-5],[A-Z]")
 
 
@@ -45,7 +46,7 @@ class Vaisala:
 
     def recognise(self, head: Head) -> Guess | None:
         """Messages of an address, R and a number, then key=value pairs with units; some of wind."""
-        found = guess(head, self.name, "Vaisala messages with an average wind speed (Sm=)", parse)
+        found = guess(head, self.name, "Vaisala messages with an average wind speed (Sm=)", parse, split)
         if found is not None:
             return found
         # Wind may be one of several messages sent in turn.
@@ -62,10 +63,16 @@ class Vaisala:
         instrument = Instrument(
             name="a Vaisala transmitter", channels=CHANNELS, parse=parse,
             sensor=Sensor(name="Vaisala weather transmitter", resolution=0.1),
-            described_by="the WXT530 user guide",
+            described_by="the WXT530 user guide", split=split,
         )  # fmt: skip
         reading = read_lines(source, instrument, zone_name=options.zone)
         return turned(reading, options.azimuth, where=str(source.path))
+
+
+def split(line: str) -> tuple[str, str]:
+    """The stamp before a message, and the message without the name that a data system writes before it."""
+    stamp, raw = split_stamp(line)
+    return stamp, _NAMED.sub("", raw)
 
 
 def parse(raw: str) -> Sample | Defect:

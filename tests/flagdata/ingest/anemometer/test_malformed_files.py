@@ -92,7 +92,7 @@ REFUSED = [
     ),
     pytest.param({"content": b"<!doctype html><html><body>404</body></html>\n", "error": InputError}, id="html"),
     pytest.param({"content": b'[file]\ndelimiter = ","\n', "error": InputError}, id="toml"),
-    pytest.param({"content": b"1 2 3\n4 5 6\n", "error": InputError, "says": "recipe"}, id="numbers-without-header"),
+    pytest.param({"content": b"1 2 3\n4 5 6\n", "error": InputError, "says": "--columns"}, id="numbers-without-header"),
 ]
 
 

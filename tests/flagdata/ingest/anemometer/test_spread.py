@@ -109,3 +109,9 @@ def test_a_timer_of_16_ms_is_a_clock_read_less_often_than_the_sensor() -> None:
     log = ordered(np.arange(3000) // 3 * 16 * MS, smooth(3000), step=MS)
     assert np.diff(log.time) == pytest.approx(16 * MS / 3, abs=1)
     assert [f.kind for f in log.findings] == ["held-stamps"]
+
+
+def test_a_single_long_renewal_of_a_stamp_moves_no_row_to_its_end() -> None:
+    log = ordered(np.repeat([0, 13_800 * S], [5, 4]), smooth(9), step=60 * S)
+    assert (log.time[:5] - T0).max() < 60 * S
+    assert log.time[5] - T0 == 13_800 * S

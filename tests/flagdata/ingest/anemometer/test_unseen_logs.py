@@ -114,11 +114,42 @@ def test_a_code_for_no_direction_takes_no_pressure_with_it(read: Read) -> None:
     assert log.series.channels["air_pressure"].tolist() == pytest.approx([99_900.0] * 8)
 
 
-def test_days_are_refused_as_days(log_file: Write) -> None:
-    rows = "".join(f"2017-02-{at + 1:02d},{4 + at / 10:.1f}\n" for at in range(12))
-    error = refusal(log_file(f"date,wind_km/h\n{rows}"), WindOptions(zone="UTC"))
-    assert "without a time of day" in error.what
-    assert "with the times of its readings" in error.fix
+@pytest.mark.parametrize(
+    ("day", "first"),
+    [("2017-02-{:02d}", "2017-02-01"), ("201702{:02d}", "2017-02-01"), ("{:02d}-Feb-2017", "2017-02-01"),
+     ("{:02d}.02.2017", "2017-02-01")],
+)  # fmt: skip
+def test_days_are_read_as_days_with_a_warning(read: Read, day: str, first: str) -> None:
+    rows = "".join(f"{day.format(at + 1)},{4 + at / 10:.1f}\n" for at in range(20))
+    log = read(f"date,wind_km/h\n{rows}", zone="UTC")
+    assert instants(log)[0] == f"{first}T00:00:00"
+    assert np.diff(log.series.time).tolist() == [86_400 * _SECOND] * 19
+    assert [(f.severity.name, f.count) for f in log.findings if f.kind == "dates-alone"] == [("WARNING", 20)]
+
+
+def test_the_order_of_days_is_asked_for(log_file: Write) -> None:
+    rows = "".join(f"{at + 1:02d}/03/2017,{4 + at / 10:.1f}\n" for at in range(0, 12, 4))
+    assert "--date-order" in refusal(log_file(f"date,wind_km/h\n{rows}"), WindOptions(zone="UTC")).fix
+
+
+def test_a_count_that_starts_again_is_refused_where_it_does(log_file: Write) -> None:
+    rows = "".join(f"{at % 12 * 5},{4 + at / 10:.1f}\n" for at in range(30))
+    error = refusal(log_file(f"minutes,wind_km/h\n{rows}"), WindOptions(start=1_600_000_000 * _SECOND))
+    assert "2 times, first at line 14" in error.what
+    assert "--start" in error.fix
+
+
+def test_the_direction_comes_with_the_speed_that_is_named(read: Read) -> None:
+    rows = "".join(f"2026-05-01 10:{at:02d}:00,{4 + at / 10:.1f},{100 + at}\n" for at in range(12))
+    log = read(f"time,10 min avg,wind dir [deg]\n{rows}", zone="UTC", wind="10 min avg", unit="m/s")
+    assert degrees(log) == pytest.approx([100.0 + at for at in range(12)])
+
+
+def test_a_direction_from_an_unknown_north_is_left_out_in_words(read: Read) -> None:
+    rows = "".join(f"2026-05-01 10:{at:02d}:00,{4 + at / 10:.1f},{100 + at}\n" for at in range(12))
+    log = read(f"time,TWS [kn],TWD\n{rows}", zone="UTC")
+    assert "wind_direction" not in log.series.channels
+    assert any("'TWD' may be from true or magnetic north" in finding.what for finding in log.findings)
 
 
 def test_a_direction_without_a_speed_is_named_as_such(log_file: Write) -> None:
@@ -258,3 +289,20 @@ def test_messages_numbered_alike_are_not_repeats_unless_they_say_the_same(read: 
     log = read("\n".join(rows) + "\n", zone="UTC")
 
     assert len(log.series.time) == 30
+
+
+@pytest.mark.parametrize(
+    ("heading", "points"),
+    [
+        ("年,月,日,時,風速(m/s),風向", ("南南東", "南東", "東", "北東", "静穏", "西北西")),
+        ("年,月,日,时,风速(m/s),风向", ("南东南", "东南", "东", "东北", "静风", "西西北")),
+    ],
+)
+def test_tables_of_the_far_east_in_parts_and_points(read: Read, heading: str, points: tuple[str, ...]) -> None:
+    rows = "".join(f"2026,5,1,{12 + at},{3 + at / 10:.1f},{point}\n" for at, point in enumerate(points))
+    log = read(f"{heading}\n{rows}", zone="UTC")
+    assert ((log.series.time - log.series.time[0]) // (3600 * 10**9)).tolist() == [0, 1, 2, 3, 4, 5]
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([3 + at / 10 for at in range(6)])
+    degrees = np.degrees(log.series.channels["wind_direction"])
+    assert np.isnan(degrees[4])
+    assert degrees[[0, 1, 2, 3, 5]].tolist() == pytest.approx([157.5, 135.0, 90.0, 45.0, 292.5])
