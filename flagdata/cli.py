@@ -88,7 +88,7 @@ def root(context: click.Context, debug: bool) -> None:
 
 
 def _show_traceback() -> None:
-    """Of the error that ends the command, if one does."""
+    """Show the traceback of the error that ends the command, if one does."""
     if sys.exc_info()[0] not in (None, SystemExit, click.exceptions.Exit):
         traceback.print_exc()
 

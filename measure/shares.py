@@ -8,6 +8,20 @@ from dataclasses import dataclass
 from scipy.stats import beta
 
 
+def clopper_pearson(hits: float, count: int, *, level: float) -> tuple[float, float]:
+    """The interval of a share, each side (1 − level)/2: Clopper and Pearson, Biometrika 26:404 (1934). 0 to 1
+    of no cases.
+
+    Args:
+        hits, count: in so many of so many; a sum of shares may stand for the hits.
+        level: of the interval, between 0 and 1.
+    """
+    tail = (1 - level) / 2
+    low = float(beta.ppf(tail, hits, count - hits + 1)) if hits > 0 else 0.0
+    high = float(beta.ppf(1 - tail, hits + 1, count - hits)) if hits < count else 1.0
+    return low, high
+
+
 @dataclass(frozen=True, kw_only=True)
 class Share:
     """How often something happened.
@@ -30,11 +44,10 @@ class Share:
 
     @classmethod
     def of(cls, happened: Iterable[bool], *, level: float = 0.9) -> Share:
-        """From cases. The interval is that of Clopper and Pearson, Biometrika 26:404 (1934); 0 to 1 of no cases."""
+        """From cases."""
         cases = [bool(case) for case in happened]
-        hits, count, tail = sum(cases), len(cases), (1 - level) / 2
-        low = float(beta.ppf(tail, hits, count - hits + 1)) if hits else 0.0
-        high = float(beta.ppf(1 - tail, hits + 1, count - hits)) if hits < count else 1.0
+        hits, count = sum(cases), len(cases)
+        low, high = clopper_pearson(hits, count, level=level)
         return cls(hits=hits, count=count, low=low, high=high, level=level)
 
     def as_dict(self) -> dict[str, float | int | None]:

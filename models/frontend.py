@@ -90,7 +90,7 @@ class FrontEnd:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of what is given for one clip."""
+        """Shape of what is given for one clip."""
         if self.maps == "frames":
             return (1, self.frames, self.size, self.size)
         if self.maps == "spectral-maps":

@@ -24,7 +24,7 @@ from torch import Tensor
 from flagdata.errors import InputError, UnknownNameError
 
 _MARGIN = 0.005
-"""Of the range, added at each end."""
+"""Share of the range that is added at each end."""
 
 
 class Cloth(StrEnum):

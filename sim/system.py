@@ -137,7 +137,7 @@ class Drive:
         return replace(self, wind=both(self.wind), targets=both(self.targets), offset=both(self.offset))
 
     def select(self, members: slice) -> Drive:
-        """Of some members."""
+        """The same for some members only."""
 
         def own(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
             return pair[0][..., members], pair[1][..., members]

@@ -12,7 +12,7 @@ from flagdata.console import document, json_option, lake_option, progress
 @click.command("declare-cloths")
 @click.argument("table", type=click.Path(path_type=Path))
 @click.option("--crop", default="square", show_default=True, metavar="BOX",
-              help="Of all films: x,y,width,height in px of the upright image; whole, square, or auto.")  # fmt: skip
+              help="Region of all films: x,y,width,height [px] of upright images; whole, square, or auto.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch to commit on.")
 @json_option
 @lake_option

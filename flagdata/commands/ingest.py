@@ -67,23 +67,21 @@ from flagdata.errors import UsageError
 @click.option(
     "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
 )
-@click.option(
-    "--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: of dates written with numbers only."
-)
+@click.option("--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: order in dates of numbers only.")
 @click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
-@click.option("--talker", metavar="ID", help="Wind: of NMEA 0183, where several instruments share a stream.")
+@click.option("--talker", metavar="ID", help="Wind: NMEA 0183 talker to read, where several share a stream.")
 @click.option(
-    "--azimuth", type=float, metavar="DEG", help="Wind: of the sensor's north or bow, clockwise from true north."
+    "--azimuth", type=float, metavar="DEG", help="Wind: bearing of the sensor's north or bow, clockwise from north."
 )
 @click.option(
     "--clock", type=click.Choice(["first", "last"]),
     help="Wind: where the log's clock was set back or on, whose stamps are right: those before it, or those after.",
 )  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
-@click.option("--encoding", metavar="CODEC", help="Wind: of the text, where it cannot be told.")
+@click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where it cannot be told.")
 @click.option(
     "--unit", metavar="UNIT",
-    help="Wind: of a speed whose heading states none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
+    help="Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
 )  # fmt: skip
 @click.option(
     "--wind", metavar="LABEL",

@@ -21,7 +21,7 @@ WIND_ONLY = (
     "columns",
 )  # fmt: skip
 LENGTHS = ("unit",)
-"""Of meshes and markers, and of the wind's speed."""
+"""Options that meshes and markers share with the wind's speed."""
 FOREIGN = {
     "camera": ("a camera file", (*WIND_ONLY, *LENGTHS)),
     "anemometer": ("an anemometer log", CAMERA_ONLY),

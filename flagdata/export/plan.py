@@ -36,7 +36,7 @@ class Exporter(Protocol):
 
     @property
     def kinds(self) -> frozenset[Kind]:
-        """Of rows it can write, with these options."""
+        """The kinds of rows that it can write with these options."""
         ...
 
     def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:

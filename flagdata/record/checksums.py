@@ -96,7 +96,7 @@ def _channel(entry: Mapping[str, Any]) -> ChannelChecksums:
 
 
 def metadata_checksum(values: Mapping[str, str]) -> int:
-    """Of the content of a metadata record."""
+    """The checksum of the content of a metadata record."""
     return zlib.crc32(json.dumps(values, sort_keys=True, ensure_ascii=True).encode())
 
 

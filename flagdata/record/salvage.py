@@ -141,7 +141,7 @@ class _Copy:
         self._channels[channel.id] = (channel, written)
 
     def schema_name(self, channel_id: int) -> str | None:
-        """Of a known channel; `None` for a channel that is not known."""
+        """The name of a channel's schema; `None` for a channel that is not known."""
         if channel_id not in self._channels:
             return None
         schema = self._schemas.get(self._channels[channel_id][0].schema_id)

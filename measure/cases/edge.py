@@ -29,7 +29,7 @@ _SPAN = 15
 """Columns of the parabola in `scatter`: 2 mm at 0.138 mm a pixel, over which a sheet of 75 µm paper is smooth."""
 
 _STRIDE = 4
-"""Of the rows whose median is the ground of a column: a line covers few of them."""
+"""Each so many-th row counts for the median that is the ground of a column: a line covers few of them."""
 
 
 class Seen(IntEnum):
@@ -100,7 +100,7 @@ class EdgeTrack:
         return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
 
     def share(self, what: Seen) -> float:
-        """Of all frames and columns of the picture."""
+        """The share that was seen so, of all frames and columns of the picture."""
         return float((self.seen == what).mean())
 
 

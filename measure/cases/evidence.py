@@ -33,9 +33,9 @@ class Kind(StrEnum):
     """What was measured."""
 
     FREQUENCY = "frequency"
-    """Of the flutter at a tunnel speed [Hz]."""
+    """Frequency of the flutter at a tunnel speed [Hz]."""
     WAVE = "wave speed"
-    """Of the travelling wave at a tunnel speed [m/s]."""
+    """Speed of the travelling wave at a tunnel speed [m/s]."""
     AMPLITUDE = "amplitude"
     """Largest first harmonic of the deflection, over the length, at a tunnel speed."""
     STOP = "stop speed"

@@ -25,7 +25,7 @@ from measure.cases.waves import Estimate, Waves, waves
 
 _DRAWN = 16
 _EVERY = 8
-"""Of the columns, which `waves` is given: 1.1 mm, far below a wave's length."""
+"""`waves` is given each so many-th column: 1.1 mm, far below a wave's length."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +77,7 @@ class Observations:
     thresholds: Thresholds
 
     def conditions(self, case: Case, group: Group, kinds: Sequence[Kind]) -> tuple[Condition, ...]:
-        """Of a group, of these kinds; wave speeds and amplitudes only of clips with the whole sheet."""
+        """The conditions of a group, of these kinds; wave speeds and amplitudes only of clips with the whole sheet."""
         found = []
         for clip in self.clips:
             if clip.spec.group is group:

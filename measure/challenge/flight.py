@@ -169,7 +169,7 @@ def _frames(recipe: ChallengeRecipe, key: Key) -> int:
 
 
 def _winds(recipe: ChallengeRecipe, seed: int, key: Key) -> tuple[Floats, ...]:
-    """Of each recording (sample, 3) [m/s], from the start of the run."""
+    """The wind of each recording (sample, 3) [m/s], from the start of the run."""
     direction = np.array([math.cos(key.toward), math.sin(key.toward), 0.0])
     if not key.intensity:
         return tuple(speed * direction[None] for speed in key.speeds)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, InputError, NotFoundError, UnknownNameError
+from flagdata.files import write_text
 from flagdata.provenance import canonical, digest, file_hash
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
@@ -33,7 +34,7 @@ _EPOCH = 1_600_000_000  # of every file of a set: when it was written would tell
 MODEL_COLUMNS, MODEL_ROWS = 15, 10
 """Cells of the participant's mesh: 176 vertices."""
 HEIGHT = 2.0
-"""Of a flag's lower corner [m]."""
+"""Height of a flag's lower corner [m]."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class ChallengeFolder:
         return json.loads(self.public.read_text(encoding="utf-8"))
 
     def names(self) -> list[str]:
-        """Of the sets, sorted."""
+        """Names of the sets, sorted."""
         return sorted(self.manifest()["sets"])
 
     def chosen(self, only: tuple[str, ...]) -> list[str]:
@@ -144,11 +145,8 @@ def data_hash(folder: Path) -> str:
 
 def write_json(path: Path, content: Mapping[str, Any]) -> str:
     """Write canonical JSON so that a reader sees all of it or nothing; its SHA-256."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     text = canonical(content) + "\n"
-    partial = path.with_suffix(path.suffix + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
+    write_text(path, text)
     return digest(text)
 
 

@@ -6,11 +6,13 @@ A row is made of the sheet's JSON document, so that it can be made again of any 
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError, CorruptError
+from flagdata.files import write_text
 
 KEYS = ("challenge", "title", "code_version", "criteria", "sets")
 """Columns before the shares: the folder's name, its title, the grader's code, hashes of the verdicts' criteria divided
@@ -59,13 +61,11 @@ def without(path: Path, name: str) -> list[dict[str, str]]:
 def write(path: Path, entries: list[dict[str, str]]) -> None:
     """All rows, in one step; a share that a row does not have stays empty."""
     columns = dict.fromkeys([*KEYS, *(column for entry in entries for column in entry)])
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(path.suffix + ".part")
-    with partial.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, list(columns), restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(entries)
-    partial.replace(path)
+    stream = io.StringIO(newline="")
+    writer = csv.DictWriter(stream, list(columns), restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(entries)
+    write_text(path, stream.getvalue())
 
 
 def _told(share: Mapping[str, Any]) -> str:

@@ -19,7 +19,7 @@ FIELD = "corrective-field"
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Of one set.
+    """What became of one set.
 
     Attributes:
         key: what was true.
@@ -105,7 +105,7 @@ class Outcome:
 
     @property
     def claims(self) -> tuple[bool, ...]:
-        """Of each claim that an effect of some class acts, whether one does. "One of" is a single claim."""
+        """For each claim that an effect of some class acts, whether one does. "One of" is a single claim."""
         named = dict.fromkeys(class_of(name) for name in self.named)
         if self.conclusion is Conclusion.ONE_OF:
             return (any(name in self.true_classes for name in named),) if named else ()

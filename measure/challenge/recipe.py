@@ -50,7 +50,7 @@ class Diagonals(StrEnum):
 
 
 class Method(StrEnum):
-    """Of integration."""
+    """How steps are integrated."""
 
     SYMPLECTIC = "symplectic"
     IMPLICIT = "implicit"
@@ -79,7 +79,7 @@ class Numerics:
 
 @dataclass(frozen=True, kw_only=True)
 class Strengths:
-    """Of one effect.
+    """Strengths at which one effect is set.
 
     Attributes:
         parameter: which strength is drawn; everything else stays at its usual value.

@@ -111,6 +111,6 @@ class Barrier(MetaPathFinder):
 
 
 def _prepare() -> None:
-    """Of a worker: nothing of the generator within reach."""
+    """Prepare a worker: nothing of the generator is within its reach."""
     single_threaded()
     sys.meta_path.insert(0, Barrier())

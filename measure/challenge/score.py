@@ -81,7 +81,7 @@ class Coefficients:
 
 @dataclass(frozen=True, kw_only=True)
 class HalfStrength:
-    """Of an effect, in its own unit, with 90 % bounds."""
+    """The half-detection strength of an effect, in its own unit, with 90 % bounds."""
 
     value: float
     low: float
@@ -115,7 +115,7 @@ class Sheet:
 
     @property
     def strong(self) -> list[Outcome]:
-        """Of sets of one effect, at twice its class's half-detection strength or more."""
+        """Outcomes of sets of one effect, at twice its class's half-detection strength or more."""
         power = self.power
         if power is None:
             return []
@@ -123,8 +123,8 @@ class Sheet:
 
     @property
     def strong_outside(self) -> list[Outcome]:
-        """Of sets with an effect from outside the library, at twice the half-detection strength of a class of effects
-        that was not seen, or more."""
+        """Outcomes of sets with an effect from outside the library, at twice the half-detection strength of a class of
+        effects that was not seen, or more."""
         power = self.power
         if power is None:
             return []

@@ -82,7 +82,7 @@ class Transcript:
     show_default=True,
     help="Folder for the pages and the data; one that an earlier demonstration made is replaced.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Of all that is random.")
+@click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Seed of all that is random.")
 @click.option(
     "--minutes", type=click.FloatRange(2, 120), default=10.0, show_default=True, help="Length of the video it makes."
 )

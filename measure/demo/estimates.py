@@ -24,7 +24,7 @@ from models import estimator
 STEP = 6.0
 """From one window to the next [s]."""
 SIZE = FlagSize(length=1.5, height=1.0)
-"""Of the flag that was drawn, as if it were one that the model knows."""
+"""Size of the flag that was drawn, as if it were one that the model knows."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

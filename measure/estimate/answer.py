@@ -14,8 +14,8 @@ from flagdata.errors import InputError
 from models.targets import TARGETS
 
 LEAST_INFORMATION = 0.05
-"""Of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments [nat]. Below it the film told
-nothing: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
+"""Information of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments [nat]. Below it the film
+told nothing: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
 SHORT = {"wind_speed": "wind", "density": "area weight", "bending_scale": "bending", "anisotropy": "anisotropy"}
 """Names in the one-line answer."""
 HEADLINE = ("wind_speed", "density")

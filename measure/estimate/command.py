@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 @click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran.")
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Rate of a folder of images.")
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
-              help="Of the intervals.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of all draws.")
+              help="Level of the intervals.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
 @click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default wave, of flags.")
 @click.option("--refine", type=click.IntRange(min=28), metavar="N",
               help="Refine the first window by N simulated clips, 28 or more; 50 take minutes.")  # fmt: skip
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 @click.option(
     "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
 )
-@click.option("--branch", default="main", show_default=True, help="Of the lake, to commit on.")
+@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
 @click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
 @json_option
 def measure(

@@ -59,7 +59,7 @@ class Errors:
     last: NDArray[np.float64]
 
     def correlation(self, name: str, *, seed: int = 0) -> tuple[float, float]:
-        """Of one target: the correlation, and the upper end of its one-sided 90 % interval by resampling films."""
+        """The correlation of one target, and the upper end of its one-sided 90 % interval by resampling films."""
         column = self.names.index(name)
         a, b = self.first[:, column], self.last[:, column]
         generator = stream(seed, "window-correlation", name)
@@ -169,20 +169,18 @@ def of_model(model: Estimator) -> Dependence:
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
               help="Where the films are.")  # fmt: skip
 @click.option("--at", help="Version of the lake.")
-@click.option("--side", default="validation", show_default=True, help="Of the data set; it must not be trained on.")
+@click.option("--side", default="validation", show_default=True, help="Side of the data; it must not be trained on.")
 @click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, lake_path: Path, at: str | None, side: str, out: Path) -> None:
     """Measure how alike two windows of one film are to the shipped model NAME, and write it into its card."""
     import flagdata
-    from flagdata.dataset import ExplicitSplit
     from models.estimator import load
     from models.training.recipe import DataSpec
 
     model = load(out / name)
     recipe: Any = model.card["recipe"]
     spec = DataSpec.of_identity(recipe["data"])
-    split = ExplicitSplit(where={part: spec.where(part) for part in {"train", side}})
-    pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=split)
+    pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=spec.split("train", side))
     with progress(len(set(pairs.table.seed.tolist())), label="windows", unit="film") as advance:
         entry = card_entry(errors(model, pairs, advance=advance))
     card = {key: value for key, value in read_card(out / name).items() if key != "format"}

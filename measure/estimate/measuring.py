@@ -25,7 +25,7 @@ from models.learner import Loss
 from models.restriction import MORE, Known, restricted
 
 DRAWS = 400
-"""Of each window's posterior, for each size of flag."""
+"""How many draws there are of each window's posterior, for each size of flag."""
 CONTRADICTION = 0.002
 """Share of the model's draws within the area weight that was stated, below which a warning is due: of 400 not one."""
 

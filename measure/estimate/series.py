@@ -70,7 +70,7 @@ class Agreement:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum:
-    """Of both series, over the longest run without gaps.
+    """Spectra of both series, over the longest run without gaps.
 
     Attributes:
         frequency: (f,) [Hz].
@@ -189,7 +189,7 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
 
 
 def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> Agreement | None:
-    """Of the windows that the reference covers; None where there is none."""
+    """How the windows that the reference covers agree with it; None where there is none."""
     known = np.isfinite(reference)
     count = int(known.sum())
     if not count:

@@ -147,7 +147,7 @@ class SizePrior:
 STRATA = 3
 """Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each."""
 LEAST_SHARE = 0.5
-"""Of the prior that the frame rate must admit."""
+"""Share of the prior that the frame rate must admit."""
 RATE_SLACK = 0.95
 """A film may be this much slower than the model's frames: one frame in twenty is then shown twice. It admits films of
 24 frames a second for a model of 25."""

@@ -18,7 +18,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 
 _REACH = 0.75
-"""Of a native period: half, and half of that for uneven stamps. A missing frame is a whole period away."""
+"""Share of a native period: half, and half of that for uneven stamps. A missing frame is a whole period away."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class Layout:
         return int(np.floor((self.last - self.first - self.length + self.tolerance) / self.step + 1e-9)) + 1
 
     def start(self, index: int) -> float:
-        """Of window `index` [s from the film's first frame]."""
+        """Start of window `index` [s from the film's first frame]."""
         return self.first + index * self.step
 
 

@@ -327,7 +327,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
 
 
 def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
-    """Of an effect, of its coefficient beyond null and the standard error by what nulls leave."""
+    """The strength of an effect, by its coefficient beyond null and the standard error that nulls leave."""
     return estimate(null + coefficient, math.hypot(error, CRITERIA.response * coefficient), unit)
 
 

@@ -59,7 +59,7 @@ def columns() -> tuple[Column, ...]:
 
 
 def names() -> tuple[str, ...]:
-    """Of all columns of the statistics, the calibrated parameters first."""
+    """Names of all columns of the statistics, the calibrated parameters first."""
     return (*(name for name, _, _ in THETA), *(column.name for column in columns()))
 
 

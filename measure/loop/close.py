@@ -154,7 +154,7 @@ class Solved:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """Of the base model."""
+        """The evidence against the base model."""
         return self.fits.whitened.evidence(self.fits.whitened.found)
 
     @property
@@ -176,7 +176,7 @@ class Solved:
         return named if self.judgement.conclusion is Conclusion.EFFECT else named[:1]
 
     def strength(self, weighed: Weighed, larger: Refined) -> Estimate:
-        """Of an acting effect beyond the linear: its error is as much larger than Σ says as where it is linear."""
+        """The strength of an acting effect beyond the linear: its error exceeds what Σ says as where it is linear."""
         place = self.acting.index(weighed.column)
         column, coefficient = larger.model.effects[place]
         linear = self.evidence.fit([weighed.column]).of(weighed.column)[1]
@@ -335,7 +335,7 @@ def _proposal(solved: Solved) -> str:
 
 
 def _unseen(setting: Setting, refined: Refined) -> Predictions:
-    """Of all segments, each by the model fitted to the other recordings; of a single recording by that fitted to it."""
+    """Predictions of all segments by the model fitted to the other recordings; of a single recording by its own."""
     if len(setting.speeds) < 2:
         return predict(setting.forecaster, setting.segments, refined.model)
     parts: list[Predictions] = []

@@ -241,7 +241,7 @@ def _said(options: Options, *, level: float | None, nulls: int | None) -> Option
 
 
 def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:
-    """Of the first source that is a file, of the recipe, or of the first recording."""
+    """The name of the first source that is a file, of the recipe, or of the first recording."""
     if sources and Path(sources[0]).exists():
         return Path(sources[0]).resolve().stem
     return recording if recipe is None or sources else recipe.title

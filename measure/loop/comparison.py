@@ -70,7 +70,7 @@ def _strata(values: Floats, recording: NDArray[np.int64]) -> list[Floats]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Predictions:
-    """Of segments, by one model: errors and predicted markers (frame, marker, 3, segment) [m]."""
+    """What one model says of segments: errors and predicted markers (frame, marker, 3, segment) [m]."""
 
     errors: Floats
     predicted: Floats
@@ -129,7 +129,7 @@ def left_out(
     whitened: WhitenedMisfit,
     outsides: Sequence[NDArray[np.bool_]],
 ) -> list[LeftOut]:
-    """Of a model, each time fitted to the other segments alone."""
+    """What a model leaves, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
     ended = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
     models = [model for model, _ in ended]
@@ -144,7 +144,7 @@ def measured(
     outsides: Sequence[NDArray[np.bool_]],
     chosen: Sequence[int] = (),
 ) -> list[LeftOut]:
-    """Of models as they are; what each leaves along the nuisances and chosen columns is fitted to the other
+    """What models leave as they are; what each leaves along the nuisances and chosen columns is fitted to the other
     segments."""
     every = errors_of(models, forecaster, segments)
     return [
@@ -212,7 +212,7 @@ def root(squared: Floats) -> Estimate:
 
 
 def paired(before: Floats, after: Floats) -> Estimate:
-    """Of roots of means, paired by segment: linear in the squares, whose difference Student's interval is of."""
+    """Difference of roots of means, paired by segment: linear in the squares, for which Student's interval holds."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
     return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)

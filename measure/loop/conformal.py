@@ -21,7 +21,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+
+from measure.shares import clopper_pearson
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def kinds_needed(level: float) -> int:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GroupedConformal:
-    """Of a statistic that is large where something is missing.
+    """How rare values of a statistic are that is large where something is missing.
 
     Attributes:
         null: (group,) the statistic of groups of nulls.
@@ -58,7 +59,7 @@ class GroupedConformal:
         return self.count >= kinds_needed(level)
 
     def p(self, value: float) -> float:
-        """Of a statistic, the data themselves counted as a kind that is as far."""
+        """p of a statistic, the data themselves counted as a kind that is as far."""
         return (1 + self._as_far(value)) / (1 + self.count)
 
     def critical(self, level: float) -> float | None:
@@ -68,12 +69,9 @@ class GroupedConformal:
         return max(float(value) for value in np.unique(self.null) if self.p(float(value)) > level)
 
     def interval(self, value: float, *, level: float) -> tuple[float, float]:
-        """Of the share of all kinds, simulated or not, that are at least as far: by how many kinds happen to be among
-        the nulls (Clopper and Pearson, Biometrika 26:404, 1934, with sums of shares in place of counts)."""
-        found = self._as_far(value)
-        low = 0.0 if found <= 0 else float(beta.ppf((1 - level) / 2, found, self.count - found + 1))
-        high = 1.0 if found >= self.count else float(beta.ppf((1 + level) / 2, found + 1, self.count - found))
-        return low, high
+        """Interval of the share of all kinds, simulated or not, that are at least as far, by how many kinds happen to
+        be among the nulls (Clopper and Pearson's interval, with sums of shares in place of counts)."""
+        return clopper_pearson(self._as_far(value), self.count, level=level)
 
     def quantile(self, share: float) -> float:
         """The value that one more kind does not exceed with a chance of `share` or more; infinite where there are too

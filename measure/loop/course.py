@@ -35,7 +35,7 @@ _WINDOW = 0.2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """Of segments.
+    """The wind's course in segments.
 
     Attributes:
         score: (segment, window, part) g, of errors over their scale; parts are along the wind, to its left, upward.
@@ -49,7 +49,7 @@ class Course:
     log: Floats | None = None
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Course:
-        """Of some segments."""
+        """The same for some segments only."""
         log = None if self.log is None else self.log[chosen]
         return Course(score=self.score[chosen], curvature=self.curvature[chosen], log=log)
 
@@ -179,7 +179,7 @@ class Gauge:
         return cls(moved=moved.permute(4, 0, 1, 2, 3).flatten(3), window=window)
 
     def course(self, errors: Tensor) -> Course:
-        """Of errors (segment, frame, marker · 3) over their scale."""
+        """The course by errors (segment, frame, marker · 3) over their scale."""
         score = torch.einsum("spfk,sfk->sfp", self.moved, errors.to(self.moved))
         curvature = torch.einsum("spfk,sqfk->sfpq", self.moved, self.moved)
         return Course(score=self._windows(score), curvature=self._windows(curvature))
@@ -192,5 +192,5 @@ class Gauge:
 
     @classmethod
     def joined(cls, parts: Sequence[Gauge]) -> Gauge:
-        """Of the segments of some, one after another."""
+        """The segments of several, one after another."""
         return cls(moved=torch.cat([p.moved for p in parts]), window=parts[0].window)

@@ -71,8 +71,8 @@ class Cut:
 
     @classmethod
     def of(cls, rate: float, frames: int) -> Cut:
-        """Of recordings of so many frames, or more: frames about a horizon apart, segments of 2 s, or half of what
-        there is.
+        """How recordings of so many frames or more are cut: frames about a horizon apart, segments of 2 s, or half of
+        what there is.
 
         Args:
             rate: [Hz].
@@ -240,7 +240,7 @@ class Segments:
 
     @property
     def duration(self) -> float:
-        """Of what counts of a segment [s]."""
+        """Duration of what counts of a segment [s]."""
         return self.cut.length * self.period
 
     def __len__(self) -> int:
@@ -325,7 +325,7 @@ class Forecaster:
         return replace(system, wind=wind, motion=self._motion(segments)), state
 
     def _motion(self, segments: Segments) -> AnchorTracks | None:
-        """Of the attachments of every segment, from where they are in its first frame; None where they stand still."""
+        """Motion of every segment's attachments, from their places in its first frame; None where they stand still."""
         tracks = [item.attachments for item in segments.items if item.attachments is not None]
         if not tracks:
             return None

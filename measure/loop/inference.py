@@ -29,7 +29,7 @@ Chosen = Sequence[int]
 
 _HERE = (0.0,) * len(THETA)
 _SHIFTS = 16
-"""Of 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
+"""Number of shifts. In 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +163,7 @@ class Nulls:
 
     @property
     def design(self) -> Design:
-        """Of the first segment: that of all, where they are of one experiment."""
+        """The design of the first segment: that of all, where they are of one experiment."""
         damping = Calibration().moved((0.0, 0.0, float(self.calibration[0, _DAMPING]))).damping
         return Design(
             noise=float(self.noise[0]), period=float(self.period[0]), cloth=str(self.cloth[0]), damping=damping
@@ -281,7 +281,7 @@ class Evidence:
 
     @classmethod
     def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
-        """Of segments with their wind's speed (segment,) [m/s].
+        """The evidence of segments with their wind's speed (segment,) [m/s].
 
         Args:
             beside: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
@@ -323,7 +323,7 @@ class Evidence:
         return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Evidence:
-        """Of some segments; indices may repeat."""
+        """The same for some segments only; indices may repeat."""
         return Evidence(
             recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
             energy=self.energy[chosen], columns=self.columns, lines=None if self.lines is None else self.lines[chosen],

@@ -27,7 +27,7 @@ SHAPES = tuple((i, 0) for i in range(5))
 STROUHAL = 0.2
 """f D/U of a circular cylinder from Re 300 to 2e5 (Roshko 1954)."""
 _POINTS = 128
-"""Of a transform: finer than what segments of 50 frames resolve."""
+"""Points of a transform: finer than what segments of 50 frames resolve."""
 _NEAR = 2.0
 """Hz to either side that a line is compared with; a segment of 2 s resolves 1 Hz (Hann's window)."""
 _EDGE = 0.5
@@ -72,7 +72,7 @@ class Spectrum:
 
     @property
     def _frequency(self) -> Floats:
-        """Of the transforms [Hz]."""
+        """Frequencies of the transforms [Hz]."""
         return np.asarray(np.fft.rfftfreq(_POINTS, self.period), dtype=np.float64)
 
     def _with_the_wind(self, values: Floats) -> Floats:
@@ -120,7 +120,7 @@ class Lines:
 
     @classmethod
     def of(cls, groups: Floats) -> Lines:
-        """Of null groups (group, shape · axis): see `strongest`."""
+        """The lines of null groups (group, shape · axis): see `strongest`."""
         return cls(mean=groups.mean(axis=0), deviation=np.maximum(groups.std(axis=0), 1e-6))
 
     def standing_out(self, groups: Floats) -> Floats:
@@ -128,7 +128,7 @@ class Lines:
         return ((groups - self.mean) / self.deviation).max(axis=1)
 
     def line(self, prominence: Floats, *, centre: float, width: float) -> Line:
-        """Of some segments (segment, reduced frequency, shape · axis).
+        """The line in some segments (segment, reduced frequency, shape · axis).
 
         Args:
             centre, width: mean and standard deviation of nulls' `standing_out`.

@@ -24,7 +24,7 @@ from measure.observe.trajectory import Floats, Specimen
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PoleMoment:
-    """Of some segments.
+    """Moments about the pole of some segments.
 
     Attributes:
         arms: (frame, marker, 2, segment) w (−y, x)/T² [m³/s²] of what is seen.
@@ -55,7 +55,7 @@ class PoleMoment:
 
     @classmethod
     def joined(cls, parts: list[PoleMoment]) -> PoleMoment:
-        """Of the segments of some, one after another."""
+        """The segments of several, one after another."""
         return cls(arms=torch.cat([p.arms for p in parts], dim=-1), scale=torch.cat([p.scale for p in parts]))
 
 

@@ -121,7 +121,7 @@ def _scene(specimen: Specimen) -> dict[str, Any]:
 
 
 def _flag(specimen: Specimen) -> dict[str, Any] | None:
-    """Of a plain flag; None for any other cloth."""
+    """The scene of a plain flag; None for any other cloth."""
     rest = specimen.mesh.rest - specimen.mesh.rest.min(axis=0)
     width, height = (float(side) for side in rest.max(axis=0))
     columns = len(np.unique(rest[:, 0])) - 1

@@ -146,7 +146,7 @@ class _Groups:
     damping: list[float] = field(default_factory=list)
 
     def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int, nominal: Floats) -> None:
-        """Of a group whose statistics are at its true calibration, the nominal one so many steps away."""
+        """Add a group whose statistics are at its true calibration, the nominal one so many steps away."""
         self.shares.append(unscaled(evidence, columns))
         self.left.append(evidence.fit(()).left)
         self.gained.append(best_gain(evidence))
@@ -322,7 +322,7 @@ class Reference:
 
     @cached_property
     def conformal(self) -> GroupedConformal:
-        """Of how far the farthest is, of all columns, what is left and the line: the global test's."""
+        """The global test: how far the farthest is of all columns, what is left and the line."""
         return GroupedConformal(null=self.far.max(axis=1), kinds=self.kinds)
 
     @cached_property
@@ -351,7 +351,7 @@ class Reference:
         return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
 
     def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
-        """Of the global test on what some columns leave, fitted to the data."""
+        """p of the global test on what some columns leave, fitted to the data."""
         return self.conformal.p(self.farthest(evidence, columns, chosen))
 
     def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
@@ -392,7 +392,7 @@ class Reference:
         return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
 
     def _far(self, values: Floats | float, columns: int | slice) -> Floats:
-        """Of shares, what is left, or the best gain, as `far` has it."""
+        """How far shares, what is left or the best gain lie, as `far` has it."""
         return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
 
 
@@ -401,7 +401,7 @@ _NOTHING = 1e-6
 
 
 def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
-    """Of some segments: each column's drop over what is left with it, and the likelihood ratio of gusts; where moments
+    """Each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where moments
     about the pole are looked at, then the same drops of these, and what they leave.
 
     Args:

@@ -188,7 +188,7 @@ def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:
 def _step(
     found: Statistics, null: NullModel, speeds: Floats, model: Model, anchor: Calibration
 ) -> tuple[Floats, Floats]:
-    """Of generalised least squares from here, under the prior about a calibration; with standard errors."""
+    """One step of generalised least squares from here, under the prior about a calibration; with standard errors."""
     count = found.r.shape[1]
     chosen = range(len(THETA), count)
     fit = Evidence.of(found, speeds, null).fit(chosen, centre=anchor.steps_from(model.calibration))

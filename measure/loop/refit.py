@@ -51,7 +51,7 @@ class Fits:
         return self._made[key]
 
     def left_out(self, fitted: Refined, outsides: Sequence[NDArray[np.bool_]]) -> list[LeftOut]:
-        """Of one of these models, each time fitted to the other segments alone."""
+        """What one of these models leaves, each time fitted to the other segments alone."""
         keys = [(fitted.chosen, outside.tobytes()) for outside in outsides]
         new = [place for place, key in enumerate(keys) if key not in self._left]
         if new:

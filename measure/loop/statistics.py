@@ -48,7 +48,7 @@ as for a point that moves evenly."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Statistics:
-    """Of segments.
+    """Sums over the frames and markers of segments.
 
     Attributes:
         recording: (segment,) index of each one's recording.
@@ -86,7 +86,7 @@ class Statistics:
         return self.lines
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Statistics:
-        """Of some segments."""
+        """The same for some segments only."""
         return Statistics(
             recording=self.recording[chosen], r=self.r[chosen], response=self.response[chosen],
             error=self.error[chosen], marker_error=self.marker_error[chosen],
@@ -171,7 +171,7 @@ class Projection:
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def course(self, errors: Tensor) -> Course | None:
-        """Of the wind, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
+        """The wind's course, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
         return None if self.gauge is None else self.gauge.course(_over_scale(errors, self.scale))
 
     def lines(self, errors: Tensor) -> Floats | None:
@@ -296,7 +296,7 @@ def _plain(changes: Tensor, scale: Tensor) -> Tensor:
 def _turned(
     pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
 ) -> Statistics:
-    """Of moments of errors and sensitivities (frame, marker, 3, segment)."""
+    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment)."""
     moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
     moved, directions = _moments(pole_moment, changes)
     size = ((moment * pole_moment.scale) ** 2).mean(0).cpu().numpy()
@@ -368,7 +368,7 @@ def reduced(
     noise: Floats,
     counted: NDArray[np.bool_] | None = None,
 ) -> Statistics:
-    """Of segments with their errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m].
+    """Statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m].
 
     Args:
         counted: (frame, marker, segment) whether each position was tracked; None where all were.

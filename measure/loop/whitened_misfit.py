@@ -35,7 +35,7 @@ class WhitenedMisfit:
     origin: Calibration = field(default_factory=Calibration)
 
     def of(self, errors: Tensor) -> Evidence:
-        """Of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
+        """The evidence of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
         lines, turned = self.projection.lines(errors), self.projection.turned(errors)
         known = self.found.turning
         turning = None if known is None or turned is None else replace(known, r=turned)
@@ -52,5 +52,5 @@ class WhitenedMisfit:
         return self.evidence(found)
 
     def evidence(self, statistics: Statistics) -> Evidence:
-        """Of all segments."""
+        """The evidence of all segments."""
         return Evidence.of(statistics, self.speeds, self.null)

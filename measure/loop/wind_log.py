@@ -27,13 +27,13 @@ from measure.observe.trajectory import WindTrack
 Floats = NDArray[np.float64]
 
 _STEPS = (0.03, 0.05, 0.1)
-"""Of the gain, the direction [rad] and the clock [s]: about as large as what is expected of them."""
+"""Steps of the gain, the direction [rad] and the clock [s]: about as large as what is expected of them."""
 
 _REACH = 3.0
 """Prior standard deviations to either side within which a lag is sought."""
 _LAGS = 121
 _CALM = 0.3
-"""Of a log that shows less, no share is taken [m/s]."""
+"""Wind below which no share of a log is taken [m/s]."""
 
 
 def misread(wind: WindTrack, *, gain: float = 0.0, direction: float = 0.0, clock: float = 0.0) -> WindTrack:

@@ -139,7 +139,7 @@ def sharp_corners(corners: Points) -> NDArray[np.int64]:
 
 
 def distance_to(corners: Points, point: Points) -> float:
-    """Of a point (2,) from the edge of a polygon [m]."""
+    """Distance of a point (2,) from the edge of a polygon [m]."""
     along = np.roll(corners, -1, axis=0) - corners
     offset = point - corners
     share = np.clip((offset * along).sum(axis=1) / (along * along).sum(axis=1), 0, 1)

@@ -20,13 +20,13 @@ from measure.observe.interpolation import onto
 from measure.observe.trajectory import Floats, Trajectory
 
 _SAME = 1e-6
-"""Of the cloth's size: rest coordinates are often kept in single precision."""
+"""Share of the cloth's size within which places are the same: rest coordinates are often kept in single precision."""
 _DENSER = 2.0
 """Markers a point: between markers as far apart as the points, wrinkles are lost that the other recordings show."""
 _SHARED = 0.5
-"""Of the markers of the recording that has most: so many at least must be in all, to be taken alone."""
+"""Share of the markers of the recording with most that all must have in common, for these to be taken alone."""
 _NEAR = 0.75
-"""Of the weight of a point: it counts as seen where markers of so much were tracked."""
+"""Share of a point's weight: it counts as seen where markers of so much were tracked."""
 
 
 def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:

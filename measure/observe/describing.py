@@ -90,7 +90,7 @@ def of_simulation(artifact: Artifact, rest: Floats) -> Known:
 
 
 def _simulated_pins(scene: Mapping[str, Any], rest: Floats) -> Floats | None:
-    """Of the recipe's shape; an ArcSim scene's handles are not in the row."""
+    """The pins of the recipe's shape; None for an ArcSim scene, whose handles are not in the row."""
     if scene["shape"] == "flag":
         held = handles.full_hoist(rest) if scene["attachment"] == "hoist" else handles.corners(rest)
     elif scene["shape"] == "hanging-cloth":

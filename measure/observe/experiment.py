@@ -123,8 +123,8 @@ def _noise(seen: Observation) -> float:
 
 
 def _checked(experiment: Experiment) -> tuple[Finding, ...]:
-    """Of the cloth on its pins, in its wind. Whether pins stand still, and whether the motion about them is that of
-    the wind's moment, is not asked where they are carried.
+    """Findings on the cloth, its pins and its wind. Whether pins stand still, and whether the motion about them is that
+    of the wind's moment, is not asked where they are carried.
 
     Raises:
         InputError: pins, wind, axes or rate that cannot be those of the recording.
@@ -149,7 +149,7 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
 
 
 def _stiffness(known: Sequence[Known], setup: Setup) -> float:
-    """Of the pins [N/m]; those that are carried hold rigidly."""
+    """Stiffness of the pins [N/m]; those that are carried hold rigidly."""
     if setup.carried:
         return math.inf
     return _agreed([k.stiffness for k in known], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins")

@@ -11,7 +11,7 @@ from scipy.interpolate import RBFInterpolator
 from flagdata.errors import InputError
 
 _COINCIDENT = 1e-6
-"""Of the cloth's size: points nearer than this are one point. Rest coordinates are often kept in single precision."""
+"""Share of the cloth's size: points nearer than this are one. Rest coordinates are often kept in single precision."""
 
 
 def onto(source_rest: NDArray[np.float64], target_rest: NDArray[np.float64]) -> NDArray[np.float64]:

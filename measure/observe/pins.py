@@ -13,7 +13,7 @@ from sim.mesh import Mesh
 
 _NAMED = {Hold.HOIST_CORNERS: handles.corners, Hold.TOP_CORNERS: handles.top_corners, Hold.HOIST: handles.full_hoist}
 _NEAR = 1e-6
-"""Of the cloth's size: what is nearer than this is in one place."""
+"""Share of the cloth's size: what is nearer than this is in one place."""
 
 
 def hold(mesh: Mesh, pins: Hold | Floats) -> tuple[Mesh, tuple[int, ...]]:

@@ -25,13 +25,13 @@ BIN = 0.2
 """Duration of a stretch [s]: five frames at 25 a second."""
 _LEVEL = 0.9
 _RARE = 0.01
-"""Of a line in white noise, below which it is told."""
+"""Probability of a line in white noise below which it is told."""
 _SLOW = 3
 """Periods in a recording below which a line is no more than a trend."""
 
 
 def course(setting: Setting, model: Model, place: int) -> Course:
-    """Of the effect at a place of a model, along all recordings."""
+    """The course of the effect at a place of a model, along all recordings."""
     column, fitted = model.effects[place]
     amplitudes, period = _amplitudes(setting, model, column, fitted)
     stretch = max(1, round(BIN / period))

@@ -43,7 +43,8 @@ def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectCol
 
 
 def _step(lens: Lens, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
-    """Of generalised least squares from a model, under the prior about the nominal calibration; standard errors."""
+    """One step of generalised least squares from a model, under the prior about the nominal calibration, and its
+    standard errors."""
     own = evidence(lens.at(model), speeds, null)
     found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
     value, error = np.array([found.of(column) for column in range(own.columns)]).T

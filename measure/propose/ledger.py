@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import CorruptError
+from flagdata.files import write_text
 from measure.propose.outcome import Outcome
 
 SCHEMA = "flagdata.ledger/1"
@@ -39,8 +40,5 @@ def add(path: Path, outcome: Outcome, *, effect: str) -> None:
         CorruptError: a file that is no ledger.
     """
     made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
-    path.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)
-    partial = path.with_suffix(".partial")
-    partial.write_text(text + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_text(path, text + "\n")

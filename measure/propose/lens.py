@@ -56,7 +56,7 @@ class Lens:
         return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
     def select(self, chosen: NDArray[np.int64]) -> Lens:
-        """Of some segments."""
+        """The same for some segments only."""
         return replace(
             self, segments=self.segments.select(chosen), base=self.base[..., chosen],
             directions=tuple(direction[..., chosen] for direction in self.directions),
@@ -75,11 +75,11 @@ class Lens:
 
     @property
     def calibrated(self) -> Statistics:
-        """Of the calibrated parameters, at the nominal model."""
+        """Statistics of the calibrated parameters, at the nominal model."""
         return self.seen(self.base, self.directions[: len(THETA)])
 
     def of_columns(self, columns: Sequence[Column]) -> Statistics:
-        """Of the calibrated parameters and some columns, at the nominal model."""
+        """Statistics of the calibrated parameters and some columns, at the nominal model."""
         parts = [self.calibrated]
         for first in range(0, len(columns), _TOGETHER):
             own = columns[first : first + _TOGETHER]
@@ -88,7 +88,7 @@ class Lens:
         return replace(parts[0], response=np.concatenate([part.response for part in parts], axis=2))
 
     def at(self, model: Model) -> Statistics:
-        """Of the calibrated parameters and the effects of a model, there."""
+        """Statistics of the calibrated parameters and the effects of a model, there."""
         steps = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
 
         ways = np.eye(len(steps)) * steps
@@ -111,5 +111,5 @@ class Lens:
 
 
 def evidence(found: Statistics, speeds: Floats, null: NullModel) -> Evidence:
-    """Of what a lens sees; its columns are those of the response."""
+    """The evidence in what a lens sees; its columns are those of the response."""
     return replace(Evidence.of(found, speeds, null), columns=found.response.shape[2])

@@ -76,7 +76,7 @@ def of_columns(
 def _bundle(
     forecaster: Forecaster, segments: Segments, base: Tensor, columns: Sequence[TermColumn]
 ) -> dict[str, Tensor]:
-    """Of terms of one field."""
+    """Sensitivities to terms of one field."""
     count, step = len(segments), columns[0].step
     copies = segments.select(list(range(count)) * len(columns))
     system, state = forecaster.system(copies, [Calibration()] * len(copies))

@@ -24,7 +24,7 @@ from sim.render.prior import named
 from sim.run import load
 from sim.run.recipe import Recipe
 
-SCENES = {"density": "flag-wide", "fabric_density": "flag-fabrics"}
+SCENES = {"density": ("flag-wide",), "fabric_density": ("flag-fabrics", "flag-fabrics-damped")}
 """Recipes whose ranges are the prior, by the area weight that a model tells: those of the data it was trained on."""
 RENDERS = "flags"
 """Prior of ζ, where a target's own is not known."""
@@ -46,8 +46,8 @@ class Clip:
     recording: Artifact | None = None
 
 
-def scene_of(estimator: Estimator) -> Recipe:
-    """The recipe whose ranges are the prior of what a model tells.
+def scenes_of(estimator: Estimator) -> tuple[Recipe, ...]:
+    """Recipes whose ranges are the prior of what a model tells.
 
     Raises:
         InputError: a model of another kind of cloth.
@@ -59,7 +59,7 @@ def scene_of(estimator: Estimator) -> Recipe:
             f"the model tells {', '.join(names) or 'nothing'}, and no area weight of a flag",
             where=f"model {estimator.name!r}", fix="take the model of flags that comes with the package",
         )  # fmt: skip
-    return load(found[0])
+    return tuple(load(name) for name in found[0])
 
 
 def run(
@@ -78,11 +78,11 @@ def run(
     Raises:
         InputError: see `measure.refine.procedure.refine`.
     """
-    recipe = scene_of(estimator)
+    recipes = scenes_of(estimator)
     if area_weight is not None:
         density = Range(low=area_weight[0], high=area_weight[1])
-        recipe = replace(recipe, material=replace(recipe.material, density=density))
-    space = Space.of(recipe)
+        recipes = tuple(replace(one, material=replace(one.material, density=density)) for one in recipes)
+    space = Space.of(recipes[0])
     otherwise = view or DrawnView(prior=named(RENDERS), assets=Assets())
     targets = [
         Target(name=clip.name, clip=clip.frames, view=otherwise)
@@ -92,4 +92,4 @@ def run(
     ]
     settings = Settings(budget=budget, seed=seed, level=level)
     with progress(budget * len(targets), label="refining", unit="clip") as advance:
-        return refine(targets, estimator, recipe, settings=settings, cache=cache, advance=advance)
+        return refine(targets, estimator, recipes, settings=settings, cache=cache, advance=advance)

@@ -98,7 +98,9 @@ class Evaluator:
 
     def _request(self, point: Iterable[float], replicate: int) -> Request:
         own = tuple(round(float(value), _DECIMALS) + 0.0 for value in point)
-        return Request(point=own, seed=child_seed(self.seed, "replicate", digest(repr(own)), replicate))
+        return Request(
+            point=own, seed=child_seed(self.seed, "replicate", digest(repr(own)), replicate), replicate=replicate
+        )
 
     def _made(self, requests: list[Request]) -> list[Evaluated]:
         films = self.simulator.films(requests)

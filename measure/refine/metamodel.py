@@ -91,7 +91,7 @@ class Metamodel:
         )  # fmt: skip
 
     def log_density(self, regressors: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of an observed summary (k,), or one each (m, k), at regressors (m, p − 1): (m,)."""
+        """Logarithms (m,) of the density of a summary (k,), or of one each (m, k), at regressors (m, p − 1)."""
         k, freedom = observed.shape[-1], self.freedom
         x = _design(regressors, self.centre, self.spread)
         stretch = 1 + np.einsum("mi,ij,mj->m", x, self.inverse, x, optimize=True)

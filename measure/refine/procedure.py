@@ -96,16 +96,16 @@ class Settings:
 
 
 def refine(
-    targets: Target | Sequence[Target], estimator: Estimator, recipe: Recipe, *, settings: Settings | None = None,
-    cache: Path | None = None, advance: Callable[[int], object] | None = None,
+    targets: Target | Sequence[Target], estimator: Estimator, recipes: Recipe | Sequence[Recipe], *,
+    settings: Settings | None = None, cache: Path | None = None, advance: Callable[[int], object] | None = None,
 ) -> Refinement:  # fmt: skip
     """Measure the cloth and the wind of a clip, or of several clips of one cloth, each in a wind of its own.
 
     Args:
         targets: one clip, or several of one flag.
         estimator: a model of the posterior loss.
-        recipe: of the scene, such as `sim.run.load("flag-wide")`; its ranges are the prior, and should be those of the
-            model's training data.
+        recipes: of the scene, such as `sim.run.load("flag-wide")`; its ranges are the prior, and should be those of the
+            model's training data. Replicates take turns at several, see `measure.refine.simulator`.
         cache: folder in which evaluations are kept: an interrupted refinement goes on from them.
         advance: called with the number of clips that were simulated.
 
@@ -122,7 +122,7 @@ def refine(
     evaluators = tuple(
         Evaluator(
             Simulator.of(
-                recipe, target.view, frames=front.frames, rate=front.rate, renderer=chosen.renderer, batch=chosen.batch
+                recipes, target.view, frames=front.frames, rate=front.rate, renderer=chosen.renderer, batch=chosen.batch
             ),
             estimator, chosen.seed, cache, model,
         )
@@ -300,14 +300,15 @@ class _Run:
                         what=f"{share:.0%} of the wind's probability lies at the ends of the range that is searched",
                     )
                 )  # fmt: skip
-        out.append(
-            Finding(
-                kind="damping-assumed", severity=Severity.WARNING,
-                what="clips were simulated with the material's own damping: the intervals are too narrow for a cloth "
-                "that is damped more",
-                fix="rely on the model's own interval, which allows for any damping, where that is not known",
-            )
-        )  # fmt: skip
+        if not self.evaluators[0].simulator.draws_damping:
+            out.append(
+                Finding(
+                    kind="damping-assumed", severity=Severity.WARNING,
+                    what="clips were simulated with the material's own damping: the intervals are too narrow for a "
+                    "cloth that is damped more",
+                    fix="rely on the model's own interval, which allows for any damping, where that is not known",
+                )
+            )  # fmt: skip
         if not all(knows_view(target) for target in self.targets):
             out.append(
                 Finding(

@@ -1,7 +1,9 @@
-"""From points of the search space to films: simulated in one joint batch, then filmed one by one.
+"""From points of the search space to films: simulated in joint batches, then filmed one by one.
 
 Replicates of one θ differ in a start that is a millimetre off, of which nothing is left after the seconds that settle
-but another phase of the same motion, in the camera's noise, and in ζ where it is not known.
+but another phase of the same motion, in the camera's noise, in ζ where it is not known, and in the internal damping:
+nobody knows that of a cloth which is filmed, and steps of an integrator damp by themselves. So they take turns at
+scenes which differ in their integrator, and each draws its damping where its scene has a range of it.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
+from flagdata.tables import Range
 from measure.refine.space import DENSITY, WIND, Space
 from measure.refine.view import View
 from sim.assets import Assets
@@ -38,11 +41,13 @@ class Request:
 
     Attributes:
         point: θ in [−1, 1]¹⁷.
-        seed: of the start, the camera's noise and, where it is drawn, ζ.
+        seed: of the start, the damping, the camera's noise and, where it is drawn, ζ.
+        replicate: its number, which says whose turn it is among the scenes.
     """
 
     point: tuple[float, ...]
     seed: int
+    replicate: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,18 +65,18 @@ class Film:
 
 @dataclass(frozen=True)
 class Simulator:
-    """Simulates and films flags of one scene.
+    """Simulates and films flags of one space.
 
     Attributes:
-        recipe: of the scene, with `time` as the network's clips need it; see `of`.
+        scenes: that replicates take turns at, with `time` as the network's clips need it; see `of`.
         view: how they are filmed.
         renderer: a name of `sim.render.RENDERERS`.
         batch: flags that are simulated together. Results depend on it in their last bits, so that batches are filled
-            up to it.
+            up to it. Several scenes share it.
         assets: textures and backgrounds.
     """
 
-    recipe: Recipe
+    scenes: tuple[Scene, ...]
     view: View
     renderer: str = "raster"
     batch: int = 8
@@ -79,43 +84,62 @@ class Simulator:
 
     @classmethod
     def of(
-        cls, recipe: Recipe, view: View, *, frames: int, rate: float, renderer: str = "raster", batch: int = 8
-    ) -> Simulator:
+        cls, recipes: Recipe | Sequence[Recipe], view: View, *, frames: int, rate: float, renderer: str = "raster",
+        batch: int = 8,
+    ) -> Simulator:  # fmt: skip
         """A simulator of clips of this length [frames] and rate [Hz].
 
+        Args:
+            recipes: a scene's, or those of several scenes of one space.
+
         Raises:
-            InputError: see `Space.of`; fewer than one flag in a batch.
+            InputError: see `Space.of`; scenes of different spaces, or none; fewer than one flag in a batch.
         """
         if batch < 1:
             raise InputError(f"batches of {batch}", fix="take at least one flag")
-        Space.of(recipe)
-        timed = replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))
-        return cls(recipe=timed, view=view, renderer=renderer, batch=batch)
+        several = (recipes,) if isinstance(recipes, Recipe) else tuple(recipes)
+        spaces = {Space.of(recipe).identity for recipe in several}
+        if len(spaces) != 1:
+            raise InputError(
+                f"{len(several)} scenes of {len(spaces)} different search spaces", fix="give scenes of the same ranges"
+            )
+        scenes = tuple(
+            Scene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
+        )
+        return cls(scenes=scenes, view=view, renderer=renderer, batch=batch)
 
     @cached_property
     def space(self) -> Space:
-        return Space.of(self.recipe)
+        return self.scenes[0].space
+
+    @property
+    def draws_damping(self) -> bool:
+        """Whether the damping differs among replicates."""
+        return any(isinstance(scene.recipe.material.damping, Range) for scene in self.scenes)
 
     @property
     def identity(self) -> str:
         """A hash of all that shapes a film beside its request."""
         own = {
-            "recipe": self.recipe.identity(), "view": self.view.identity, "renderer": self.renderer,
-            "batch": self.batch, "start_noise": START_NOISE, "space": self.space.identity,
+            "recipes": [scene.recipe.identity() for scene in self.scenes], "view": self.view.identity,
+            "renderer": self.renderer, "batch": self.batch, "start_noise": START_NOISE, "space": self.space.identity,
         }  # fmt: skip
         return digest(canonical(own))
 
     def films(self, requests: Sequence[Request]) -> list[Film]:
-        """Simulate and film requests, in batches of `batch`."""
-        out: list[Film] = []
-        for first in range(0, len(requests), self.batch):
-            out += self._batch(requests[first : first + self.batch])
-        return out
+        """Simulate and film requests, those of each scene in batches."""
+        size = -(-self.batch // len(self.scenes))
+        found: dict[int, Film] = {}
+        for number, scene in enumerate(self.scenes):
+            own = [place for place, request in enumerate(requests) if request.replicate % len(self.scenes) == number]
+            for first in range(0, len(own), size):
+                part = own[first : first + size]
+                found |= zip(part, self._batch(scene, [requests[place] for place in part], size=size), strict=True)
+        return [found[place] for place in range(len(requests))]
 
-    def _batch(self, requests: Sequence[Request]) -> list[Film]:
+    def _batch(self, scene: Scene, requests: Sequence[Request], *, size: int) -> list[Film]:
         begun = time.perf_counter()
-        members = [self._member(request) for request in requests]
-        outcomes = run(self._crew, self._stepper, members, size=self.batch)
+        outcomes = run(scene.crew, scene.stepper, [scene.member(request) for request in requests], size=size)
         share = (time.perf_counter() - begun) / len(requests)
         films: list[Film] = []
         for request, outcome in zip(requests, outcomes, strict=True):
@@ -129,28 +153,46 @@ class Simulator:
         return films
 
     @cached_property
-    def _crew(self) -> Crew:
-        return Crew(self.recipe)
-
-    @cached_property
-    def _stepper(self) -> Stepper:
-        return Stepper.of(self._crew)
-
-    @cached_property
-    def _template(self) -> Member:
-        return Crew(replace(self.recipe, scene=replace(self.recipe.scene, start_noise=0.0))).member(0)
-
-    @cached_property
     def _renderer(self) -> Renderer:
         return RENDERERS[self.renderer](assets=self.assets)
 
-    def _member(self, request: Request) -> Member:
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene's recipe, and what is made of it once."""
+
+    recipe: Recipe
+
+    @cached_property
+    def space(self) -> Space:
+        return Space.of(self.recipe)
+
+    @cached_property
+    def crew(self) -> Crew:
+        return Crew(self.recipe)
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        return Stepper.of(self.crew)
+
+    def member(self, request: Request) -> Member:
+        """The flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene
         noise = stream(request.seed, "start").normal(0.0, START_NOISE, scene.position.shape)
         noise[list(scene.handles.vertices)] = 0.0
+        damping = self.recipe.material.damping
         material = replace(
-            scene.material, density=float(values[DENSITY]), bending=values[:DENSITY].reshape(BENDING_SHAPE)
-        )
+            scene.material, density=float(values[DENSITY]), bending=values[:DENSITY].reshape(BENDING_SHAPE),
+            damping=(
+                damping.at(stream(request.seed, "damping").random())
+                if isinstance(damping, Range)
+                else scene.material.damping
+            ),
+        )  # fmt: skip
         flag = replace(scene, position=scene.position + noise, material=material, wind=(float(values[WIND]), 0.0, 0.0))
         return replace(self._template, scene=flag, seed=request.seed, parameters={})
+
+    @cached_property
+    def _template(self) -> Member:
+        return Crew(replace(self.recipe, scene=replace(self.recipe.scene, start_noise=0.0))).member(0)

@@ -22,7 +22,7 @@ from sim.run.recipe import Recipe, Shape
 BENDING = BENDING_SHAPE[0] * BENDING_SHAPE[1]
 DENSITY, WIND = BENDING, BENDING + 1
 DIMENSION = BENDING + 2
-"""Of θ: bending coefficients 0 to 14 (three directions of five curvatures), density, wind speed."""
+"""Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), density, wind speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,12 +84,14 @@ class Space:
         """The ranges of a scene's recipe.
 
         Raises:
-            InputError: a recipe that has no such ranges, several materials, effects, or another scene than a flag.
+            InputError: a recipe that has no such ranges, or ranges of anything else but the damping; several materials,
+                effects, or another scene than a flag.
         """
         spec, speed = recipe.material, recipe.wind.speed
         factor, density, wind = spec.bending_each, spec.density, speed
         common = spec.bending if isinstance(spec.bending, Range) else None
         alone = len(spec.bases) == 1 and not recipe.effects and recipe.scene.shape is Shape.FLAG
+        alone &= not any(isinstance(q, Range) for q in (spec.density_factor, spec.stretching, recipe.wind.toward))
         if not (
             isinstance(factor, Range) and isinstance(density, Range) and isinstance(wind, Range)
             and alone and ((common is not None and common.low > 0) or spec.bending == 1.0) and factor.low > 0
@@ -102,7 +104,7 @@ class Space:
 
     @property
     def ranges(self) -> tuple[Range, ...]:
-        """Of each of the 17 parameters, in SI."""
+        """The range of each of the 17 parameters, in SI."""
         table = self.material.bending.ravel().tolist()
         low, high = self._factors
         bending = [Range(low=k * low, high=k * high, scale=Scale.LOG) for k in table]

@@ -64,7 +64,7 @@ class View(Protocol):
     """Says by what ζ and camera a clip is filmed."""
 
     def at(self, seed: int) -> tuple[RenderParameters, Camera]:
-        """Of the clip with this seed."""
+        """ζ and the camera of the clip with this seed."""
         ...
 
     @property

@@ -105,7 +105,7 @@ class Logarithmic(Scale):
         return self._apart([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
 
     def _apart(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
-        """Of the ticks, as many from the first on as do not touch."""
+        """As many of the ticks, from the first on, as do not touch."""
         kept: list[tuple[float, str]] = []
         for value, label in ticks:
             if not kept or abs(self(value) - self(kept[-1][0])) >= (room(label) + room(kept[-1][1])) / 2:
@@ -248,7 +248,7 @@ def _round_step(least: float) -> float:
 
 
 def _within_decade(low: float, high: float) -> list[float]:
-    """Of 1, 2, 3, 5, 7 × 10ⁿ, those between."""
+    """Those of 1, 2, 3, 5, 7 × 10ⁿ that lie between."""
     exponents = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
     return [f * 10.0**n for n in exponents for f in (1, 2, 3, 5, 7) if low <= f * 10.0**n <= high]
 

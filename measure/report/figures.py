@@ -17,7 +17,7 @@ _FAR = 6.0  # an observed statistic this many times the largest null is shown on
 
 
 def root_mean_square(values: Sequence[float]) -> float:
-    """Of the values that are there; NaN where none is."""
+    """Root mean square of the values that are there; NaN where none is."""
     finite = [v for v in values if math.isfinite(v)]
     return math.sqrt(sum(v * v for v in finite) / len(finite)) if finite else math.nan
 

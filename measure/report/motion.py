@@ -72,7 +72,7 @@ class Motion:
 
     @property
     def radius(self) -> float:
-        """Of the circle about the upright through the mean that holds the observed cloth [m]: half a panel's width."""
+        """Half a panel's width [m]: the circle about the upright through the mean that holds the observed cloth."""
         return _finite_reach(np.linalg.norm(self.observed[..., :2], axis=-1))
 
     @property

@@ -22,9 +22,9 @@ LEVELS = (0.50, 0.80, 0.90)
 CURVE = tuple(round(0.05 * step, 2) for step in range(1, 20))
 """Nominal levels of the curves."""
 BINS = 10
-"""Of the rank histogram."""
+"""Number of bins of the rank histogram."""
 BAND = 0.99
-"""Of the rank histogram's band: Talts et al. show 99 % of a binomial."""
+"""Share of a binomial within the rank histogram's band: Talts et al. show 99 %."""
 
 Array = NDArray[np.float64]
 

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("models", metavar="MODEL...", nargs=-1, required=True)
 @click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
-@click.option("--side", default="test", show_default=True, help="Side of it: train, validation, test.")
+@click.option("--side", default="test", show_default=True, help="Side of the data set: train, validation or test.")
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake; by default its head.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", default=Path("evaluation"), show_default=True,
               help="Where the page, the table in Markdown and the JSON go.")  # fmt: skip
-@click.option("--name", default="evaluation", show_default=True, help="Of the files, without their endings.")
+@click.option("--name", default="evaluation", show_default=True, help="Name of the files, without their endings.")
 @click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
               help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.")  # fmt: skip
 @click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 @click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
               help="Range of all clips' area weight, if it is known [kg/m²]; the paper's is 0.10:0.17.")  # fmt: skip
 @click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of draws and of the bootstrap.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
+              help="Seed of the draws and of the bootstrap.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
 @json_option
 @lake_option
@@ -155,10 +156,7 @@ class _Desk:
         return self._pairs[side]
 
     def _of(self, data: DataSpec, side: str) -> Pairs:
-        from flagdata.dataset import ExplicitSplit
-
-        split = ExplicitSplit(where={name: data.where(name) for name in {"train", side}})
-        return self._source.pairs(at=self._at, split=side, split_by=split)
+        return self._source.pairs(at=self._at, split=side, split_by=data.split("train", side))
 
     def _clips(self, side: str, estimator: Estimator) -> Prepared:
         from models.training.inputs import prepare_clips

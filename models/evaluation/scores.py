@@ -17,7 +17,7 @@ from models.evaluation.bootstrap import Estimate, Resamples, estimate, ratio
 from models.evaluation.predictions import Predictions
 
 TOLERANCE = 0.5
-"""Of Acc@0.5 [m/s]; Runia et al., Cloth in the Wind, CVPR 2020, section 6."""
+"""Error that Acc@0.5 allows [m/s]; Runia et al., Cloth in the Wind, CVPR 2020, section 6."""
 BIN = 1.0
 """Width of the bins of the error against wind [m/s]."""
 

@@ -19,7 +19,7 @@ from models.evaluation.scores import SCORES, rmse_bound
 from models.evaluation.triplets import accuracy_values
 
 Values = Mapping[str, NDArray[np.float64]]
-"""Of each metric (1 + draws,): its value in the data, then in each draw of sequences."""
+"""Metric → (1 + draws,): its value in the data, then in each draw of sequences."""
 
 OF_TARGETS = ("rmse", "relative_error", "bias", "r_squared", "pearson")
 """Scores that are shown of every target."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("recipe", metavar="RECIPE")
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake to learn from; by default its head.")
-@click.option("--seed", type=click.IntRange(min=0), help="Of weights, crops and orders, instead of the recipe's.")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of weights, crops and orders, instead of the recipe's.")
 @click.option("--sequences", type=click.IntRange(min=2), metavar="N", help="Simulations to learn from, instead of all.")
 @click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
               help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.")  # fmt: skip
@@ -106,6 +106,7 @@ def trained(
     from models.training.publish import data_identity, network_artifact, publish
     from models.training.steps import Training
 
+    recipe.check()
     source = flagdata.open(lake_path)
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
@@ -166,7 +167,5 @@ def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | Non
     Raises:
         NotFoundError, RefusedError: there are none, or the sides leak.
     """
-    from flagdata.dataset import ExplicitSplit
-
-    split = ExplicitSplit(where={name: recipe.data.where(name) for name in ("train", "validation", "test")})
+    split = recipe.data.split("train", "validation", "test")
     return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)

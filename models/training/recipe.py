@@ -20,6 +20,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import torch
+
+from flagdata.dataset.splits import ExplicitSplit
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, parsed
@@ -71,6 +74,10 @@ class DataSpec:
     def where(self, side: str) -> str:
         """SQL over the catalog that takes a side."""
         return "(" + " or ".join(f"name like '{dataset}-{side}-%'" for dataset in self.datasets) + ")"
+
+    def split(self, *sides: str) -> ExplicitSplit:
+        """These sides of the data sets, by which pairs are read."""
+        return ExplicitSplit(where={side: self.where(side) for side in sides})
 
     def identity(self) -> dict[str, Any]:
         """JSON values; one data set is named by itself."""
@@ -173,6 +180,15 @@ class TrainingRecipe:
             self.network.name, self.network.options, loss=loss.name, targets=loss.targets, components=loss.components,
             margin=loss.margin,
         )  # fmt: skip
+
+    def check(self) -> None:
+        """Make sure that the network takes what the front end gives, by shapes alone, before anything is prepared.
+
+        Raises:
+            InputError: options or clips that the network does not take.
+        """
+        with torch.no_grad(), torch.device("meta"):
+            self.learner().network(torch.empty(2, *self.front_end.shape))
 
     @cached_property
     def hash(self) -> str:

@@ -77,7 +77,7 @@ class WorkerProcess:
 
     @property
     def pid(self) -> int | None:
-        """Of the running worker."""
+        """Process number of the running worker."""
         return None if self._process is None else self._process.pid
 
     def request(self, messages: Sequence[Message], *, timeout: float, setup: Message | None = None) -> list[Message]:

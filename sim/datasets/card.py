@@ -97,7 +97,7 @@ def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[st
 
 
 def distributions(parameters: Sequence[dict[str, Any]], *, rendered: bool) -> list[Distribution]:
-    """Of all numbers of ζ, or of θ and the instruments, by name.
+    """Distributions of all numbers of ζ, or of θ and the instruments, by name.
 
     Args:
         parameters: of each film.

@@ -111,7 +111,7 @@ def _threads_per_process(count: int) -> Iterator[None]:
 
 
 def threads(client: Client) -> int:
-    """Of all workers together, 0 where there are none.
+    """Number of threads of all workers together, 0 where there are none.
 
     Raises:
         WorkerError: the connection to the scheduler was lost, and with it all jobs.

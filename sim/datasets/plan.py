@@ -70,7 +70,7 @@ class Plan:
 
     @property
     def size(self) -> float:
-        """Of what is missing [B]."""
+        """Size of what is missing [B]."""
         return self.missing_sequences * self.rates.sequence_bytes + self.missing_films * self.rates.film_bytes
 
     def as_dict(self) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class Flat:
 
     @property
     def _radius(self) -> float:
-        """Of what is local [m]."""
+        """Radius of what is local [m]."""
         return _LOCAL * math.sqrt(math.prod(self._extents))
 
     def _bumps(self, u: float | None, v: float | None) -> Tensor:

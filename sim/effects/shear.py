@@ -11,7 +11,7 @@ from sim.effects.effect import FlowEffect
 from sim.effects.parameter import Value, shape, strength
 
 _LOWEST = 0.05
-"""Of the reference height: below it the profile is taken as constant."""
+"""Share of the reference height below which the profile is taken as constant."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -93,7 +93,7 @@ class JointBatch:
         )  # fmt: skip
 
     def parts(self, state: State) -> Iterator[tuple[System, slice, State]]:
-        """Of every batch its system, its place among the members, and its state."""
+        """For every batch its system, its place among the members, and its state."""
         memory, start = state.memory, 0
         for system in self.systems:
             members = slice(start, start + system.cloth.batch)

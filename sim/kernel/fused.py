@@ -300,7 +300,7 @@ def _function(code: ctypes.CDLL, name: str, kind: str) -> Any:
 
 
 def _kind(system: System) -> str:
-    """Of the kernel's functions: by the type of the numbers, and with narrow blocks where members are few.
+    """Name of the kernel's functions by the type of the numbers, with narrow blocks where members are few.
 
     Contact adds forces up in groups as wide as a block: with it, blocks are as wide for few members as for many, so
     that what one gets does not depend on their number.

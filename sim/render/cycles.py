@@ -86,7 +86,7 @@ class Cycles:
         return develop(scene, behind, gain=parameters.gain).to(meshes.device)
 
     def _pictures(self, meshes: Meshes, zeta: RenderParameters, camera: Camera) -> int:
-        """Of one exposure."""
+        """How many pictures make one exposure."""
         half = zeta.exposure_time / 2
         first, last = (camera.project(moved(meshes, offset).positions)[0] for offset in (-half, half))
         return min(_MOST_PICTURES, max(1, math.ceil(float((last - first).norm(dim=-1).max()))))

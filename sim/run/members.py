@@ -52,7 +52,7 @@ class Member:
 
     @property
     def wind_speed(self) -> float:
-        """Of the mean wind, horizontally [m/s]."""
+        """Horizontal speed of the mean wind [m/s]."""
         return math.hypot(*self.scene.wind[:2])
 
 

@@ -151,7 +151,7 @@ def _scene(table: Table, folder: Path) -> SceneSpec:
 
 
 def _stiffness(table: Table) -> float:
-    """Of the handles [N/m]."""
+    """Stiffness of the handles [N/m]."""
     rigid, given = table.flag("rigid"), "stiffness" in table
     if rigid and given:
         raise UsageError("both rigid and a stiffness are given", where=table.where, fix="keep one of them")

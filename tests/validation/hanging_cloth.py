@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 
 import flagdata
-from flagdata.dataset import ExplicitSplit, Pairs
+from flagdata.dataset import Pairs
 from flagdata.rng import stream
 from models import estimator
 from models.training.recipe import DataSpec
@@ -46,7 +46,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     model = estimator.shipped("wave-cloth")
     source = flagdata.open(place)
     spec = DataSpec(datasets=(_DATASET,))
-    split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
+    split = spec.split("train", "test")
     train, test = (source.pairs(split=side, split_by=split) for side in ("train", "test"))
     rows = source.lake.rows(f"kind = 'recording' and {spec.where('test')}", columns=["artifact", "parameters"])
     material = {row["artifact"]: json.loads(row["parameters"])["material"] for row in rows.to_pylist()}

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 import flagdata
 from flagdata.console import progress
-from flagdata.dataset import ExplicitSplit
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, combined
 from measure.estimate.dependence import of_model
@@ -39,7 +38,7 @@ def run(*, seed: int, out: object) -> dict[str, Any]:
     recipe: Any = model.card["recipe"]
     data: Any = model.card["data"]
     spec = DataSpec.of_identity(recipe["data"])
-    split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
+    split = spec.split("train", "test")
     pairs = flagdata.open(path).pairs(at=data["at"], split="test", split_by=split)
     chosen = np.unique(pairs.table.seed, return_index=True)[1][:FILMS].tolist()
     names = tuple(model.learners[0].scaling.names)

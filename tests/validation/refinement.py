@@ -27,10 +27,10 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.console import progress
-from flagdata.dataset import ExplicitSplit, Source
+from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
 from measure.refine import start
-from measure.refine.command import RENDERS, scene_of
+from measure.refine.command import RENDERS, scenes_of
 from measure.refine.distance import squared
 from measure.refine.evaluator import STAGES, Evaluator
 from measure.refine.peers.registry import PEERS, minimise
@@ -103,8 +103,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     cache = out / "refinement-cache" if folder is None else Path(folder)
     own_model = os.environ.get("FLAGDATA_REFINE_MODEL")
     estimator = models.shipped() if own_model is None else models.load(Path(own_model))
-    scene = scene_of(estimator)
-    space = Space.of(scene)
+    scenes = scenes_of(estimator)
+    space = Space.of(scenes[0])
     at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
     handmade = _handmade(at, seed)
     scores: list[Score] = []
@@ -118,7 +118,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
     for number, target in enumerate(targets):
         found = refine(
-            target, estimator, scene, cache=cache,
+            target, estimator, scenes, cache=cache,
             settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
         )  # fmt: skip
         own.append(found)
@@ -221,7 +221,7 @@ def _handmade(at: str, seed: int) -> Fitted | None:
     if lake is None:
         return None
     spec = DataSpec(datasets=("flagsim-wide",))
-    split = ExplicitSplit(where={side: spec.where(side) for side in ("train", "test")})
+    split = spec.split("train", "test")
     train = Source.open(lake).pairs(at=at, split="train", split_by=split)
     return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
 

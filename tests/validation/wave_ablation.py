@@ -17,7 +17,7 @@ from typing import Any
 
 import flagdata
 from flagdata.console import progress
-from flagdata.dataset import ExplicitSplit, Source
+from flagdata.dataset import Source
 from models import estimator as models
 from models.evaluation import report
 from models.evaluation.evaluation import as_document, evaluate
@@ -94,7 +94,7 @@ def _recipe(label: str, chosen: tuple[str, ...], *, seed: int) -> TrainingRecipe
 
 def _predictions(source: Source, obj: str, label: str, *, at: str | None, cache: Path, seed: int) -> Predictions:
     network = models.load(source.lake.object_path(obj))
-    split = ExplicitSplit(where={name: _TESTED.where(name) for name in ("train", "test")})
+    split = _TESTED.split("train", "test")
     pairs = source.pairs(at=at, split="test", split_by=split)
     with progress(len(pairs), "prepare what tests", "clip") as advance:
         clips = prepare_clips(pairs, network.front_end, network.cropping, folder=cache, workers=1, advance=advance)

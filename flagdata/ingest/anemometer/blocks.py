@@ -28,7 +28,7 @@ _LINE = re.compile(
     r"(?P<name>[^\W\d_](?:[^:=\t\d]|(?<=[^\W_])\d){0,40}?)\s*[:=\t]\s*(?P<value>[^:=\s](?:[^=]{0,60}\S)?)\s*"
 )
 _SHARE = 0.6
-"""Of the lines with a letter or digit in them; the others are titles."""
+"""Share of the lines with a letter or digit that must be readings; the others are titles."""
 _LEAST = 3
 """Readings by which the kind is told."""
 _MOST = 60

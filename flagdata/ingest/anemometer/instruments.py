@@ -330,7 +330,7 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
 
 
 def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
-    """Of columns with the same words, those that are readings of their own: not another unit, not the mean of one."""
+    """Those of columns with the same words that are readings of their own: not another unit, not the mean of one."""
     order = sorted(
         indices, key=lambda i: (found.headings[i].unit is None, found.headings[i].mean, found.headings[i].unit != "m/s")
     )

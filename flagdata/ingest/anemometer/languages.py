@@ -16,11 +16,10 @@ _TIME = r"时间|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:вре
 _WORDS = tuple(
     (re.compile(pattern, re.IGNORECASE), word)
     for pattern, word in (
-        (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
-        (r"\bдата\b", "date"), (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"),
-        (r"^\s*[日일]\s*$", "day"), (r"^\s*[時时시]\s*$", "hour"), (r"^\s*[分분]\s*$", "minute"),
-        (r"^\s*[秒초]\s*$", "second"), (r"м/с", "m/s"), (r"км/ч", "km/h"),
-        (r"\bград(?:усы)?\b\.?", "deg"), (r"℃", "°C"),
+        (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"), (r"\bдата\b", "date"),
+        (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"), (r"^\s*[日일]\s*$", "day"),
+        (r"^\s*[時时시]\s*$", "hour"), (r"^\s*[分분]\s*$", "minute"), (r"^\s*[秒초]\s*$", "second"),
+        (r"м/с", "m/s"), (r"км/ч", "km/h"), (r"\bград(?:усы)?\b\.?", "deg"), (r"℃", "°C"),
     )
 )  # fmt: skip
 

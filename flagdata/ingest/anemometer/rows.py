@@ -74,7 +74,7 @@ class RowReader:
     def _sorted(
         self, numbers: Sequence[int], lines: Sequence[str], width: int
     ) -> tuple[NDArray[np.int64], list[list[str]]]:
-        """Of these lines the rows that fit, with their numbers; the others are counted."""
+        """The rows of these lines that fit, with their numbers; the others are counted."""
         named = len(self.header) if self.header is not None else None
         comment = self._layout.comment
         looked: list[int] = []

@@ -48,7 +48,7 @@ class Orientation:
 
     @classmethod
     def of_display_matrix(cls, matrix: Sequence[int]) -> Orientation:
-        """Of the nine numbers a, b, u, c, d, v, x, y, w of a container's display matrix.
+        """The orientation by the nine numbers a, b, u, c, d, v, x, y, w of a container's display matrix.
 
         A stored pixel (p, q) is shown at (a p + c q, b p + d q), y down (ISO/IEC 14496-12, 8.3.2 and 6.2.2).
         """
@@ -60,7 +60,7 @@ class Orientation:
 
     @classmethod
     def of_exif(cls, value: int) -> Orientation:
-        """Of the Exif tag Orientation, 1 to 8 (CIPA DC-008, 4.6.4 A); other values are upright."""
+        """The orientation by the Exif tag Orientation, 1 to 8 (CIPA DC-008, 4.6.4 A); other values are upright."""
         table = {2: (0, 1, 0), 3: (0, 1, 1), 4: (0, 0, 1), 5: (1, 0, 0), 6: (1, 1, 0), 7: (1, 1, 1), 8: (1, 0, 1)}
         transpose, flip_x, flip_y = table.get(value, (0, 0, 0))
         return cls(transpose=bool(transpose), flip_x=bool(flip_x), flip_y=bool(flip_y))

@@ -12,11 +12,11 @@ from measure.cases.held.model import NAMES, Cloth, Parameters, errors, predicted
 from measure.cases.held.reading import Floats, Swing
 
 STEPS = (0.3, 0.7, 0.7)
-"""Of ln density, ln bending and ln damping, for their sensitivities; that of the lag is the model's velocity."""
+"""Steps of ln density, ln bending and ln damping, for their sensitivities; that of the lag is the model's velocity."""
 PRIOR = (1.0, 1.0, 1.0, np.inf)
 """Standard deviations of the steps from the nominal cloth: a factor of e each; the lag is free."""
 _LONGEST = (0.7, 1.0, 1.0, 0.1)
-"""Of an iteration's steps."""
+"""The longest step of each parameter in one iteration."""
 _BOUNDS = ((0.2, 5.0), (0.05, 20.0), (0.1e-3, 0.1))  # factors on density and bending; damping [s]
 _HUBER = 3.0  # robust standard deviations; the tracker loses a node now and then by centimetres
 ITERATIONS = 4

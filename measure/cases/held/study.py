@@ -18,11 +18,11 @@ from measure.shares import Share
 from sim.material import Material
 
 LEVEL = 0.05
-"""Of each pair of repeats."""
+"""Level at which each pair of repeats is tested."""
 MOVED = 0.06
 """By which one of a pair's stamps are moved for the control [s]: less than a frame of the camera."""
 SHUFFLES = 200
-"""Of the repeats' segments, for how many pairs are told apart by chance."""
+"""How often the repeats' segments are shuffled, to find how many pairs are told apart by chance."""
 _START = 0.3  # s of lag that the calibration starts from
 
 

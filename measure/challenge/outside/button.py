@@ -13,7 +13,7 @@ from sim.effects.effect import ClothEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 
 PLACE = (0.72, 0.3)
-"""Of the width from the hoist and of the height from below."""
+"""Place of the button: from the hoist as a share of the width, from below as a share of the height."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from sim.effects.effect import ClothEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 
 PLACE = 0.6
-"""Of the width, from the hoist."""
+"""Place of the seam from the hoist, as a share of the width."""
 _PIECES = 200
 
 

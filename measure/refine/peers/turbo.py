@@ -19,7 +19,7 @@ from measure.refine.peers.gaussian import fitted, gains, signed, unit
 from measure.refine.peers.library import library
 
 LENGTH, LEAST, MOST = 0.8, 0.5**7, 1.6
-"""Of the region's side in [0, 1]ᵈ: at the start, where it starts anew, and at most."""
+"""Length of the region's side in [0, 1]ᵈ: at the start, where it starts anew, and at most."""
 SUCCESSES = 3
 """In a row after which it doubles."""
 _INITIAL = 10

@@ -190,9 +190,23 @@ def test_clips_of_another_rate_are_refused(tmp_path: Path) -> None:
         prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=1, advance=lambda n: None)
 
 
+def test_clips_that_the_network_does_not_take_are_refused_before_they_are_prepared(lake: Path, tmp_path: Path) -> None:
+    from tests.models.conftest import RECIPE
+
+    small = RECIPE.replace('maps = "wave-maps"', 'maps = "frames"').replace('name = "wave"', 'name = "cardona"')
+    recipe = tmp_path / "small.toml"
+    recipe.write_text(small.replace("dimension = 4\nwidths = [6, 6, 6]\n", ""))
+    arguments = ["train", str(recipe), "--at", "v1", "--lake", str(lake), "--cache", str(tmp_path / "cache")]
+    done = CliRunner().invoke(root, arguments)
+    assert done.exit_code != 0
+    assert "at least 64×64" in str(done.output) + str(done.exception)
+    assert not (tmp_path / "cache").exists()
+
+
 @pytest.mark.parametrize("name", TRAININGS.names())
 def test_every_recipe_of_the_catalog_is_read_and_makes_its_network(name: str) -> None:
     recipe = load(name)
+    recipe.check()
     with torch.device("meta"):
         assert sum(weights.numel() for weights in recipe.learner().network.parameters()) > 100_000
     assert recipe.front_end.frames == 30
