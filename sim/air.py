@@ -25,7 +25,7 @@ from torch import Tensor
 from flagdata.errors import InputError
 from flagdata.registry import Registry
 from sim.cloth import Cloth
-from sim.kernel import fields
+from sim.kernel import on_mesh
 
 # Dynamic viscosity of air at 288.15 K, U.S. Standard Atmosphere 1976, table 4.
 _VISCOSITY = 1.789e-5
@@ -66,8 +66,8 @@ class FaceWind:
 
 def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> FaceWind:
     """The relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
-    if fields.usable(position, velocity, wind):
-        normal, relative, across = fields.face_wind(cloth.faces, position, velocity, wind)
+    if on_mesh.usable(position, velocity, wind):
+        normal, relative, across = on_mesh.face_wind(cloth.faces, position, velocity, wind)
         return FaceWind(normal=normal, relative=relative, across=across)
     x0, x1, x2 = cloth.at_corners(position)
     normal = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)

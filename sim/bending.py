@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth, gather_sum
-from sim.kernel import fields
+from sim.kernel import on_mesh
 from sim.tables import bending_stiffness
 
 # Lengths below this share of the edge are held there, so that a collapsed triangle pushes back with a finite force.
@@ -31,8 +31,8 @@ class Fold:
 
 def fold(cloth: Cloth, position: Tensor) -> Fold:
     """Fold angles of positions (vertex, 3, batch) [m], in (−π, π]."""
-    if fields.usable(position):
-        angle, gradient = fields.fold(cloth.hinges, position)
+    if on_mesh.usable(position):
+        angle, gradient = on_mesh.fold(cloth.hinges, position)
         return Fold(angle=angle, gradient=gradient)
     xi, xj, xk, xl = (position[cloth.hinges[:, c]] for c in range(4))
     edge = xj - xi
@@ -62,7 +62,7 @@ def fold(cloth: Cloth, position: Tensor) -> Fold:
 
 def fold_angle(cloth: Cloth, position: Tensor) -> Tensor:
     """Fold angles (hinge, batch) [rad] alone."""
-    return fields.fold_angle(cloth.hinges, position) if fields.usable(position) else fold(cloth, position).angle
+    return on_mesh.fold_angle(cloth.hinges, position) if on_mesh.usable(position) else fold(cloth, position).angle
 
 
 def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:

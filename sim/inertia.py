@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.kernel import fields
+from sim.kernel import on_mesh
 
 
 def rest_areas(cloth: Cloth) -> Tensor:
@@ -37,16 +37,16 @@ def mean_normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tenso
 
 def _sixths(cloth: Cloth, position: Tensor) -> Tensor:
     """A third of the faces' normals, as long as the faces are large: (face, 3, batch) [m²]."""
-    if fields.usable(position):
-        return fields.sixths(cloth.faces, position)
+    if on_mesh.usable(position):
+        return on_mesh.sixths(cloth.faces, position)
     x0, x1, x2 = cloth.at_corners(position)
     return torch.linalg.cross(x1 - x0, x2 - x0, dim=1) / 6
 
 
 def _sixth_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
     """Their time derivative: (face, 3, batch) [m²/s]."""
-    if fields.usable(position, velocity):
-        return fields.sixth_rates(cloth.faces, position, velocity)
+    if on_mesh.usable(position, velocity):
+        return on_mesh.sixth_rates(cloth.faces, position, velocity)
     x0, x1, x2 = cloth.at_corners(position)
     v0, v1, v2 = cloth.at_corners(velocity)
     return (torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)) / 6

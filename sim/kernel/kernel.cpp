@@ -1,7 +1,7 @@
 // One block after the other, in float32 and float64, with blocks of as many members as fit a vector register, or half.
 
 #include "block.hpp"
-#include "fields.hpp"
+#include "on_mesh.hpp"
 #include "implicit.hpp"
 
 namespace {
@@ -33,26 +33,26 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
 
 }  // namespace
 
-// What fields.py calls, for numbers of type T, taken L members at a time.
+// What on_mesh.py calls, for numbers of type T, taken L members at a time.
 #define FIELDS(T, L, name)                                                                                           \
-  void face_wind_##name(const int64_t* face, int64_t faces, int64_t batch, fields::View<T> position,                 \
-                        fields::View<T> velocity, fields::View<T> wind, T* normal, T* relative, T* across) {         \
-    fields::Fields<T, L>::face_wind(face, faces, batch, position, velocity, wind, normal, relative, across);         \
+  void face_wind_##name(const int64_t* face, int64_t faces, int64_t batch, on_mesh::View<T> position,                 \
+                        on_mesh::View<T> velocity, on_mesh::View<T> wind, T* normal, T* relative, T* across) {         \
+    on_mesh::Fields<T, L>::face_wind(face, faces, batch, position, velocity, wind, normal, relative, across);         \
   }                                                                                                                  \
-  void normals_##name(const int64_t* face, int64_t faces, int64_t batch, fields::View<T> position, T* sixth) {       \
-    fields::Fields<T, L>::normals(face, faces, batch, position, sixth);                                              \
+  void normals_##name(const int64_t* face, int64_t faces, int64_t batch, on_mesh::View<T> position, T* sixth) {       \
+    on_mesh::Fields<T, L>::normals(face, faces, batch, position, sixth);                                              \
   }                                                                                                                  \
-  void normal_rates_##name(const int64_t* face, int64_t faces, int64_t batch, fields::View<T> position,              \
-                           fields::View<T> velocity, T* sixth) {                                                     \
-    fields::Fields<T, L>::normal_rates(face, faces, batch, position, velocity, sixth);                               \
+  void normal_rates_##name(const int64_t* face, int64_t faces, int64_t batch, on_mesh::View<T> position,              \
+                           on_mesh::View<T> velocity, T* sixth) {                                                     \
+    on_mesh::Fields<T, L>::normal_rates(face, faces, batch, position, velocity, sixth);                               \
   }                                                                                                                  \
   void gather_##name(const T* const* corner, int64_t corners, int64_t elements, const int64_t* slots, int64_t k,     \
                      int64_t vertices, int64_t width, T* total) {                                                    \
-    fields::Fields<T, L>::gather(corner, corners, elements, slots, k, vertices, width, total);                       \
+    on_mesh::Fields<T, L>::gather(corner, corners, elements, slots, k, vertices, width, total);                       \
   }                                                                                                                  \
-  void fold_##name(const int64_t* hinge, int64_t hinges, int64_t batch, fields::View<T> position, T* angle,          \
+  void fold_##name(const int64_t* hinge, int64_t hinges, int64_t batch, on_mesh::View<T> position, T* angle,          \
                    T* const* gradient) {                                                                             \
-    fields::Fields<T, L>::fold(hinge, hinges, batch, position, angle, gradient);                                     \
+    on_mesh::Fields<T, L>::fold(hinge, hinges, batch, position, angle, gradient);                                     \
   }
 
 // What fused.py calls, for numbers of type T, L members a block.

@@ -19,7 +19,7 @@ _NAMES = {torch.float32: "f32", torch.float64: "f64"}
 
 
 class _View(ctypes.Structure):
-    """Mirrors `fields::View` of fields.hpp."""
+    """Mirrors `on_mesh::View` of on_mesh.hpp."""
 
     _fields_ = [("data", ctypes.c_void_p), ("vertex", ctypes.c_int64), ("component", ctypes.c_int64)]
 
