@@ -22,13 +22,21 @@ void forces(const Problem<T>* p, int64_t blocks, void* lists, const T* x, const 
     Block<T, L>(*p, b, blocks, of_block + b).forces(x + b * size, v + b * size, T(share), f + b * size);
 }
 
-// One backward Euler step; `failed` (blocks, L) tells which members' solves did not converge.
+// Backward Euler steps, for each of which there are a wind and targets of the handles: (steps, blocks, ...). `failed`
+// (blocks, L) tells which members' solves did not converge.
 template <typename T, int L>
 void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag, double tolerance,
-              int64_t iterations) {
+              int64_t iterations, int64_t steps) {
   const int64_t size = p->vertices * 3 * L;
-  for (int64_t b = 0; b < blocks; ++b)
-    Implicit<T, L>(*p, b, blocks).step(x + b * size, v + b * size, failed + b * L, T(h), T(lag), tolerance, iterations);
+  for (int64_t b = 0; b < blocks; ++b) {
+    Problem<T> now = *p;
+    Implicit<T, L> block(now, b, blocks);
+    for (int64_t s = 0; s < steps; ++s) {
+      block.step(x + b * size, v + b * size, failed + b * L, T(h), T(lag), tolerance, iterations);
+      now.wind += blocks * 3 * L;
+      now.targets += blocks * p->held * 3 * L;
+    }
+  }
 }
 
 }  // namespace
@@ -67,13 +75,14 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
     forces<T, L>(p, blocks, lists, x, v, f, share);                                                                  \
   }                                                                                                                  \
   void implicit_##name(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag,       \
-                       double tolerance, int64_t iterations) {                                                       \
-    implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations);                                          \
+                       double tolerance, int64_t iterations, int64_t steps) {                                        \
+    implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations, steps);                                   \
   }
 
 extern "C" {
 FOR(float, 16, f32)
 FOR(float, 8, f32_few)
+FOR(float, 4, f32_fewest)
 FOR(double, 8, f64)
 FIELDS(float, 16, f32)
 FIELDS(double, 8, f64)
