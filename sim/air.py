@@ -43,6 +43,10 @@ class AirForce(Protocol):
         """The quadratic-normal force nearest to it, of which the compiled kernel takes care."""
         ...
 
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """What `force` has more than `plain`: (vertex, 3, batch) [N]."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True)
 class FaceWind:
@@ -110,6 +114,10 @@ class QuadraticNormal:
         push = third * (self.density * seen.across.abs() * seen.across * seen.normal + self.drag * seen.along)
         return cloth.shared_out(push)
 
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """Nothing: (vertex, 3, batch) [N]."""
+        return torch.zeros_like(position)
+
 
 NO_AIR = QuadraticNormal(density=0.0)
 
@@ -140,6 +148,10 @@ class Stokes:
         areas = torch.tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
         coefficient = 6 * math.pi * self.viscosity * (areas / math.pi).sqrt()
         return coefficient[:, None, None] * (wind - velocity)
+
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """All of it: (vertex, 3, batch) [N]."""
+        return self.force(cloth, position, velocity, wind)
 
 
 AIR_FORCES = Registry(

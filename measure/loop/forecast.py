@@ -334,27 +334,37 @@ class Forecaster:
 
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
         """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker
-        was not tracked."""
-        return self.run(system, state, segments)[0]
+        was not tracked.
+
+        Args:
+            system, state: a member for each of the segments, once or several times over.
+        """
+        errors, _ = self._run(partial(self.integrator.advance, system, duration=segments.period), state, segments)
+        return torch.stack(errors)
 
     def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
         """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
-        return self._run(partial(self.integrator.advance, system, duration=segments.period), state, segments)
+        advance = partial(self.integrator.advance, system, duration=segments.period)
+        errors, predictions = self._run(advance, state, segments)
+        return torch.stack(errors), torch.stack(predictions)
 
-    def _run(self, advance: Callable[[State], State], state: State, segments: Segments) -> tuple[Tensor, Tensor]:
-        """The same of what advances a state by a period."""
-        period = segments.period
+    def _run(
+        self, advance: Callable[[State], State], state: State, segments: Segments
+    ) -> tuple[list[Tensor], list[Tensor]]:
+        """The same of what advances a state by a period, frame by frame."""
+        period, copies = segments.period, state.position.shape[-1] // len(segments)
         seen = self._real(segments.positions)
-        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64))
-        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
-        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]) / (2 * period)
+        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64)).repeat(1, 1, copies)
+        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1]).repeat(1, 1, copies)
+        v = torch.einsum("vm,mcb->vcb", self._lifted, (seen[2] - seen[0]) / (2 * period)).repeat(1, 1, copies)
         state = replace(state, position=x, velocity=v, time=period)
-        errors, predictions = [], []
+        errors: list[Tensor] = []
+        predictions: list[Tensor] = []
         with torch.no_grad():
             for k in range(2, len(seen)):
                 state = advance(state)
                 predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
-                error = seen[k] - predicted
+                error = (seen[k][:, :, None] - predicted.unflatten(-1, (copies, -1))).flatten(2)
                 if mask is not None:
                     error = error * mask[k][:, None]
                 if k >= segments.first:
@@ -364,7 +374,7 @@ class Forecaster:
                 state = replace(
                     state, position=state.position + lifted, velocity=state.velocity + lifted / period, time=k * period
                 )
-        return torch.stack(errors), torch.stack(predictions)
+        return errors, predictions
 
     def sensitivity(
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
@@ -414,12 +424,11 @@ class Forecaster:
         together = math.ceil(len(batches) * len(segments) / WIDEST)
         found: list[Tensor] = []
         for chosen in np.array_split(np.arange(len(batches)), together):
-            copies = segments.select(list(range(len(segments))) * len(chosen))
             joint, start = JointBatch.of([batches[place] for place in chosen])
             errors, _ = self._run(
-                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, copies
+                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, segments
             )
-            found += errors.split(len(segments), dim=-1)
+            found += torch.stack(errors).split(len(segments), dim=-1)
         return found
 
 

@@ -30,9 +30,8 @@ _BLOCKED = (
     "tie_stiffness", "tie_slack", "wind", "targets", "rate", "tie_targets", "tie_rate",
 )  # fmt: skip
 
-_FEW, _FEWEST = 8, 4
-"""Members that fit a narrow block: half of a wide one, with 0.6 (backward Euler) to 0.9 (leapfrog) of its time, or a
-quarter of it."""
+_FEW = 8
+"""Members that fit a narrow block: half of a wide one, with 0.6 (backward Euler) to 0.9 (leapfrog) of its time."""
 
 _CONTACT_POINTERS = ("face", "vertex_area", "centre", "apart", "group", "group_rest", "block")
 _CONTACT_SCALARS = ("thickness", "stiffness", "friction")
@@ -329,9 +328,7 @@ def _kind(system: System) -> str:
     """
     if system.cloth.dtype == torch.float64:
         return "f64"
-    if system.cloth.batch > _FEW or system.contact is not None:
-        return "f32"
-    return "f32_few" if system.cloth.batch > _FEWEST else "f32_fewest"
+    return "f32_few" if system.cloth.batch <= _FEW and system.contact is None else "f32"
 
 
 def _to_blocks(tensor: Tensor, lanes: int, blocks: int) -> Tensor:

@@ -82,7 +82,6 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
 extern "C" {
 FOR(float, 16, f32)
 FOR(float, 8, f32_few)
-FOR(float, 4, f32_fewest)
 FOR(double, 8, f64)
 FIELDS(float, 16, f32)
 FIELDS(double, 8, f64)
