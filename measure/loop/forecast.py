@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -283,6 +284,7 @@ class Forecaster:
         markers: (marker, 2) [m].
         integrator: of the model.
         dtype, device: of the tensors.
+        workers: threads among which batches that run jointly are shared out; members do not depend on it.
     """
 
     specimen: Specimen
@@ -290,6 +292,7 @@ class Forecaster:
     integrator: SplitEuler
     dtype: torch.dtype = torch.float32
     device: torch.device | str = "cpu"
+    workers: int = 1
 
     @cached_property
     def _seen(self) -> Tensor:
@@ -419,17 +422,21 @@ class Forecaster:
     def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
         """`errors` of each of some batches of the same segments.
 
-        They run in one joint batch: small batches cost nearly as much as larger ones.
+        They run in one joint batch, or one for each worker: small batches cost nearly as much as larger ones.
         """
-        together = math.ceil(len(batches) * len(segments) / WIDEST)
-        found: list[Tensor] = []
-        for chosen in np.array_split(np.arange(len(batches)), together):
+
+        def run(chosen: NDArray[np.int64]) -> Sequence[Tensor]:
             joint, start = JointBatch.of([batches[place] for place in chosen])
             errors, _ = self._run(
                 partial(self.integrator.advance_jointly, joint, duration=segments.period), start, segments
             )
-            found += torch.stack(errors).split(len(segments), dim=-1)
-        return found
+            return torch.stack(errors).split(len(segments), dim=-1)
+
+        together = max(math.ceil(len(batches) * len(segments) / WIDEST), min(self.workers, len(batches)))
+        shares = [np.arange(len(batches))[place::together] for place in range(together)]
+        with ThreadPoolExecutor(self.workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            done = list(pool.map(run, shares))
+        return [done[place % together][place // together] for place in range(len(batches))]
 
 
 def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:

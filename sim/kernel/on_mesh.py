@@ -1,8 +1,8 @@
 """Fields on the faces and hinges of a mesh by the compiled library: what effects look at in every step.
 
-The torch source (`sim.air`, `sim.cloth`, `sim.inertia`, `sim.bending`) is the definition, and what runs where gradients
-are wanted, on other devices, and where the library cannot be built. A chain of torch calls writes and reads a whole field
-for every operation; here all of them are done while a face is in registers.
+The torch source (`sim.air`, `sim.cloth`, `sim.inertia`, `sim.bending`) is the definition, and what runs where
+gradients are wanted, on other devices, and where the library cannot be built. A chain of torch calls writes and reads a
+whole field for every operation; here all of them are done while a face is in registers.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def usable(*tensors: Tensor) -> bool:
 
 
 def face_wind(faces: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Unit normals (face, 3, batch), relative wind (face, 3, batch) and its part along the normals (face, 1, batch): see
-    `sim.air.FaceWind`.
+    """Unit normals (face, 3, batch), relative wind (face, 3, batch) and its part along the normals (face, 1, batch),
+    see `sim.air.FaceWind`.
 
     Args:
         faces: (face, 3) vertices.
@@ -78,7 +78,7 @@ def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
 
 
 def fold(hinges: Tensor, position: Tensor) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor, Tensor]]:
-    """Fold angles (hinge, batch) of hinges (hinge, 4) and their gradients at the four corners: see `sim.bending.Fold`."""
+    """Fold angles (hinge, batch) of hinges (hinge, 4) and their gradients at the corners: see `sim.bending.Fold`."""
     i, j, k, opposite = (position.new_empty((len(hinges), 3, position.shape[-1])) for _ in range(4))
     return _folded(hinges, position, _places([i, j, k, opposite])), (i, j, k, opposite)
 
