@@ -359,7 +359,7 @@ class Forecaster:
         seen = self._real(segments.positions)
         mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64)).repeat(1, 1, copies)
         x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1]).repeat(1, 1, copies)
-        v = torch.einsum("vm,mcb->vcb", self._lifted, (seen[2] - seen[0]) / (2 * period)).repeat(1, 1, copies)
+        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]).repeat(1, 1, copies) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
         errors: list[Tensor] = []
         predictions: list[Tensor] = []

@@ -264,40 +264,29 @@ class Block {
     }
   }
 
-  // Gradients of a fold angle at the opposite corners k and l; at the edge's ends i and j they are
-  // (w0 - 1) left + (w1 - 1) right and -w0 left - w1 right.
-  struct Gradient {
-    V3 left, right;
-    V w0, w1;
-    void at_corners(V3 g[4]) const {
-      g[0] = combine(left, w0 - 1, right, w1 - 1);
-      g[1] = combine(left, -w0, right, -w1);
-      g[2] = left;
-      g[3] = right;
-    }
-  };
-
-  // Fold angle of a hinge.
-  V fold(const T* x, int64_t e, Gradient& g) const {
+  // Fold angle of a hinge and its gradients at the corners i, j, k, l.
+  void fold(const T* x, int64_t e, V3 g[4], V& angle) const {
     const int32_t* c = p.hinge + 4 * e;
     const V3 xi = load3(x + 3 * L * int64_t(c[0]));
-    return fold(sub(load3(x + 3 * L * int64_t(c[1])), xi), sub(load3(x + 3 * L * int64_t(c[2])), xi),
-                sub(load3(x + 3 * L * int64_t(c[3])), xi), g);
+    fold(sub(load3(x + 3 * L * int64_t(c[1])), xi), sub(load3(x + 3 * L * int64_t(c[2])), xi),
+         sub(load3(x + 3 * L * int64_t(c[3])), xi), g, angle);
   }
 
   // The same by the vectors from i to j, k and l.
-  static V fold(V3 edge, V3 left, V3 right, Gradient& g) {
+  static void fold(V3 edge, V3 left, V3 right, V3 g[4], V& angle) {
     const V3 normal0 = cross(edge, left), normal1 = cross(right, edge);
     const V square = dot(edge, edge), length = root(square);
     const V doubled0 = root(dot(normal0, normal0)), doubled1 = root(dot(normal1, normal1));
     const V floor = T(1e-3) * square, tiny = splat(T(1e-30));
     const V3 n0 = scale(normal0, 1 / maximum(doubled0, tiny)), n1 = scale(normal1, 1 / maximum(doubled1, tiny));
-    g.left = scale(n0, length / maximum(doubled0, floor));
-    g.right = scale(n1, length / maximum(doubled1, floor));
+    g[2] = scale(n0, length / maximum(doubled0, floor));
+    g[3] = scale(n1, length / maximum(doubled1, floor));
     const V inverse = 1 / square;
-    g.w0 = dot(edge, left) * inverse, g.w1 = dot(edge, right) * inverse;
+    const V w0 = dot(edge, left) * inverse, w1 = dot(edge, right) * inverse;
     const V sine = -dot(edge, cross(n0, n1)) / length, cosine = dot(n0, n1);
-    return arctangent2(sine, cosine);
+    angle = arctangent2(sine, cosine);
+    g[0] = combine(g[2], w0 - 1, g[3], w1 - 1);
+    g[1] = combine(g[2], -w0, g[3], -w1);
   }
 
   // k S / 2 of a hinge at a fold angle.
@@ -321,11 +310,9 @@ class Block {
   void hinges(const T* x, const T* v, T* f) const {
     for (int64_t e = 0; e < p.hinges; ++e) {
       const int32_t* c = p.hinge + 4 * e;
-      Gradient gradient;
-      const V angle = fold(x, e, gradient);
       V3 g[4];
-      gradient.at_corners(g);
-      V rate = V{};
+      V angle, rate = V{};
+      fold(x, e, g, angle);
       for (int i = 0; i < 4; ++i) rate += dot(g[i], load3(v + 3 * L * int64_t(c[i])));
       const V moment = -bending(e, angle) * (angle + damping * rate);
       for (int i = 0; i < 4; ++i) add3(f + 3 * L * int64_t(c[i]), scale(g[i], moment));

@@ -20,7 +20,7 @@ class Implicit : Block<T, L> {
     V k0, k1, k2, k3, tu, tv;  // stiffness times rest area
   };
   struct Hinge {
-    typename Base::Gradient gradient;
+    V3 gradient[4];
     V k;
   };
   std::vector<Face> faces_;
@@ -77,13 +77,12 @@ class Implicit : Block<T, L> {
     for (int64_t e = 0; e < p.hinges; ++e) {
       const int32_t* c = p.hinge + 4 * e;
       Hinge& s = hinges_[e];
-      const V angle = this->fold(x, e, s.gradient);
+      V angle;
+      this->fold(x, e, s.gradient, angle);
       s.k = this->bending(e, angle);
-      V3 g[4];
-      s.gradient.at_corners(g);
       for (int i = 0; i < 4; ++i) {
-        add(f, c[i], scale(g[i], -s.k * angle));
-        add(d, c[i], scale(square(g[i]), s.k));
+        add(f, c[i], scale(s.gradient[i], -s.k * angle));
+        add(d, c[i], scale(square(s.gradient[i]), s.k));
       }
     }
   }
@@ -106,16 +105,9 @@ class Implicit : Block<T, L> {
     for (int64_t e = 0; e < p.hinges; ++e) {
       const int32_t* c = p.hinge + 4 * e;
       const Hinge& s = hinges_[e];
-      const auto& [left, right, w0, w1] = s.gradient;
-      const V3 f0 = get(field, c[0]), edge = sub(f0, get(field, c[1]));
-      const V rate = dot(left, combine(sub(get(field, c[2]), f0), splat(1), edge, w0)) +
-                     dot(right, combine(sub(get(field, c[3]), f0), splat(1), edge, w1));
-      const V moment = s.k * rate;
-      const V3 l = scale(left, moment), r = scale(right, moment), j = combine(l, -w0, r, -w1);
-      add(product, c[0], {-l.x - r.x - j.x, -l.y - r.y - j.y, -l.z - r.z - j.z});
-      add(product, c[1], j);
-      add(product, c[2], l);
-      add(product, c[3], r);
+      V rate = V{};
+      for (int i = 0; i < 4; ++i) rate += dot(s.gradient[i], get(field, c[i]));
+      for (int i = 0; i < 4; ++i) add(product, c[i], scale(s.gradient[i], s.k * rate));
     }
     if (p.stiffness > 0)
       for (int64_t h = 0; h < p.held; ++h)

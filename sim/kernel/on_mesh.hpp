@@ -131,14 +131,12 @@ class Fields : Block<T, L> {
       for (int64_t e = 0; e < hinges; ++e) {
         const int64_t* c = hinge + 4 * e;
         const V3 xi = get(x, c[0], size);
-        typename Base::Gradient bent;
-        const V own =
-            Base::fold(sub(get(x, c[1], size), xi), sub(get(x, c[2], size), xi), sub(get(x, c[3], size), xi), bent);
-        store(angle + batch * e + from, own, size);
-        if (!gradient) continue;
         V3 g[4];
-        bent.at_corners(g);
-        for (int i = 0; i < 4; ++i) put(gradient[i] + from, e, batch, g[i], size);
+        V bent;
+        Base::fold(sub(get(x, c[1], size), xi), sub(get(x, c[2], size), xi), sub(get(x, c[3], size), xi), g, bent);
+        store(angle + batch * e + from, bent, size);
+        if (gradient)
+          for (int i = 0; i < 4; ++i) put(gradient[i] + from, e, batch, g[i], size);
       }
     });
   }
