@@ -25,6 +25,7 @@ from torch import Tensor
 from flagdata.errors import InputError
 from flagdata.registry import Registry
 from sim.cloth import Cloth
+from sim.kernel import on_mesh
 
 # Dynamic viscosity of air at 288.15 K, U.S. Standard Atmosphere 1976, table 4.
 _VISCOSITY = 1.789e-5
@@ -40,6 +41,10 @@ class AirForce(Protocol):
     @property
     def plain(self) -> QuadraticNormal:
         """The quadratic-normal force nearest to it, of which the compiled kernel takes care."""
+        ...
+
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """What `force` has more than `plain`: (vertex, 3, batch) [N]."""
         ...
 
 
@@ -65,6 +70,9 @@ class FaceWind:
 
 def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> FaceWind:
     """The relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+    if on_mesh.usable(position, velocity, wind):
+        normal, relative, across = on_mesh.face_wind(cloth.faces, position, velocity, wind)
+        return FaceWind(normal=normal, relative=relative, across=across)
     x0, x1, x2 = cloth.at_corners(position)
     normal = torch.linalg.cross(x1 - x0, x2 - x0, dim=1)
     length = (normal * normal).sum(1, keepdim=True).sqrt()
@@ -106,6 +114,10 @@ class QuadraticNormal:
         push = third * (self.density * seen.across.abs() * seen.across * seen.normal + self.drag * seen.along)
         return cloth.shared_out(push)
 
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """Nothing: (vertex, 3, batch) [N]."""
+        return torch.zeros_like(position)
+
 
 NO_AIR = QuadraticNormal(density=0.0)
 
@@ -136,6 +148,10 @@ class Stokes:
         areas = torch.tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
         coefficient = 6 * math.pi * self.viscosity * (areas / math.pi).sqrt()
         return coefficient[:, None, None] * (wind - velocity)
+
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """All of it: (vertex, 3, batch) [N]."""
+        return self.force(cloth, position, velocity, wind)
 
 
 AIR_FORCES = Registry(

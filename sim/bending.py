@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth, gather_sum
+from sim.kernel import on_mesh
 from sim.tables import bending_stiffness
 
 # Lengths below this share of the edge are held there, so that a collapsed triangle pushes back with a finite force.
@@ -30,6 +31,9 @@ class Fold:
 
 def fold(cloth: Cloth, position: Tensor) -> Fold:
     """Fold angles of positions (vertex, 3, batch) [m], in (−π, π]."""
+    if on_mesh.usable(position):
+        angle, gradient = on_mesh.fold(cloth.hinges, position)
+        return Fold(angle=angle, gradient=gradient)
     xi, xj, xk, xl = (position[cloth.hinges[:, c]] for c in range(4))
     edge = xj - xi
     left, right = xk - xi, xl - xi
@@ -54,6 +58,11 @@ def fold(cloth: Cloth, position: Tensor) -> Fold:
         angle=torch.atan2(sine, cosine),
         gradient=(-(1 - w0) * gk - (1 - w1) * gl, -w0 * gk - w1 * gl, gk, gl),
     )
+
+
+def fold_angle(cloth: Cloth, position: Tensor) -> Tensor:
+    """Fold angles (hinge, batch) [rad] alone."""
+    return on_mesh.fold_angle(cloth.hinges, position) if on_mesh.usable(position) else fold(cloth, position).angle
 
 
 def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
@@ -88,7 +97,7 @@ def force(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
 
 def energy(cloth: Cloth, position: Tensor) -> Tensor:
     """Stored energy k S θ²/4: (batch,) [J]; exact for constant stiffness."""
-    angle = fold(cloth, position).angle
+    angle = fold_angle(cloth, position)
     return (stiffness(cloth, angle) * angle**2).sum(0) / 2
 
 

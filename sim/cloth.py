@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
+from sim.kernel import on_mesh
 from sim.material import Material
 from sim.mesh import Mesh
 from sim.tables import GRIDS, Evaluation, StrainGrid, bending_segments, direction_rows, sample_stretching
@@ -203,6 +204,8 @@ def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
     Returns:
         (vertex, 3, batch).
     """
+    if on_mesh.usable(*corners):
+        return on_mesh.gather_sum(corners, slots)
     stacked = torch.cat([*corners, torch.zeros_like(corners[0][:1])])
     first, *others = stacked.index_select(0, slots.reshape(-1)).unflatten(0, tuple(slots.shape))
     total = first.clone()

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
+from sim.kernel import on_mesh
 
 
 def rest_areas(cloth: Cloth) -> Tensor:
@@ -26,17 +27,29 @@ def rest_areas(cloth: Cloth) -> Tensor:
 
 def mean_normals(cloth: Cloth, position: Tensor) -> Tensor:
     """Mean normals at the vertices (see above): (vertex, 3, batch)."""
-    x0, x1, x2 = cloth.at_corners(position)
-    sixth = torch.linalg.cross(x1 - x0, x2 - x0, dim=1) / 6
-    return cloth.shared_out(sixth) / rest_areas(cloth)[:, None, None]
+    return cloth.shared_out(_sixths(cloth, position)) / rest_areas(cloth)[:, None, None]
 
 
 def mean_normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
     """Their time derivative: (vertex, 3, batch) [1/s]."""
+    return cloth.shared_out(_sixth_rates(cloth, position, velocity)) / rest_areas(cloth)[:, None, None]
+
+
+def _sixths(cloth: Cloth, position: Tensor) -> Tensor:
+    """A third of the faces' normals, as long as the faces are large: (face, 3, batch) [m²]."""
+    if on_mesh.usable(position):
+        return on_mesh.sixths(cloth.faces, position)
+    x0, x1, x2 = cloth.at_corners(position)
+    return torch.linalg.cross(x1 - x0, x2 - x0, dim=1) / 6
+
+
+def _sixth_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
+    """Their time derivative: (face, 3, batch) [m²/s]."""
+    if on_mesh.usable(position, velocity):
+        return on_mesh.sixth_rates(cloth.faces, position, velocity)
     x0, x1, x2 = cloth.at_corners(position)
     v0, v1, v2 = cloth.at_corners(velocity)
-    sixth = (torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)) / 6
-    return cloth.shared_out(sixth) / rest_areas(cloth)[:, None, None]
+    return (torch.linalg.cross(v1 - v0, x2 - x0, dim=1) + torch.linalg.cross(x1 - x0, v2 - v0, dim=1)) / 6
 
 
 def effective(force: Tensor, *, mass: Tensor, added: Tensor, normals: Tensor) -> Tensor:

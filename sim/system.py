@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -317,15 +318,22 @@ class System:
 
     def drive(self, start: float, end: float) -> Drive:
         """Wind and handles between two times [s], taken as linear."""
-        offset = (self.offset(start), self.offset(end))
-        first, last = self._targets(start, offset[0]), self._targets(end, offset[1])
-        return Drive(
-            wind=(self.wind.velocity(start), self.wind.velocity(end)),
-            targets=(first, last),
-            rate=(last - first) / (end - start),
-            offset=offset,
-            drift=(offset[1] - offset[0]) / (end - start),
-        )
+        (drive,) = self.drives((start, end))
+        return drive
+
+    def drives(self, times: Sequence[float]) -> list[Drive]:
+        """The same between each two times that follow one another."""
+        winds = [self.wind.velocity(time) for time in times]
+        offsets = [self.offset(time) for time in times]
+        targets = [self._targets(time, offset) for time, offset in zip(times, offsets, strict=True)]
+        return [
+            Drive(
+                wind=(winds[k], winds[k + 1]), targets=(targets[k], targets[k + 1]),
+                rate=(targets[k + 1] - targets[k]) / (end - start), offset=(offsets[k], offsets[k + 1]),
+                drift=(offsets[k + 1] - offsets[k]) / (end - start),
+            )
+            for k, (start, end) in enumerate(pairwise(times))
+        ]  # fmt: skip
 
     @property
     def sprung(self) -> bool:
@@ -401,9 +409,11 @@ class System:
         undisturbed = torch.lerp(*drive.wind, share)
         wind = self.local(undisturbed, time, position)
         total = torch.zeros_like(position)
-        if self.flows or self.air is not self.air.plain:
+        if self.flows:
             total = total + self.air.force(self.cloth, position, velocity, wind)
             total = total - self.air.plain.force(self.cloth, position, velocity, undisturbed)
+        elif self.air is not self.air.plain:
+            total = total + self.air.beyond(self.cloth, position, velocity, wind)
         moving = velocity if effect_velocity is None else effect_velocity
         return self._with_added(total, wind, time, position, moving, memory)
 

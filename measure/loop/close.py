@@ -69,7 +69,7 @@ class Options:
         nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
-        workers: processes for the nulls, then threads for the models that are refitted.
+        workers: processes for the nulls, then threads for sensitivities and for the models that are refitted.
 
     Raises:
         UsageError: a level or counts that make no sense.
@@ -116,7 +116,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
             "a verdict on a cloth whose attachments move: null experiments of such cloths are not simulated",
             where="close-loop", fix="hold the cloth still, or compare forecasts (measure.loop.forecast) yourself",
         )  # fmt: skip
-    setting = Setting.of(experiment)
+    setting = Setting.of(experiment, workers=options.workers)
     tell("sensitivities", 0, 1)
     found, projection = _looked_at(setting)
     late = (0.0,) * len(setting.speeds) if found.course is None else lags(found.course, setting.segments)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -283,6 +284,7 @@ class Forecaster:
         markers: (marker, 2) [m].
         integrator: of the model.
         dtype, device: of the tensors.
+        workers: threads among which batches that run jointly are shared out; members do not depend on it.
     """
 
     specimen: Specimen
@@ -290,6 +292,7 @@ class Forecaster:
     integrator: SplitEuler
     dtype: torch.dtype = torch.float32
     device: torch.device | str = "cpu"
+    workers: int = 1
 
     @cached_property
     def _seen(self) -> Tensor:
@@ -334,27 +337,37 @@ class Forecaster:
 
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
         """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker
-        was not tracked."""
-        return self.run(system, state, segments)[0]
+        was not tracked.
+
+        Args:
+            system, state: a member for each of the segments, once or several times over.
+        """
+        errors, _ = self._run(partial(self.integrator.advance, system, duration=segments.period), state, segments)
+        return torch.stack(errors)
 
     def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
         """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
-        return self._run(partial(self.integrator.advance, system, duration=segments.period), state, segments)
+        advance = partial(self.integrator.advance, system, duration=segments.period)
+        errors, predictions = self._run(advance, state, segments)
+        return torch.stack(errors), torch.stack(predictions)
 
-    def _run(self, advance: Callable[[State], State], state: State, segments: Segments) -> tuple[Tensor, Tensor]:
-        """The same of what advances a state by a period."""
-        period = segments.period
+    def _run(
+        self, advance: Callable[[State], State], state: State, segments: Segments
+    ) -> tuple[list[Tensor], list[Tensor]]:
+        """The same of what advances a state by a period, frame by frame."""
+        period, copies = segments.period, state.position.shape[-1] // len(segments)
         seen = self._real(segments.positions)
-        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64))
-        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1])
-        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]) / (2 * period)
+        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64)).repeat(1, 1, copies)
+        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1]).repeat(1, 1, copies)
+        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]).repeat(1, 1, copies) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
-        errors, predictions = [], []
+        errors: list[Tensor] = []
+        predictions: list[Tensor] = []
         with torch.no_grad():
             for k in range(2, len(seen)):
                 state = advance(state)
                 predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
-                error = seen[k] - predicted
+                error = (seen[k][:, :, None] - predicted.unflatten(-1, (copies, -1))).flatten(2)
                 if mask is not None:
                     error = error * mask[k][:, None]
                 if k >= segments.first:
@@ -364,7 +377,7 @@ class Forecaster:
                 state = replace(
                     state, position=state.position + lifted, velocity=state.velocity + lifted / period, time=k * period
                 )
-        return torch.stack(errors), torch.stack(predictions)
+        return errors, predictions
 
     def sensitivity(
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
@@ -409,18 +422,21 @@ class Forecaster:
     def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
         """`errors` of each of some batches of the same segments.
 
-        They run in one joint batch: small batches cost nearly as much as larger ones.
+        They run in one joint batch, or one for each worker: small batches cost nearly as much as larger ones.
         """
-        together = math.ceil(len(batches) * len(segments) / WIDEST)
-        found: list[Tensor] = []
-        for chosen in np.array_split(np.arange(len(batches)), together):
-            copies = segments.select(list(range(len(segments))) * len(chosen))
+
+        def run(chosen: NDArray[np.int64]) -> Sequence[Tensor]:
             joint, start = JointBatch.of([batches[place] for place in chosen])
             errors, _ = self._run(
-                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, copies
+                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, segments
             )
-            found += errors.split(len(segments), dim=-1)
-        return found
+            return torch.stack(errors).split(len(segments), dim=-1)
+
+        together = max(math.ceil(len(batches) * len(segments) / WIDEST), min(self.workers, len(batches)))
+        shares = [np.arange(len(batches))[place::together] for place in range(together)]
+        with ThreadPoolExecutor(self.workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            done = list(pool.map(run, shares))
+        return [done[place % together][place // together] for place in range(len(batches))]
 
 
 def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:

@@ -76,7 +76,7 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
         acting = [
             column.at(strengths[:, place].repeat_interleave(count)) for place, (column, _) in enumerate(own[0].effects)
         ]
-        found += forecaster.errors(*apply(acting, *batch), copies).split(count, dim=-1)
+        found += forecaster.errors(*apply(acting, *batch), segments).split(count, dim=-1)
     return found
 
 

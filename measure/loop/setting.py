@@ -34,11 +34,17 @@ class Setting:
     calibration: Calibration
 
     @classmethod
-    def of(cls, experiment: Experiment) -> Setting:
-        """Raises InputError: recordings that cannot be used together, or are too short."""
+    def of(cls, experiment: Experiment, *, workers: int = 1) -> Setting:
+        """With a model that uses so many threads.
+
+        Raises:
+            InputError: recordings that cannot be used together, or are too short.
+        """
         turned = aligned(experiment)
         segments = Segments.of(turned.recordings)
-        forecaster = Forecaster(specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler())
+        forecaster = Forecaster(
+            specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler(), workers=workers
+        )
         return cls(experiment=turned, segments=segments, forecaster=forecaster, calibration=Calibration())
 
     @property

@@ -199,93 +199,88 @@ def statistics(
 
     The columns of the result are `THETA`'s, then those given.
     """
-    return Statistics.joined([found for found, *_ in _pieces(forecaster, segments, calibrations, columns)])
+    return Statistics.joined([piece.found for piece in _pieces(forecaster, segments, calibrations, columns)])
 
 
 def projected(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> tuple[Statistics, Projection]:
-    """The same, with the directions: 4 MB a segment of 50 frames, 190 markers and 36 columns."""
+    """The same, with how they move with what the wind's log may be off by, and with the directions, 4 MB a segment of
+    50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
-    pieces: list[Projection] = []
-    pole_moments: list[PoleMoment] = []
-    turning: list[Tensor] = []
-    gauges: list[Gauge] = []
-    for found, changes, scale, pole_moment, gauge in _pieces(forecaster, segments, calibrations, columns, log=True):
-        parts.append(found)
-        pieces.append(Projection.along(changes, scale))
-        pole_moments.append(pole_moment)
-        turning.append(_moments(pole_moment, changes)[1])
-        gauges.append(gauge)
+    along: list[Projection] = []
+    pieces = list(_pieces(forecaster, segments, calibrations, columns))
+    for piece in pieces:
+        own = Projection.along(piece.changes, piece.scale)
+        off = sensitivities(forecaster, piece.segments, piece.calibrations, piece.base)
+        parts.append(_with_log(piece, own, off))
+        along.append(own)
     whole = Projection(
-        directions=torch.cat([piece.directions for piece in pieces]),
+        directions=torch.cat([own.directions for own in along]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
-        pole_moment=PoleMoment.joined(pole_moments), turning=torch.cat(turning), gauge=Gauge.joined(gauges),
+        pole_moment=PoleMoment.joined([piece.pole_moment for piece in pieces]),
+        turning=torch.cat([piece.turning for piece in pieces]), gauge=Gauge.joined([piece.gauge for piece in pieces]),
     )  # fmt: skip
     return Statistics.joined(parts), whole
 
 
-def _pieces(
-    forecaster: Forecaster,
-    segments: Segments,
-    calibrations: Sequence[Calibration],
-    columns: Sequence[Column],
-    *,
-    log: bool = False,
-) -> Iterator[tuple[Statistics, list[Tensor], Tensor, PoleMoment, Gauge]]:
-    """Statistics of some segments at a time, with the sensitivities, the scale of the errors, pole_moment and gauge.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Piece:
+    """Some segments, with their calibrations, errors and sensitivities (frame, marker, 3, segment), the scale of the
+    errors, the directions of moments (segment, column, frame), and all statistics but those of a log."""
 
-    Args:
-        log: whether the wind was logged, so that what its log may be off by is looked at.
-    """
-    recording = segments.recording
+    segments: Segments
+    calibrations: Sequence[Calibration]
+    base: Tensor
+    changes: Sequence[Tensor]
+    scale: Tensor
+    pole_moment: PoleMoment
+    turning: Tensor
+    gauge: Gauge
+    found: Statistics
+
+
+def _pieces(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> Iterator[_Piece]:
+    """Some segments at a time."""
     # Segments of one recording share weights, and so stay in one chunk.
-    for chosen in _chunks(recording):
-        own = segments.select(chosen)
+    for chosen in _chunks(segments.recording):
+        own, recording = segments.select(chosen), segments.recording[chosen]
         starts = [calibrations[i] for i in chosen]
-        noise = own.noise
         base = forecaster.errors(*forecaster.system(own, starts), own)
         changes = forecaster.sensitivities((*columns, *winds()), own, starts, base)
         changes, blown = changes[: -len(winds())], changes[-len(winds()) :]
-        pole_moment, scale = (
-            PoleMoment.of(base, own, forecaster.specimen),
-            error_scale(base, recording[chosen], noise, own.counted),
-        )
+        pole_moment = PoleMoment.of(base, own, forecaster.specimen)
+        scale = error_scale(base, recording, own.noise, own.counted)
         gauge = Gauge.of(blown, scale, period=own.period)
+        turned, turning = _turned(pole_moment, base, changes, recording)
         found = replace(
-            reduced(base, changes, recording[chosen], noise, own.counted),
-            lines=_spectrum(forecaster, own).prominence(base),
-            turning=_turned(pole_moment, base, changes, recording[chosen]),
+            reduced(base, changes, recording, own.noise, own.counted),
+            lines=_spectrum(forecaster, own).prominence(base), turning=turned,
             course=gauge.course(_over_scale(base, scale)),
         )  # fmt: skip
-        if log:
-            found = _with_log(found, sensitivities(forecaster, own, starts, base), changes, scale, pole_moment, gauge)
-        yield found, changes, scale, pole_moment, gauge
+        yield _Piece(
+            segments=own, calibrations=starts, base=base, changes=changes, scale=scale, pole_moment=pole_moment,
+            turning=turning, gauge=gauge, found=found,
+        )  # fmt: skip
 
 
-def _with_log(
-    found: Statistics,
-    off: Sequence[Tensor],
-    changes: Sequence[Tensor],
-    scale: Tensor,
-    pole_moment: PoleMoment,
-    gauge: Gauge,
-) -> Statistics:
+def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statistics:
     """Statistics with how they move with what the wind's log may be off by.
 
     Args:
+        along: the sensitivities that the statistics are along.
         off: (frame, marker, 3, segment) [m] of each nuisance.
-        changes: the sensitivities that the statistics are along.
     """
-    turning, course = found.turning, found.course
+    turning, course = piece.found.turning, piece.found.course
     if turning is not None:
-        moved = pole_moment.moment(torch.stack(list(off))).double().permute(2, 0, 1)
-        along = _moments(pole_moment, changes)[1] @ moved.transpose(1, 2)
-        turning = replace(turning, log=along.cpu().numpy())
+        moved = piece.pole_moment.moment(torch.stack(list(off))).double().permute(2, 0, 1)
+        turning = replace(turning, log=(piece.turning @ moved.transpose(1, 2)).cpu().numpy())
     if course is not None:
-        course = replace(course, log=np.stack([gauge.course(_plain(own, scale)).score for own in off], axis=-1))
-    log = Projection.along(changes, scale).response(off)
-    return replace(found, log=log, turning=turning, course=course)
+        scores = [piece.gauge.course(_plain(own, piece.scale)).score for own in off]
+        course = replace(course, log=np.stack(scores, axis=-1))
+    return replace(piece.found, log=along.response(off), turning=turning, course=course)
 
 
 def _plain(changes: Tensor, scale: Tensor) -> Tensor:
@@ -295,21 +290,17 @@ def _plain(changes: Tensor, scale: Tensor) -> Tensor:
 
 def _turned(
     pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
-) -> Statistics:
-    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment)."""
+) -> tuple[Statistics, Tensor]:
+    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment, column,
+    frame) of length 1 where there is any."""
     moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
-    moved, directions = _moments(pole_moment, changes)
+    moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
+    directions = moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
     size = ((moment * pole_moment.scale) ** 2).mean(0).cpu().numpy()
     return Statistics(
         recording=recording, r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
         response=(directions @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
-    )  # fmt: skip
-
-
-def _moments(pole_moment: PoleMoment, changes: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-    """(segment, column, frame) of sensitivities (frame, marker, 3, segment); and of length 1, where there is any."""
-    moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
-    return moved, moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
+    ), directions  # fmt: skip
 
 
 def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:

@@ -96,13 +96,16 @@ class FactoredNormal:
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        return self.base.force(cloth, position, velocity, wind) + self.beyond(cloth, position, velocity, wind)
+
+    def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        """What the factors make more of it: (vertex, 3, batch) [N] for a wind as `force` has it."""
         seen = face_wind(cloth, position, velocity, wind)
-        density = torch.full_like(seen.across, self.base.density)
+        factor = torch.ones_like(seen.across)
         for effect in self.effects:
-            density = density * effect.factor(self.base.density, seen.across)
-        third = (cloth.areas / 3)[:, None, None]
-        push = third * (density * seen.across.abs() * seen.across * seen.normal + self.base.drag * seen.along)
-        return cloth.shared_out(push)
+            factor = factor * effect.factor(self.base.density, seen.across)
+        size = (cloth.areas / 3)[:, None, None] * self.base.density * (factor - 1)
+        return cloth.shared_out(size * seen.across.abs() * seen.across * seen.normal)
 
 
 class WindEffect(Effect):

@@ -56,13 +56,13 @@ class Hysteresis(Effect):
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
         """z = 0, and the fold angles: (2, hinge, batch)."""
-        angle = bending.fold(cloth, position).angle
+        angle = bending.fold_angle(cloth, position)
         return torch.stack([torch.zeros_like(angle), angle])
 
     def update(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
         """z and the fold angles after a step to a position (vertex, 3, batch): (2, hinge, batch)."""
         past, before = memory
-        angle = bending.fold(cloth, position).angle
+        angle = bending.fold_angle(cloth, position)
         change = CURVATURE_SPACING * cloth.hinge_column[:, None] * (angle - before)
         goal = torch.sign(change)
         return torch.stack([goal + (past - goal) * torch.exp(-change.abs() / self.curvature), angle])

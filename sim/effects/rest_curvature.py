@@ -37,7 +37,7 @@ class RestCurvature(Effect):
     ] = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        curl = Curl(angle=bending.fold(system.cloth, self.rolled(system.cloth)).angle)
+        curl = Curl(angle=bending.fold_angle(system.cloth, self.rolled(system.cloth)))
         return replace(system, effects=(*system.effects, curl)), state
 
     def rolled(self, cloth: Cloth) -> Tensor:

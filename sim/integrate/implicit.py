@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import accumulate
 
 import torch
 from torch import Tensor
@@ -24,6 +25,7 @@ from sim import bending, contact, membrane
 from sim.cloth import gather_sum
 from sim.inertia import mean_normals
 from sim.integrate.backend import Backend, kernel_for
+from sim.kernel.fused import Kernel
 from sim.state import State
 from sim.system import Drive, System
 
@@ -69,22 +71,43 @@ class BackwardEuler:
         """The state `duration` seconds later."""
         steps = max(1, math.ceil(duration / self.step - 1e-9))
         h = duration / steps
+        if (kernel := self._kernel(system, state)) is not None and system.limits is None:
+            return self._at_once(kernel, system, state, h, steps)
         for _ in range(steps):
             state = self.stepped(system, state, system.drive(state.time, state.time + h), h)
         return state
+
+    def _kernel(self, system: System, state: State) -> Kernel | None:
+        """Where it can take the step."""
+        kernel = kernel_for(system, state, self.backend)
+        beyond = system.extra or system.loads or system.ties or system.contact is not None
+        return None if beyond else kernel
+
+    def _at_once(self, kernel: Kernel, system: System, state: State, h: float, steps: int) -> State:
+        """Steps of `h` [s] in one call of the kernel."""
+        times = list(accumulate([h] * steps, initial=state.time))
+        x, v = kernel.implicit(
+            [system.wind.velocity(time) for time in times[:-1]], [system.targets(time) for time in times[1:]],
+            state.position, state.velocity, h, lag=self._lag(h), tolerance=self.tolerance, iterations=self.iterations,
+        )  # fmt: skip
+        return State(position=x, velocity=v, time=times[-1])
+
+    def _lag(self, h: float) -> float:
+        return h if self.air_shape is AirShape.PREVIOUS else 0.0
 
     def stepped(self, system: System, state: State, drive: Drive, h: float) -> State:
         """The state one step of `h` [s] later, whatever `step` is, with what moves the cloth from outside meanwhile."""
         cloth = system.cloth
         x, v, time = state.position, state.velocity, state.time
-        if system.clamped:
-            v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
-        kernel = kernel_for(system, state, self.backend)
-        if kernel is not None and not (system.extra or system.loads or system.ties) and system.contact is None:
-            lag = h if self.air_shape is AirShape.PREVIOUS else 0.0
-            x, v = kernel.implicit(drive, x, v, h, lag=lag, tolerance=self.tolerance, iterations=self.iterations)
+        if (kernel := self._kernel(system, state)) is not None:
+            x, v = kernel.implicit(
+                drive.wind[:1], drive.targets[1:], x, v, h, lag=self._lag(h), tolerance=self.tolerance,
+                iterations=self.iterations,
+            )  # fmt: skip
             x, v = system.limited(x, v, h)
             return State(position=x, velocity=v, time=time + h)
+        if system.clamped:
+            v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         mass = cloth.mass.unsqueeze(1)
         faces = membrane.Linearised.at(cloth, x)
         folds = bending.Linearised.at(cloth, x) if len(cloth.hinges) else None

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 
 import torch
 from torch import Tensor
@@ -45,8 +46,7 @@ class SplitEuler:
         if not (system.extra or system.loads or system.ties):
             return self.base.advance(plain, state, duration)
         steps, h = self._steps(duration)
-        for _ in range(steps):
-            drive = system.drive(state.time, state.time + h)
+        for drive in system.drives(_times(state.time, h, steps)):
             begun = replace(state, velocity=_pushed(system, state, drive, h), memory=())
             state = _carried(system, state, self.base.stepped(plain, begun, drive, h), h)
         return state
@@ -59,8 +59,7 @@ class SplitEuler:
         """
         plain = batches.plain
         steps, h = self._steps(duration)
-        for _ in range(steps):
-            drive = plain.drive(state.time, state.time + h)
+        for drive in plain.drives(_times(state.time, h, steps)):
             parts = list(batches.parts(state))
             velocity = state.velocity.clone()
             for system, members, own in parts:
@@ -81,6 +80,11 @@ class SplitEuler:
         """How many, and how long each is [s]."""
         steps = max(1, math.ceil(duration / self.base.step - 1e-9))
         return steps, duration / steps
+
+
+def _times(start: float, h: float, steps: int) -> list[float]:
+    """Start and end of steps [s], added up as states are."""
+    return list(accumulate([h] * steps, initial=start))
 
 
 def _pushed(system: System, state: State, drive: Drive, h: float) -> Tensor:

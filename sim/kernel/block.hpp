@@ -268,8 +268,12 @@ class Block {
   void fold(const T* x, int64_t e, V3 g[4], V& angle) const {
     const int32_t* c = p.hinge + 4 * e;
     const V3 xi = load3(x + 3 * L * int64_t(c[0]));
-    const V3 edge = sub(load3(x + 3 * L * int64_t(c[1])), xi), left = sub(load3(x + 3 * L * int64_t(c[2])), xi),
-             right = sub(load3(x + 3 * L * int64_t(c[3])), xi);
+    fold(sub(load3(x + 3 * L * int64_t(c[1])), xi), sub(load3(x + 3 * L * int64_t(c[2])), xi),
+         sub(load3(x + 3 * L * int64_t(c[3])), xi), g, angle);
+  }
+
+  // The same by the vectors from i to j, k and l.
+  static void fold(V3 edge, V3 left, V3 right, V3 g[4], V& angle) {
     const V3 normal0 = cross(edge, left), normal1 = cross(right, edge);
     const V square = dot(edge, edge), length = root(square);
     const V doubled0 = root(dot(normal0, normal0)), doubled1 = root(dot(normal1, normal1));

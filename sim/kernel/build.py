@@ -25,7 +25,7 @@ _FLAGS = (
     "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC", "-Wno-psabi",
 )  # fmt: skip
 
-_SOURCES = ("kernel.cpp", "block.hpp", "contact.hpp", "implicit.hpp")
+_SOURCES = ("kernel.cpp", "block.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp")
 
 
 def cache_folder() -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -190,18 +191,23 @@ class Kernel:
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
         """The problem with wind and handles set; the tensors must outlive the call it is made for."""
 
-        def both(pair: tuple[Tensor, Tensor]) -> Tensor:
-            return _to_blocks(torch.stack(pair), self.lanes, self.blocks).movedim(1, 0).contiguous()
-
-        given = {"wind": both(drive.wind), "targets": both(drive.targets), "rate": self.pack(drive.rate)}
+        given = {"wind": self._each(drive.wind), "targets": self._each(drive.targets), "rate": self.pack(drive.rate)}
         if self.tied is not None:
             start, end = drive.offset
-            given["tie_targets"] = both((self.tied + start[:, None], self.tied + end[:, None]))
+            given["tie_targets"] = self._each((self.tied + start[:, None], self.tied + end[:, None]))
             given["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
+        return self._given(**given)
+
+    def _given(self, **tensors: Tensor) -> tuple[_Problem, list[Tensor]]:
+        """The problem with some tensors set, which must outlive the call it is made for."""
         problem = _Problem.from_buffer_copy(self.problem)
-        for name, tensor in given.items():
+        for name, tensor in tensors.items():
             setattr(problem, name, tensor.data_ptr())
-        return problem, list(given.values())
+        return problem, list(tensors.values())
+
+    def _each(self, parts: Sequence[Tensor]) -> Tensor:
+        """(…, batch) at several times → (time, block, …, lane)."""
+        return _to_blocks(torch.stack(tuple(parts)), self.lanes, self.blocks).movedim(1, 0).contiguous()
 
     def pack(self, tensor: Tensor) -> Tensor:
         """(…, batch) → (block, …, lane), contiguous and not shared with the argument."""
@@ -230,24 +236,39 @@ class Kernel:
         return self.unpack(out)
 
     def implicit(
-        self, drive: Drive, x: Tensor, v: Tensor, h: float, *, lag: float, tolerance: float, iterations: int
+        self,
+        winds: Sequence[Tensor],
+        targets: Sequence[Tensor],
+        x: Tensor,
+        v: Tensor,
+        h: float,
+        *,
+        lag: float,
+        tolerance: float,
+        iterations: int,
     ) -> tuple[Tensor, Tensor]:
-        """One backward Euler step without effects and contact: positions and velocities (vertex, 3, batch).
+        """Backward Euler steps of `h` [s] without effects, contact and limits: positions and velocities (vertex, 3,
+        batch).
 
         Args:
+            winds: (3, batch) at the start of each step [m/s].
+            targets: (held, 3, batch) of the handles at the end of each [m].
             lag: the air sees the shape x − lag v [s].
 
         Returns:
             NaN for members whose solve did not converge.
         """
-        problem, alive = self._drive(drive)
+        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets))
         xb, vb = self.pack(x), self.pack(v)
         failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
-        numbers = (ctypes.c_double(h), ctypes.c_double(lag), ctypes.c_double(tolerance), ctypes.c_int64(iterations))
+        counts = (ctypes.c_int64(iterations), ctypes.c_int64(len(winds)))
+        numbers = (ctypes.c_double(h), ctypes.c_double(lag), ctypes.c_double(tolerance), *counts)
         self._call("implicit", problem, xb, vb, failed, *numbers)
         del alive
-        lost = self.unpack(failed) != 0
-        return self.unpack(xb).masked_fill(lost, torch.nan), self.unpack(vb).masked_fill(lost, torch.nan)
+        after, lost = (self.unpack(xb), self.unpack(vb)), self.unpack(failed) != 0
+        if bool(lost.any()):
+            after = (after[0].masked_fill(lost, torch.nan), after[1].masked_fill(lost, torch.nan))
+        return after
 
     def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes._SimpleCData[Any]) -> None:
         function = _function(self.code, name, self.kind)

@@ -117,21 +117,28 @@ class Implicit : Block<T, L> {
  public:
   using Base::Base;
 
-  // x and v become those after a step of h; the air sees the shape x - lag v.
+  // x and v become those after a step of h, at whose start `wind` blows and at whose end the handles are at `targets`; the
+  // air sees the shape x - lag v.
   void step(T* x, T* v, int32_t* failed, T h, T lag, double tolerance, int64_t iterations) {
     const int64_t n = 3 * p.vertices;
+    const T* inverse = p.inverse_mass + b * p.vertices * L;
+    for (int64_t s = 0; s < p.held; ++s)
+      if (inverse[p.held_vertex[s] * L] == 0)  // held rigidly
+        for (int c = 0; c < 3; ++c) {
+          const int64_t i = 3 * int64_t(p.held_vertex[s]) + c;
+          store(v + i * L, (load(p.targets + ((b * p.held + s) * 3 + c) * L) - load(x + i * L)) / h);
+        }
     for (auto* field : {&diagonal_, &right_, &residual_, &direction_, &image_, &solution_}) field->assign(n, V{});
     // Gravity and air go into right_ first; contact and elastic forces of the explicit step are not wanted here.
     this->external(x, v, lag, reinterpret_cast<T*>(right_.data()));
     linearise_faces(x, right_.data(), diagonal_.data());
     linearise_hinges(x, right_.data(), diagonal_.data());
     const T* mass = p.mass + b * p.vertices * L;
-    const T* inverse = p.inverse_mass + b * p.vertices * L;
     if (p.stiffness > 0)
       for (int64_t s = 0; s < p.held; ++s)
         for (int c = 0; c < 3; ++c) {
           const int64_t i = 3 * int64_t(p.held_vertex[s]) + c;
-          const V target = load(p.targets + (((blocks + b) * p.held + s) * 3 + c) * L);
+          const V target = load(p.targets + ((b * p.held + s) * 3 + c) * L);
           right_[i] -= T(p.stiffness) * (load(x + i * L) - target);
           diagonal_[i] += T(p.stiffness);
         }
@@ -177,7 +184,7 @@ class Implicit : Block<T, L> {
       product = active > 0 ? following : product;
       active = (product <= goal || !(product < std::numeric_limits<T>::infinity())) ? V{} : active;
     }
-    for (int l = 0; l < L; ++l) failed[l] = !(product[l] <= goal[l]);
+    for (int l = 0; l < L; ++l) failed[l] |= !(product[l] <= goal[l]);
     for (int64_t k = 0; k < n; ++k) {
       const V speed = load(v + k * L) + solution_[k];
       store(v + k * L, speed);

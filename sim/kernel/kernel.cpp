@@ -1,6 +1,7 @@
 // One block after the other, in float32 and float64, with blocks of as many members as fit a vector register, or half.
 
 #include "block.hpp"
+#include "on_mesh.hpp"
 #include "implicit.hpp"
 
 namespace {
@@ -21,16 +22,46 @@ void forces(const Problem<T>* p, int64_t blocks, void* lists, const T* x, const 
     Block<T, L>(*p, b, blocks, of_block + b).forces(x + b * size, v + b * size, T(share), f + b * size);
 }
 
-// One backward Euler step; `failed` (blocks, L) tells which members' solves did not converge.
+// Backward Euler steps, for each of which there are a wind and targets of the handles: (steps, blocks, ...). `failed`
+// (blocks, L) tells which members' solves did not converge.
 template <typename T, int L>
 void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag, double tolerance,
-              int64_t iterations) {
+              int64_t iterations, int64_t steps) {
   const int64_t size = p->vertices * 3 * L;
-  for (int64_t b = 0; b < blocks; ++b)
-    Implicit<T, L>(*p, b, blocks).step(x + b * size, v + b * size, failed + b * L, T(h), T(lag), tolerance, iterations);
+  for (int64_t b = 0; b < blocks; ++b) {
+    Problem<T> now = *p;
+    Implicit<T, L> block(now, b, blocks);
+    for (int64_t s = 0; s < steps; ++s) {
+      block.step(x + b * size, v + b * size, failed + b * L, T(h), T(lag), tolerance, iterations);
+      now.wind += blocks * 3 * L;
+      now.targets += blocks * p->held * 3 * L;
+    }
+  }
 }
 
 }  // namespace
+
+// What on_mesh.py calls, for numbers of type T, taken L members at a time.
+#define FIELDS(T, L, name)                                                                                           \
+  void face_wind_##name(const int64_t* face, int64_t faces, int64_t batch, on_mesh::View<T> position,                 \
+                        on_mesh::View<T> velocity, on_mesh::View<T> wind, T* normal, T* relative, T* across) {         \
+    on_mesh::Fields<T, L>::face_wind(face, faces, batch, position, velocity, wind, normal, relative, across);         \
+  }                                                                                                                  \
+  void normals_##name(const int64_t* face, int64_t faces, int64_t batch, on_mesh::View<T> position, T* sixth) {       \
+    on_mesh::Fields<T, L>::normals(face, faces, batch, position, sixth);                                              \
+  }                                                                                                                  \
+  void normal_rates_##name(const int64_t* face, int64_t faces, int64_t batch, on_mesh::View<T> position,              \
+                           on_mesh::View<T> velocity, T* sixth) {                                                     \
+    on_mesh::Fields<T, L>::normal_rates(face, faces, batch, position, velocity, sixth);                               \
+  }                                                                                                                  \
+  void gather_##name(const T* const* corner, int64_t corners, int64_t elements, const int64_t* slots, int64_t k,     \
+                     int64_t vertices, int64_t width, T* total) {                                                    \
+    on_mesh::Fields<T, L>::gather(corner, corners, elements, slots, k, vertices, width, total);                       \
+  }                                                                                                                  \
+  void fold_##name(const int64_t* hinge, int64_t hinges, int64_t batch, on_mesh::View<T> position, T* angle,          \
+                   T* const* gradient) {                                                                             \
+    on_mesh::Fields<T, L>::fold(hinge, hinges, batch, position, angle, gradient);                                     \
+  }
 
 // What fused.py calls, for numbers of type T, L members a block.
 #define FOR(T, L, name)                                                                                              \
@@ -44,12 +75,14 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
     forces<T, L>(p, blocks, lists, x, v, f, share);                                                                  \
   }                                                                                                                  \
   void implicit_##name(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag,       \
-                       double tolerance, int64_t iterations) {                                                       \
-    implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations);                                          \
+                       double tolerance, int64_t iterations, int64_t steps) {                                        \
+    implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations, steps);                                   \
   }
 
 extern "C" {
 FOR(float, 16, f32)
 FOR(float, 8, f32_few)
 FOR(double, 8, f64)
+FIELDS(float, 16, f32)
+FIELDS(double, 8, f64)
 }

@@ -152,3 +152,23 @@ def test_stiff_materials_take_the_papers_steps(make_system) -> None:
     strain = membrane.strain(system.cloth, final.position)
     assert float(strain.g00.abs().max()) < 1e-3
     assert float(final.position[:, 0].max()) > 0.02
+
+
+@pytest.mark.parametrize("stiffness", [1e3, math.inf])
+def test_steps_in_one_call_are_those_taken_one_by_one_to_the_bit(make_system, distorted, stiffness: float) -> None:
+    handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
+    system, state = make_system(
+        distorted, [named("camel-ponte-roma"), named("white-swim-solid")], handles=handles, gravity=(0.0, 0.0, -9.81)
+    )
+
+    class Rising:
+        def velocity(self, time: float) -> torch.Tensor:
+            return torch.tensor([[5.0, 3.0], [1.0, 0.0], [0.0, 0.0]], dtype=torch.float64) * (1 + 10 * time)
+
+    system, method = replace(system, wind=Rising()), BackwardEuler(step=2e-3, backend=Backend.KERNEL)
+    together, alone = method.advance(system, state, 0.04), state
+    for _ in range(20):
+        alone = method.stepped(system, alone, system.drive(alone.time, alone.time + 2e-3), 2e-3)
+    assert torch.equal(together.position, alone.position)
+    assert torch.equal(together.velocity, alone.velocity)
+    assert together.time == alone.time

@@ -33,7 +33,7 @@ from tests.validation.flags_runs import CAMEL
 
 WINDS = (3, 5, 7)
 DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "2"))))
-"""Of the nulls, some 25 minutes of a core each; FLAGDATA_DRAWS says how many."""
+"""Of the nulls, some 13 minutes of a core each; FLAGDATA_DRAWS says how many."""
 _UNIT = 1e-4  # m, of the stored positions
 _SHOWN = 7
 """Candidates that are told."""

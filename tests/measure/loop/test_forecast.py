@@ -180,6 +180,20 @@ def test_models_in_one_batch_leave_what_they_leave_alone(
         torch.testing.assert_close(errors, alone, rtol=1e-9, atol=1e-12)
 
 
+def test_sensitivities_do_not_depend_on_how_many_threads_share_them_out(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    segments = Segments.of([own_recording])
+    calibrations = [NOMINAL] * len(segments)
+    base = forecaster.errors(*forecaster.system(segments, calibrations), segments)
+    alone, shared = (
+        replace(forecaster, workers=workers).sensitivities(library()[:3], segments, calibrations, base)
+        for workers in (1, 2)
+    )
+    for one, two in zip(alone, shared, strict=True):
+        assert torch.equal(one, two)
+
+
 def test_members_of_a_batch_do_not_touch_one_another(forecaster: Forecaster, own_recording: Trajectory) -> None:
     twice = Segments.of([own_recording, replace(own_recording, name="again")])
     alone = Segments.of([own_recording])
