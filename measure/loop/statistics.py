@@ -291,8 +291,8 @@ def _plain(changes: Tensor, scale: Tensor) -> Tensor:
 def _turned(
     pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
 ) -> tuple[Statistics, Tensor]:
-    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment, column,
-    frame) of length 1 where there is any."""
+    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment,
+    column, frame) of length 1 where there is any."""
     moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
     moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
     directions = moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)

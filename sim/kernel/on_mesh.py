@@ -102,7 +102,7 @@ def _side_by_side(field: Tensor, batch: int) -> Tensor:
 
 
 def _view(field: Tensor) -> _View:
-    """Of (vertex, 3, batch), or of (3, batch) that is the same at all vertices. The tensor must outlive it."""
+    """A view of (vertex, 3, batch), or of (3, batch) that is the same at all vertices. The tensor must outlive it."""
     vertex = field.stride(0) if field.ndim == 3 else 0
     return _View(data=field.data_ptr(), vertex=vertex, component=field.stride(-2))
 
