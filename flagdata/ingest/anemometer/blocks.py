@@ -54,20 +54,19 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The values below their names, one reading a row."""
-    lines = (line for _, block in source.blocks() for line in block)
-    rows = list(_rows(lines, _first(source.head(HEAD_LINES))))
+    lines = [line for _, block in source.blocks() for line in block]
+    rows = list(_rows(lines, _first(lines[:HEAD_LINES])))
     names = list(dict.fromkeys(name for row in rows for name in row if name))
     stamped = any("" in row for row in rows)
     cells = [[*([row.get("", "")] if stamped else []), *(row.get(name, "") for name in names)] for row in rows]
     return table(
         source, [*(["logged time"] if stamped else []), *names], cells, kind="blocks",
-        what="readings of several lines, a name and its value in each", left_out=_words(source),
+        what="readings of several lines, a name and its value in each", left_out=_words(lines),
     )  # fmt: skip
 
 
-def _words(source: TextFile) -> int:
+def _words(lines: Iterable[str]) -> int:
     """Lines with words that are neither a name and its value nor a rule: what they say is not read."""
-    lines = (line for _, block in source.blocks() for line in block)
     return sum(bool(re.search(r"[^\W_]", line)) and _LINE.fullmatch(line) is None for line in lines)
 
 

@@ -31,9 +31,7 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The lines with the stamp bare; the others as they are."""
-    text = tuple(_bare(line) for _, lines in source.blocks() for line in lines)
-    plain = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=source.findings)
-    return TableText(**{**vars(plain), "text": text})
+    return TableText.of(source, [_bare(line) for _, lines in source.blocks() for line in lines])
 
 
 def _bare(line: str) -> str:

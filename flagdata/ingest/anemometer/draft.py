@@ -26,13 +26,12 @@ from flagdata.ingest.anemometer.instruments import (
     find_winds,
     mixed_units,
     named_wind,
-    site_of_all,
-    sites,
 )
 from flagdata.ingest.anemometer.layout import Layout, lay_out
 from flagdata.ingest.anemometer.long_table import winds_by_name
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
+from flagdata.ingest.anemometer.sites import site_of_all, sites
 from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
 from flagdata.ingest.anemometer.unitcheck import FASTEST
 from flagdata.units import spelled

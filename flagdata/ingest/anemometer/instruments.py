@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,14 +21,6 @@ _WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pr
 _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
 _POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
-_SITES = frozenset(
-    {
-        "station", "site", "stid", "id", "sensor", "device", "node", "location", "logger", "mast", "turbine", "address",
-        "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
-    }
-)  # fmt: skip
-_NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
-"""Words beside which a heading is still that of a site."""
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
 _FROM_NORTH = frozenset({"twd", "gwd"})
 """Directions that instruments of boats compute, from whichever north their compass is set to."""
@@ -37,23 +29,10 @@ NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
 _CALM = frozenset(
     {
-        "calm",
-        "still",
-        "none",
-        "variable",
-        "vrb",
-        "var",
-        "calma",
-        "windstille",
-        "calme",
-        "штиль",
-        "cvr",
-        "静穏",
-        "静风",
-        "靜風",
-        "無風",
+        "calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr",
+        "静穏", "静风", "靜風", "無風",
     }
-)
+)  # fmt: skip
 """What stands in a column of compass points where there is no direction."""
 _UNREADABLE = 0.1
 
@@ -239,44 +218,6 @@ def named_wind(
 
 def _otherwise(name: str, stated: str, told: str) -> str:
     return f"the heading of {name!r} states {stated}; taken as {told}, as you said"
-
-
-def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
-    """The column that tells sites apart, and the sites in the first rows; `None` where all rows are of one.
-
-    Its heading is that of a site; or the rows of different sites share their stamps.
-    """
-    shared = len(set(stamps)) < len(stamps)
-    for index, name in enumerate(layout.names):
-        words = set(words_of(name))
-        if index in time or not words & _SITES or understand(name).quantity:
-            continue
-        cells = layout.column(index)
-        kinds = sorted({cell for cell in cells if cell})
-        if not 2 <= len(kinds) <= 50:
-            continue
-        if words <= _SITES | _NUMBERED and len(cells) >= 3 * len(kinds):
-            return index, tuple(kinds)
-        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
-        if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
-            return index, tuple(kinds)
-    return None
-
-
-def site_of_all(layout: Layout, *, apart: Collection[int]) -> tuple[int, str] | None:
-    """The column with a site's heading and the one site that the first rows hold; `None` where there is none.
-
-    Args:
-        apart: columns of the time or of units, which are none.
-    """
-    for index, name in enumerate(layout.names):
-        words = set(words_of(name))
-        if index in apart or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
-            continue
-        kinds = set(layout.column(index))
-        if len(kinds) == 1 and (site := next(iter(kinds))):
-            return index, site
-    return None
 
 
 def _column(found: _Found, index: int, channel: str, told: str | None) -> Column:

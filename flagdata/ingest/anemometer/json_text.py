@@ -118,8 +118,7 @@ def as_table(source: TextFile) -> TableText | None:
         text = f"{broken} lines are no JSON objects; left out"
         found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=broken, what=text))
     lines = tuple(out.getvalue().splitlines())
-    plain = TextFile(path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *found))
-    return TableText(**{**vars(plain), "text": lines})
+    return TableText.of(source, lines, found)
 
 
 def _once(table: Sequence[dict[str, str]]) -> tuple[list[dict[str, str]], int]:

@@ -99,5 +99,4 @@ def table(
     if left_out:
         text = f"{left_out} lines are of another kind; left out"
         found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=left_out, what=text))
-    plain = TextFile(path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *found))
-    return TableText(**{**vars(plain), "text": lines})
+    return TableText.of(source, lines, found)

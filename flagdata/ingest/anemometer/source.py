@@ -6,7 +6,7 @@ import codecs
 import gzip
 import io
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -132,6 +132,14 @@ class TableText(TextFile):
     """
 
     text: tuple[str, ...]
+
+    @classmethod
+    def of(cls, source: TextFile, lines: Sequence[str], findings: Iterable[Finding] = ()) -> TableText:
+        """A file restated as these lines, with what was found beside the file's own findings."""
+        return cls(
+            path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *findings),
+            text=tuple(lines),
+        )  # fmt: skip
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
         """See `TextFile.blocks`."""

@@ -120,8 +120,7 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     days = (day - date).days
     what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
     found = Finding(kind="date-given", severity=Severity.NOTE, what=what)
-    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, found))
-    return TableText(**{**vars(base), "text": tuple(text)})
+    return TableText.of(source, text, [found])
 
 
 def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, *, short: int = 0) -> TextFile:
@@ -137,8 +136,7 @@ def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, *, 
     if short:
         what = f"{short} lines have fewer columns than the table; left out, each counted as a reading"
         found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=short, what=what))
-    base = TextFile(path=source.path, encoding="utf-8", lines=len(text), findings=(*source.findings, *found))
-    return TableText(**{**vars(base), "text": tuple(text)})
+    return TableText.of(source, text, found)
 
 
 def _refuse_times(said: bool, where: str) -> None:

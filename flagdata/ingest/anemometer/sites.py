@@ -1,0 +1,55 @@
+"""The column of a table that tells sites, stations or sensors apart."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from flagdata.ingest.anemometer.headings import understand, words_of
+from flagdata.ingest.anemometer.layout import Layout
+
+_SITES = frozenset(
+    {
+        "station", "site", "stid", "id", "sensor", "device", "node", "location", "logger", "mast", "turbine", "address",
+        "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
+    }
+)  # fmt: skip
+_NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
+"""Words beside which a heading is still that of a site."""
+
+
+def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
+    """The column that tells sites apart, and the sites in the first rows; `None` where all rows are of one.
+
+    Its heading is that of a site; or the rows of different sites share their stamps.
+    """
+    shared = len(set(stamps)) < len(stamps)
+    for index, name in enumerate(layout.names):
+        words = set(words_of(name))
+        if index in time or not words & _SITES or understand(name).quantity:
+            continue
+        cells = layout.column(index)
+        kinds = sorted({cell for cell in cells if cell})
+        if not 2 <= len(kinds) <= 50:
+            continue
+        if words <= _SITES | _NUMBERED and len(cells) >= 3 * len(kinds):
+            return index, tuple(kinds)
+        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
+        if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+            return index, tuple(kinds)
+    return None
+
+
+def site_of_all(layout: Layout, *, apart: Collection[int]) -> tuple[int, str] | None:
+    """The column with a site's heading and the one site that the first rows hold; `None` where there is none.
+
+    Args:
+        apart: columns of the time or of units, which are none.
+    """
+    for index, name in enumerate(layout.names):
+        words = set(words_of(name))
+        if index in apart or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
+            continue
+        kinds = set(layout.column(index))
+        if len(kinds) == 1 and (site := next(iter(kinds))):
+            return index, site
+    return None
