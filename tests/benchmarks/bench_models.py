@@ -1,4 +1,4 @@
-"""What a clip costs: the front end from pixels, a step of training, an estimate; one core, medians.
+"""What a clip costs in processor time of one thread: the front end from pixels, a step of training, an estimate; medians.
 
 The plain front end is the definition that tests hold the fast one to: SciPy's filters, torch's pooling and the
 periodogram layer.
@@ -21,7 +21,7 @@ from models.frontend import FrontEnd, Maps, standardised
 from models.spectral import SpectralDecomposition
 from models.training.recipe import load
 
-_RUNS = 7
+_RUNS = 31
 _BATCH = 8
 _RECIPES = ("wave", "sdn", "sdn-112", "resnet18-1", "resnet18-10", "resnet18-20", "cardona", "yang")
 
@@ -47,9 +47,9 @@ def _milliseconds(work: Callable[[], object], *, runs: int = _RUNS) -> float:
     work()
     found = []
     for _ in range(runs):
-        begun = time.perf_counter()
+        begun = time.process_time()
         work()
-        found.append(time.perf_counter() - begun)
+        found.append(time.process_time() - begun)
     return round(1e3 * float(np.median(found)), 2)
 
 

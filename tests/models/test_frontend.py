@@ -11,7 +11,7 @@ from scipy import ndimage
 from torch.nn import functional
 
 from flagdata.errors import InputError
-from models.filters import derivatives, gaussian, smoothing_matrix
+from models.filters import gaussian, pooled_derivatives, smoothing_matrix
 from models.frontend import WAVE_CHANNELS, FrontEnd, standardised
 from models.spectral import SpectralDecomposition, periodogram
 
@@ -40,25 +40,32 @@ def plain(frames: torch.Tensor) -> torch.Tensor:
     return functional.max_pool2d(torch.from_numpy(np.stack(slopes)), 2)[None]
 
 
-@pytest.mark.parametrize(("height", "width"), [(48, 48), (33, 70), (20, 224)])
-def test_derivatives_are_scipys(height: int, width: int) -> None:
-    frames = noise(frames=5, height=height, width=width)
-    for found, (along, across) in zip(derivatives(frames, sigma=2.0), ((2, 1), (1, 2)), strict=True):
-        slope = ndimage.gaussian_filter1d(frames.double().numpy(), 2.0, axis=along, order=1, mode="nearest")
-        expected = ndimage.gaussian_filter1d(slope, 2.0, axis=across, mode="nearest")
+@pytest.mark.parametrize(("frames", "height", "width"), [(5, 48, 48), (7, 34, 70), (1, 20, 224)])
+def test_pooled_derivatives_are_scipys(frames: int, height: int, width: int) -> None:
+    video = noise(frames=frames, height=height, width=width)
+    for found, (along, across) in zip(pooled_derivatives(video, sigma=2.0), ((2, 1), (1, 2)), strict=True):
+        slope = ndimage.gaussian_filter1d(video.double().numpy(), 2.0, axis=along, order=1, mode="nearest")
+        slope = ndimage.gaussian_filter1d(slope, 2.0, axis=across, mode="nearest")
+        expected = functional.max_pool2d(torch.from_numpy(slope), 2)
         np.testing.assert_allclose(found.numpy(), expected, atol=1e-6)
 
 
 def test_a_ramp_has_its_slope_but_for_the_tails_that_are_cut_off() -> None:
     ramp = 3.0 * torch.arange(64, dtype=torch.float64).repeat(2, 40, 1)
-    along_x, along_y = derivatives(ramp, sigma=2.0)
-    assert along_x[:, :, 20:40].sub(3.0).abs().max() < 3.0 * 2e-3  # ∫ beyond 4σ of i² g(i)/σ² is 1.1e-3
+    along_x, along_y = pooled_derivatives(ramp, sigma=2.0)
+    assert along_x[:, :, 10:20].sub(3.0).abs().max() < 3.0 * 2e-3  # ∫ beyond 4σ of i² g(i)/σ² is 1.1e-3
     assert along_y.abs().max() < 1e-12
 
 
 def test_gradients_of_the_filters_are_right() -> None:
-    frames = noise(frames=2, height=9, width=11).double().requires_grad_()
-    assert torch.autograd.gradcheck(lambda x: torch.stack(derivatives(x, sigma=1.0)), (frames,))
+    frames = noise(frames=2, height=10, width=12).double().requires_grad_()
+    assert torch.autograd.gradcheck(lambda x: pooled_derivatives(x, sigma=1.0), (frames,))
+
+
+@pytest.mark.parametrize("shape", [(30, 33, 48), (30, 48, 33), (1, 30, 48, 48)])
+def test_frames_that_cannot_be_pooled_are_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match="even height and width"):
+        pooled_derivatives(torch.zeros(shape), sigma=2.0)
 
 
 def test_smoothing_in_time_is_scipys() -> None:
