@@ -112,8 +112,8 @@ def _along_height(frames: Tensor, *bands: Tensor) -> Tensor:
 
 
 def _pooled_along_width(padded: Tensor, band: Tensor) -> Tensor:
-    """(time, height/2, blocks · 16): the filter along the last axis of contiguous (time, height, blocks · 32 + taps − 1),
-    of which the largest of each two by two is taken."""
+    """(time, height/2, blocks · 16): the largest of each two by two of the filter along the last axis of contiguous
+    (time, height, blocks · 32 + taps − 1)."""
     time, height, width = padded.shape
     blocks = (width - len(band)) // _BLOCK + 1
     view = padded.as_strided((blocks, time * height, len(band)), (_BLOCK, width, 1))

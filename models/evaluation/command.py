@@ -12,14 +12,17 @@ import click
 
 from flagdata.commands.ranges import RANGE
 from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.errors import InputError
 
 if TYPE_CHECKING:
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
+    from models.crops import Cropping
     from models.estimator import Estimator
-    from models.evaluation.curves import LearningPoint
-    from models.evaluation.evaluation import Evaluation
+    from models.evaluation.curves import FramesPoint, LearningPoint
+    from models.evaluation.evaluation import Evaluation, Read
     from models.evaluation.predictions import Predictions
+    from models.frontend import FrontEnd
     from models.training.inputs import Prepared
     from models.training.recipe import DataSpec
 
@@ -39,6 +42,15 @@ if TYPE_CHECKING:
 @click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
               help="Range of all clips' area weight, if it is known [kg/m²]; the paper's is 0.10:0.17.")  # fmt: skip
 @click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
+@click.option(
+    "--frames",
+    type=click.IntRange(min=4),
+    metavar="N",
+    multiple=True,
+    help="Tell triplet accuracy of clips of N frames, too, for networks on maps; give it several times.",
+)
+@click.option("--linear", is_flag=True,
+              help="Tell what a linear model reads of area weight and stiffness from each embedding.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="Seed of the draws and of the bootstrap.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
@@ -56,6 +68,8 @@ def evaluate(
     tsne: str | None,
     area_weight: tuple[float, float] | None,
     handmade: bool,
+    frames: Sequence[int],
+    linear: bool,
     seed: int,
     workers: int | None,
     as_json: bool,
@@ -77,7 +91,9 @@ def evaluate(
     source = flagdata.open(lake_path)
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
     desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed, area_weight)
-    found = desk.evaluation(models, side=side, reference=reference, tsne=tsne, handmade=handmade)
+    found = desk.evaluation(
+        models, side=side, reference=reference, tsne=tsne, handmade=handmade, frames=frames, linear=linear
+    )
     page, text, data = report.write(found, out, name=name)
     if as_json:
         document("evaluation", as_document(found))
@@ -100,15 +116,17 @@ class _Desk:
         self._prepared: dict[tuple[str, str], Prepared] = {}
 
     def evaluation(
-        self, names: Sequence[str], *, side: str, reference: str | None, tsne: str | None, handmade: bool
-    ) -> Evaluation:
+        self, names: Sequence[str], *, side: str, reference: str | None, tsne: str | None, handmade: bool,
+        frames: Sequence[int], linear: bool,
+    ) -> Evaluation:  # fmt: skip
         from models.evaluation.evaluation import evaluate as scored
         from models.training.recipe import DataSpec
 
         told: list[Predictions] = []
         learned: list[tuple[int, Predictions]] = []
         curves: set[str] = set()
-        for row, estimator in self._models(names):
+        chosen = self._models(names)
+        for row, estimator in chosen:
             predictions = self._predictions(estimator, side)
             data = DataSpec.of_identity(_card(estimator)["recipe"]["data"])
             if data.sequences is None or row is None:
@@ -119,10 +137,12 @@ class _Desk:
                 learned.append((data.sequences or self._sequences(data), predictions))
         if handmade:
             told += self._handmade(side)
+        told = told or [predictions for _, predictions in learned]
+        data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}"
         return scored(
-            told or [predictions for _, predictions in learned],
-            data=f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}",
-            seed=self._seed, reference=reference, tsne_of=tsne,
+            told, data=data, seed=self._seed, reference=reference, tsne_of=tsne,
+            frames=self._triplets([estimator for _, estimator in chosen], frames, side),
+            reads=self._reads(told, side, data) if linear else (),
             learning=_points([point for point in learned if point[1].label in curves]),
         )  # fmt: skip
 
@@ -181,6 +201,35 @@ class _Desk:
             milliseconds=time_a_clip(estimator, self._side(side)), known=self._known,
             fitted_on=self._clips("train", estimator) if contrast else None,
         )  # fmt: skip
+
+    def _triplets(self, chosen: Sequence[Estimator], frames: Sequence[int], side: str) -> list[FramesPoint]:
+        """Triplet accuracies of the networks on maps, by label, for clips of so many frames."""
+        from models.evaluation.embeddings import takes_any_length, triplet_accuracies
+        from models.training.inputs import prepare_films
+
+        def films(front_end: FrontEnd, cropping: Cropping) -> Prepared:
+            with progress(len(self._side(side)), f"prepare {front_end.frames} frames of {side}", "film") as advance:
+                return prepare_films(
+                    self._side(side), front_end, cropping, variants=1, folder=self._cache, workers=self._workers,
+                    advance=advance,
+                )  # fmt: skip
+
+        labels: dict[str, list[Estimator]] = {}
+        for estimator in chosen:
+            if takes_any_length(estimator):
+                labels.setdefault(estimator.name, []).append(estimator)
+        if frames and not labels:
+            raise InputError(
+                "no network on maps", where="--frames", fix="name one, such as wave or sdn, or leave --frames out"
+            )
+        return [point for runs in labels.values() for point in triplet_accuracies(runs, frames, films, seed=self._seed)]
+
+    def _reads(self, told: Sequence[Predictions], side: str, data: str) -> list[Read]:
+        from models.evaluation.embeddings import readouts
+
+        table = self._side(side).table
+        parameters = {str(name): table.parameters[:, column] for column, name in enumerate(table.names)}
+        return readouts(told, parameters, data=data, seed=self._seed)
 
     @property
     def _stated(self) -> str:

@@ -1,4 +1,4 @@
-"""What a clip costs in processor time of one thread: the front end from pixels, a step of training, an estimate; medians.
+"""What a clip costs: the front end from pixels, a step of training, an estimate; medians of one thread's time.
 
 The plain front end is the definition that tests hold the fast one to: SciPy's filters, torch's pooling and the
 periodogram layer.

@@ -73,6 +73,29 @@ def test_models_are_judged_with_intervals_over_simulations(lake: Path, tmp_path:
     assert '"rmse"' in text
 
 
+def test_triplets_are_told_of_clips_of_other_lengths_and_cloth_is_read_from_embeddings(
+    lake: Path, tmp_path: Path
+) -> None:
+    found = run(
+        "evaluate", "small", "--dataset", "made", "--at", "main", "--lake", str(lake), "--out", str(tmp_path),
+        "--frames", "8", "--frames", "12", "--linear",
+    )  # fmt: skip
+    assert [(point["label"], point["frames"]) for point in found["frames"]] == [("small", 8), ("small", 12)]
+    assert all(0 <= point["accuracy"] <= 1 for point in found["frames"])
+    assert found["frames"][0]["accuracy"] != found["frames"][1]["accuracy"]
+    assert set(found["linear"][0]["pearson"]) == {"log density", "log stiffness"}
+    text = (tmp_path / "evaluation.md").read_text()
+    assert "## Triplet accuracy against frames" in text
+    assert "## Linear readout of the embedding" in text
+
+
+def test_clips_longer_than_the_films_are_refused(lake: Path, tmp_path: Path) -> None:
+    longer = ["evaluate", "small", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path), "--frames", "90"]
+    done = CliRunner().invoke(root, longer)
+    assert isinstance(done.exception, InputError)
+    assert "a film of 14 frames" in str(done.exception)
+
+
 def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(lake: Path, tmp_path: Path) -> None:
     recipe = load(str(lake.parent / "small.toml"))
     source = flagdata.open(lake)

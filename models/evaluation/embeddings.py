@@ -1,0 +1,85 @@
+"""What embeddings are worth beside the table: triplets of clips of other lengths, and what a linear model reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.rng import stream
+from models.crops import Cropping
+from models.estimator import Estimator
+from models.evaluation import triplets
+from models.evaluation.bootstrap import Resamples, estimate
+from models.evaluation.curves import FramesPoint
+from models.evaluation.evaluation import Read
+from models.evaluation.linear import bouman
+from models.evaluation.predict import embedded
+from models.evaluation.predictions import Predictions
+from models.frontend import FrontEnd
+from models.targets import truth
+from models.training.inputs import Prepared
+
+Films = Callable[[FrontEnd, Cropping], Prepared]
+"""A front end and how films are cut → one clip of each film of the side that is judged."""
+
+
+def triplet_accuracies(
+    runs: Sequence[Estimator], frames: Sequence[int], films: Films, *, seed: int
+) -> list[FramesPoint]:
+    """Triplet accuracy of one network's embedding, given so many frames of each film from a random one on.
+
+    A network on maps takes clips of any length, as the maps' size does not depend on it. It is not trained anew: what
+    is told is what its distance is worth on clips that are shorter or longer than those it learned from.
+
+    Args:
+        runs: networks of one recipe from several seeds; the mean over them is told.
+        frames: lengths of the clips.
+
+    Raises:
+        InputError: a film that is shorter, a length that the front end does not take, or clips without a triplet.
+    """
+    points, first = [], runs[0]
+    for count in frames:
+        cropping = replace(first.cropping, frames=count, scales=(1.0,), mirror=False)
+        clips = films(replace(first.front_end, frames=count), cropping)
+        resamples = Resamples.of(clips.sequence, generator=stream(seed, "evaluation", "bootstrap"))
+        chosen = triplets.draw(clips.sequence, seed=seed)
+        values = [triplets.accuracy_values(embedded(run.learners[0], clips), chosen, resamples) for run in runs]
+        found = estimate(np.mean(values, axis=0), clips=len(clips), groups=resamples.groups)
+        points.append(
+            FramesPoint(label=first.name, frames=count, accuracy=found.value, interval=(found.low, found.high))
+        )
+    return points
+
+
+def takes_any_length(estimator: Estimator) -> bool:
+    """Whether a network can be given clips of other lengths than those it learned from, and has an embedding."""
+    return estimator.front_end.maps in ("spectral-maps", "wave-maps")
+
+
+def readouts(
+    predictions: Sequence[Predictions], parameters: Mapping[str, NDArray[np.float64]], *, data: str, seed: int
+) -> list[Read]:
+    """The protocol of Bouman et al. 2013 on the embedding of each model's first run, one simulation left out at a time.
+
+    Read out are the logarithms of the area weight [kg/m²] and of the stiffness, the geometric mean of the 15 bending
+    coefficients [N·m].
+
+    Args:
+        parameters: name → (n,) values of the clips, as their records state them.
+
+    Raises:
+        InputError: too few clips, or a quantity that they do not state or that is the same in all of them.
+    """
+    density, bending = truth(parameters, ("density", "bending_scale")).T
+    quantities = {"density": density, "stiffness": 10**bending}
+    reads: dict[str, Read] = {}
+    for own in predictions:
+        if own.embedding is not None and own.label not in reads:
+            generator = stream(seed, "evaluation", "readout", own.label)
+            readout = bouman(own.embedding, quantities, group=own.group, generator=generator)
+            reads[own.label] = Read(label=own.label, data=data, readout=readout)
+    return list(reads.values())
