@@ -23,6 +23,7 @@ VALIDATIONS = {
     "real-flag": "tests.validation.real_flag",
     "refinement": "tests.validation.refinement",
     "renderers": "tests.validation.renderers",
+    "replicates": "tests.validation.replicates",
     "robot-held": "tests.validation.robot_held",
     "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
