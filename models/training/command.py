@@ -102,7 +102,7 @@ def trained(
 
     import flagdata
     from flagdata.provenance import digest
-    from models.training.inputs import prepare_clips, prepare_films
+    from models.training.inputs import film_rows, prepare_clips, prepare_films
     from models.training.publish import data_identity, network_artifact, publish
     from models.training.steps import Training
 
@@ -123,7 +123,8 @@ def trained(
         first = not several or ranks.get_rank() == 0
         if several and not first:
             ranks.barrier()  # the first prepares the inputs for all
-        with bars(len(set(train_pairs.table.recording.tolist())), f"{recipe.name}: prepare", "film") as advance:
+        films = len(film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed))
+        with bars(films, f"{recipe.name}: prepare", "film") as advance:
             train_inputs = prepare_films(
                 train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=cache,
                 workers=workers, advance=advance, sequences=recipe.data.sequences, seed=recipe.seed,

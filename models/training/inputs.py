@@ -164,8 +164,7 @@ def prepare_films(
         InputError: films that are too short, or too few sequences.
         FlagdataError: the disk is full.
     """
-    rows = np.unique(pairs.table.recording, return_index=True)[1]
-    rows = rows[_first_sequences(pairs, rows, count=sequences, seed=seed)]
+    rows = film_rows(pairs, sequences=sequences, seed=seed)
 
     def key(row: int) -> dict[str, Any]:
         return {"film": pairs.table.recording[row], "variants": variants, "crops": asdict(cropping)}
@@ -176,6 +175,16 @@ def prepare_films(
         return [cropping.cut(film, crop) for crop in drawn]
 
     return _prepared(pairs, rows, front_end, key, made, variants, folder, workers, advance)
+
+
+def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> NDArray[np.int64]:
+    """A row of the table for each film, of all simulations or of the first of a random order of this seed.
+
+    Raises:
+        InputError: fewer simulations than are asked for.
+    """
+    rows = np.unique(pairs.table.recording, return_index=True)[1]
+    return rows[_first_sequences(pairs, rows, count=sequences, seed=seed)]
 
 
 def prepare_clips(
