@@ -42,7 +42,7 @@ from sim.run.recipe import IntegratorSpec
 from tests.validation import wave_ablation
 
 FLAGS = int(os.environ.get("FLAGDATA_TRANSFER_FLAGS", "60"))
-"""Flags of each change; Cycles, which takes half a minute a film, has a quarter of them."""
+"""Flags of each change; Cycles, which takes two minutes a film, has a quarter of them."""
 VIEWS = 10  # cameras on each run of the reference simulator
 LEVEL, FALSE_ALARM = 0.9, 0.05
 DRAWS = 1000
