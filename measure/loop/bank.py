@@ -228,6 +228,11 @@ def _number(path: Path) -> int:
     return int(number)
 
 
+def files(folder: Path) -> list[Path]:
+    """The batches of a folder."""
+    return sorted(folder.glob("nulls-*.npz"))
+
+
 def load(folder: Path, *, words: str) -> NullBank:
     """The bank of a folder.
 
@@ -236,7 +241,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         CorruptError: a file that cannot be read, or of other columns.
         InputError: too few batches.
     """
-    paths = sorted(folder.glob("nulls-*.npz"))
+    paths = files(folder)
     if not paths:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []
