@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 import torch
@@ -27,10 +26,10 @@ from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.lines import Spectrum
 from measure.loop.moment import PoleMoment
+from measure.loop.rows import Rows
 from measure.loop.wind_log import sensitivities
 
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
 _CHUNK = 64
 """Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
@@ -47,7 +46,7 @@ as for a point that moves evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Statistics:
+class Statistics(Rows):
     """Sums over the frames and markers of segments.
 
     Attributes:
@@ -84,46 +83,6 @@ class Statistics:
         if self.lines is None:
             raise UsageError("no spectra", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
         return self.lines
-
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Statistics:
-        """The same for some segments only."""
-        return Statistics(
-            recording=self.recording[chosen], r=self.r[chosen], response=self.response[chosen],
-            error=self.error[chosen], marker_error=self.marker_error[chosen],
-            lines=None if self.lines is None else self.lines[chosen],
-            turning=None if self.turning is None else self.turning.select(chosen),
-            course=None if self.course is None else self.course.select(chosen),
-            log=None if self.log is None else self.log[chosen],
-        )  # fmt: skip
-
-    @classmethod
-    def joined(cls, parts: Sequence[Statistics]) -> Statistics:
-        """One after another.
-
-        Raises:
-            UsageError: none, or lines, moments or courses of some alone.
-        """
-        if not parts:
-            raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
-        lines = _all_or_none([p.lines for p in parts], "spectra")
-        turning = _all_or_none([p.turning for p in parts], "moments")
-        courses = _all_or_none([p.course for p in parts], "courses")
-        logs = _all_or_none([p.log for p in parts], "what the log may be off by")
-        return cls(
-            recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
-            response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
-            marker_error=np.concatenate([p.marker_error for p in parts]),
-            lines=np.concatenate(lines) if lines else None,
-            turning=cls.joined(turning) if turning else None, course=Course.joined(courses) if courses else None,
-            log=np.concatenate(logs) if logs else None,
-        )  # fmt: skip
-
-
-def _all_or_none(parts: Sequence[T | None], what: str) -> list[T]:
-    known = [part for part in parts if part is not None]
-    if known and len(known) < len(parts):
-        raise UsageError(f"{what} of some parts alone", where="statistics", fix="look at them in all or in none")
-    return known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
