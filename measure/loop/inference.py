@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +138,7 @@ class Nulls(Rows):
         return index.reshape(-1)
 
     @classmethod
-    def joined(cls, parts: Sequence[Nulls]) -> Nulls:
+    def joined(cls, parts: Sequence[Self]) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
         """One after another, of as many markers as all have; recordings and numerics are those of the parts."""
         least = min(part.statistics.marker_error.shape[1] for part in parts)
         return super().joined([

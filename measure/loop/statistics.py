@@ -20,7 +20,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column, winds
 from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
@@ -73,17 +72,6 @@ class Statistics(Rows):
     course: Course | None = None
     log: Floats | None = None
 
-    @property
-    def spectra(self) -> Floats:
-        """`lines`, which must have been looked at.
-
-        Raises:
-            UsageError: they were not.
-        """
-        if self.lines is None:
-            raise UsageError("no spectra", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
-        return self.lines
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Projection:
@@ -108,19 +96,14 @@ class Projection:
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
         """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
-        directions: list[Tensor] = []
-        for place in range(scale.shape[1]):
-            moved = torch.stack([_scaled(change, scale, place) for change in changes])
-            directions.append(moved / moved.norm(dim=1, keepdim=True))
-        return cls(directions=torch.stack(directions), scale=scale)
+        moved = torch.stack([_plain(change, scale).flatten(1) for change in changes], dim=1)
+        moved /= moved.norm(dim=2, keepdim=True)
+        return cls(directions=moved, scale=scale)
 
     def of(self, errors: Tensor) -> Floats:
         """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
-        parts = [
-            direction @ _weighed(errors[..., place], self.scale[:, place]).to(direction.dtype)
-            for place, direction in enumerate(self.directions)
-        ]
-        return torch.stack(parts).double().cpu().numpy()
+        clipped = _clipped(errors, self.scale).flatten(1).to(self.directions)
+        return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
 
     def turned(self, errors: Tensor) -> Floats | None:
         """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
@@ -131,7 +114,7 @@ class Projection:
 
     def course(self, errors: Tensor) -> Course | None:
         """The wind's course, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
-        return None if self.gauge is None else self.gauge.course(_over_scale(errors, self.scale))
+        return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
 
     def lines(self, errors: Tensor) -> Floats | None:
         """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
@@ -139,16 +122,8 @@ class Projection:
 
     def response(self, changes: Sequence[Tensor]) -> Floats:
         """(segment, column, k) how r moves with k sensitivities (frame, marker, 3, segment) [m per unit]."""
-        parts = [
-            direction @ torch.stack([_scaled(change, self.scale, place) for change in changes], dim=1)
-            for place, direction in enumerate(self.directions)
-        ]
-        return torch.stack(parts).double().cpu().numpy()
-
-
-def _scaled(change: Tensor, scale: Tensor, place: int) -> Tensor:
-    """(frame · marker · 3,) of one segment, over its scale."""
-    return (change[..., place] / scale[None, :, place, None]).reshape(-1)
+        moved = torch.stack([_plain(change, self.scale).flatten(1) for change in changes], dim=2)
+        return (self.directions @ moved).double().cpu().numpy()
 
 
 def statistics(
@@ -217,7 +192,7 @@ def _pieces(
         found = replace(
             reduced(base, changes, recording, own.noise, own.counted),
             lines=_spectrum(forecaster, own).prominence(base), turning=turned,
-            course=gauge.course(_over_scale(base, scale)),
+            course=gauge.course(_clipped(base, scale)),
         )  # fmt: skip
         yield _Piece(
             segments=own, calibrations=starts, base=base, changes=changes, scale=scale, pole_moment=pole_moment,
@@ -240,11 +215,6 @@ def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statis
         scores = [piece.gauge.course(_plain(own, piece.scale)).score for own in off]
         course = replace(course, log=np.stack(scores, axis=-1))
     return replace(piece.found, log=along.response(off), turning=turning, course=course)
-
-
-def _plain(changes: Tensor, scale: Tensor) -> Tensor:
-    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
-    return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
 def _turned(
@@ -298,17 +268,16 @@ def error_scale(
     return scale
 
 
-def _over_scale(errors: Tensor, scale: Tensor) -> Tensor:
-    """(segment, frame, marker · 3) of errors (frame, marker, 3, segment) over (marker, segment), long ones clipped."""
-    parts = [_weighed(errors[..., place], scale[:, place]) for place in range(errors.shape[-1])]
-    return torch.stack(parts).unflatten(1, (errors.shape[0], -1))
+def _plain(changes: Tensor, scale: Tensor) -> Tensor:
+    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
+    return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
-def _weighed(error: Tensor, scale: Tensor) -> Tensor:
-    """(frame · marker · 3,) errors (frame, marker, 3) over their scale (marker,), long ones clipped."""
-    error = error / scale[None, :, None]
-    size = error.norm(dim=2, keepdim=True) / 3**0.5
-    return (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1)
+def _clipped(errors: Tensor, scale: Tensor) -> Tensor:
+    """The same of errors, long ones clipped."""
+    errors = errors / scale[None, :, None]
+    size = errors.norm(dim=2, keepdim=True) / 3**0.5
+    return (errors * (_CLIP / size.clamp(min=_CLIP))).permute(3, 0, 1, 2).flatten(2)
 
 
 def reduced(
@@ -328,8 +297,9 @@ def reduced(
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
     scale = error_scale(base, recording, noise, counted)
+    errors = _clipped(base, scale)
     for place in range(len(recording)):
-        error = _weighed(base[..., place], scale[:, place]).double()
+        error = errors[place].flatten().double()
         moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
         inner = (moved @ moved.T).cpu().numpy()
         length = np.sqrt(np.diag(inner))
