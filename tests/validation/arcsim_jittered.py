@@ -165,7 +165,7 @@ def _page(told: Mapping[str, Any]) -> str:
     lines = ["# The loop on four experiments of ArcSim", ""]
     for draw in DRAWS:
         lines += [
-            f"## Nulls drawn {'once' if draw == 1 else 'anew'}", "",
+            f"## Nulls of draw {draw}", "",
             "| what acted | verdict | p | density, of nominal | bending, of nominal | damping [ms] | right | s |",
             "|---|---|---|---|---|---|---|---|",
         ]  # fmt: skip
