@@ -38,8 +38,8 @@ WINDS = (3, 5, 7)
 DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "3"))))
 """Of the nulls, some 13 minutes of a core each; FLAGDATA_DRAWS says how many."""
 _UNIT = 1e-4  # m, of the stored positions
-_PARTS = (40, 80)
-"""Kinds of the smaller draws."""
+_PARTS = (40,)
+"""Kinds of the smaller draws: as many as one draw has."""
 _SHOWN = 7
 """Candidates that are told."""
 

@@ -24,7 +24,7 @@ from measure.loop.setting import Setting
 from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.observe.trajectory import Experiment
 
-_DRAWS = 100
+_DRAWS = 50
 _ENDS = (0.05, 0.95)
 """Quantiles between which nine draws of ten lie."""
 
