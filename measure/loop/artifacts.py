@@ -20,6 +20,7 @@ from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical, digest, file_hash
 from flagdata.schema import Kind
+from measure.loop.bank import files
 from measure.loop.close import Options
 from measure.loop.named import NamedModel, acting
 from measure.loop.verdict import Verdict
@@ -154,7 +155,7 @@ def _recipe(closed: Closed) -> dict[str, Any]:
     options = closed.options
     bank = None
     if options.bank is not None:
-        bank = digest(" ".join(file_hash(path) for path in sorted(options.bank.glob("nulls-*.npz"))))
+        bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
     return {
         "close-loop": 1, "experiment": fingerprint(closed.experiment), "level": options.level,
         "nulls": None if options.bank is not None else options.nulls, "bank": bank,

@@ -36,10 +36,6 @@ WINDS = 4
 differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
 _VERSION = 2
 """Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm."""
-_ADDED = {
-    "version", "anchors_told", "period", "cloth", "lines", "turned", "turning", "moment", "course", "course_curvature"
-}  # fmt: skip
-"""What batches of older versions lack, some of it or all."""
 _SEGMENTS = (
     "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
     "turned", "turning", "moment", "course", "course_curvature",
@@ -156,28 +152,18 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
 def _cache(folder: Path, batch: NullBatch, index: int) -> None:
     nulls, duration = evaluate(batch, index, columns())
     own = nulls.statistics
+    if own.lines is None or own.turning is None or own.course is None:
+        raise UsageError("no spectra, moments or courses", where="null bank", fix="take statistics by `statistics`")
     buffer = BytesIO()
     np.savez(
         buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
-        response=own.response, error=own.error, marker_error=own.marker_error, lines=own.spectra, speeds=nulls.speeds,
+        response=own.response, error=own.error, marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds,
         calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
-        duration=np.array(duration),
-        anchors_told=np.array(batch.specimen.anchors_told), turned=_moments(own).r, turning=_moments(own).response,
-        moment=_moments(own).error, course=_course(own).score, course_curvature=_course(own).curvature,
+        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told), turned=own.turning.r,
+        turning=own.turning.response, moment=own.turning.error, course=own.course.score,
+        course_curvature=own.course.curvature,
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
-
-
-def _moments(own: Statistics) -> Statistics:
-    if own.turning is None:
-        raise UsageError("no moments", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
-    return own.turning
-
-
-def _course(own: Statistics) -> Course:
-    if own.course is None:
-        raise UsageError("no courses", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
-    return own.course
 
 
 def _file(folder: Path, index: int) -> Path:
@@ -198,7 +184,7 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
         raise
     except Exception as error:  # noqa: BLE001  zip, zlib and numpy each raise errors of their own kinds
         raise CorruptError(f"not a batch of nulls: {error}", where=str(path), fix=rebuild) from None
-    if not set(content) >= {*_ADDED, *_SEGMENTS, "columns", "duration"}:
+    if not set(content) >= {*_SEGMENTS, "version", "columns", "duration", "anchors_told"}:
         raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
     if content["version"].ravel().tolist() != [_VERSION]:
         raise CorruptError("its arrays are those of another version", where=str(path), fix="build the bank again")
@@ -228,6 +214,11 @@ def _number(path: Path) -> int:
     return int(number)
 
 
+def files(folder: Path) -> list[Path]:
+    """The batches of a folder."""
+    return sorted(folder.glob("nulls-*.npz"))
+
+
 def load(folder: Path, *, words: str) -> NullBank:
     """The bank of a folder.
 
@@ -236,7 +227,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         CorruptError: a file that cannot be read, or of other columns.
         InputError: too few batches.
     """
-    paths = sorted(folder.glob("nulls-*.npz"))
+    paths = files(folder)
     if not paths:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []

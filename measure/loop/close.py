@@ -48,7 +48,18 @@ from measure.loop.statistics import Projection, Statistics, projected
 from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 from measure.loop.whitened_misfit import WhitenedMisfit
 from measure.loop.wind_log import lags
-from measure.loop.words import assumptions, blowing, bounds, clocks, proposal, ratios, sentence, separating, shedding
+from measure.loop.words import (
+    assumptions,
+    blowing,
+    bounds,
+    by_draw,
+    clocks,
+    proposal,
+    ratios,
+    sentence,
+    separating,
+    shedding,
+)
 from measure.observe.trajectory import Experiment
 
 Floats = NDArray[np.float64]
@@ -195,6 +206,11 @@ class Solved:
         return None
 
 
+def fitted_base(setting: Setting, bank: NullBank) -> tuple[Setting, Fits]:
+    """The base model fitted by all directions: the setting at its calibration, and the models that begin there."""
+    return _calibrated(setting, _fits(setting, *_looked_at(setting), bank), bank)
+
+
 def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
     """Errors of the base model along all columns, and the directions."""
     starts = [setting.calibration] * len(setting.segments)
@@ -292,12 +308,15 @@ def _verdict(
     after = None if larger is None else _unseen(setting, larger)
     conformal, reach = solved.reference.conformal, solved.reference.reach
     low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
+    undecided = low <= options.level <= high and conformal.tests(options.level)
+    more = conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="",
         test=NullTest(
             statistic=judgement.statistic, null=[float(v) for v in conformal.null], kinds=conformal.count,
             p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
-            level=options.level, critical=conformal.critical(options.level), nulls=bank.words,
+            level=options.level, critical=conformal.critical(options.level), nulls=bank.words, open=undecided,
+            settling=more,
         ),
         parameters=_parameters(solved.base, larger, reach), ranking=_ranking(solved, larger),
         comparisons=trial.comparisons, apart=trial.control,
@@ -312,7 +331,10 @@ def _verdict(
     return replace(
         verdict, separating=separating(verdict),
         words=" ".join(
-            [sentence(verdict), *bounds(solved.base if larger is None else larger), *ratios(setting.experiment)]
+            [
+                sentence(verdict), *by_draw(verdict.test), *bounds(solved.base if larger is None else larger),
+                *ratios(setting.experiment),
+            ]
         ),
         proposal=_proposal(solved), seconds=time.perf_counter() - began,
     )  # fmt: skip

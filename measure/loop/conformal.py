@@ -26,6 +26,9 @@ from measure.shares import clopper_pearson
 
 Floats = NDArray[np.float64]
 
+MOST_KINDS = 1000
+"""Kinds of numerics beyond which none are proposed: 1,000 take some six hours of a core."""
+
 
 def kinds_needed(level: float) -> int:
     """The fewest kinds of numerics by which a level can be tested: K + 1 ≥ 1/level."""
@@ -72,6 +75,20 @@ class GroupedConformal:
         """Interval of the share of all kinds, simulated or not, that are at least as far, by how many kinds happen to
         be among the nulls (Clopper and Pearson's interval, with sums of shares in place of counts)."""
         return clopper_pearson(self._as_far(value), self.count, level=level)
+
+    def settling(self, value: float, *, at: float, level: float) -> int | None:
+        """The fewest kinds, no fewer than there are, whose `interval` would not hold a share `at`, if the same share of
+        them is as far; None beyond `MOST_KINDS`."""
+        share = self._as_far(value) / self.count
+
+        def holds(count: int) -> bool:
+            low, high = clopper_pearson(share * count, count, level=level)
+            return low <= at <= high
+
+        if holds(MOST_KINDS):
+            return None
+        # The interval narrows about the share, so that it holds `at` up to some count and then no more.
+        return next((count for count in range(self.count, MOST_KINDS) if not holds(count)), MOST_KINDS)
 
     def quantile(self, share: float) -> float:
         """The value that one more kind does not exceed with a chance of `share` or more; infinite where there are too

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from measure.loop.criteria import CRITERIA
+from measure.loop.rows import Rows
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ _WINDOW = 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Course:
+class Course(Rows):
     """The wind's course in segments.
 
     Attributes:
@@ -47,20 +48,6 @@ class Course:
     score: Floats
     curvature: Floats
     log: Floats | None = None
-
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Course:
-        """The same for some segments only."""
-        log = None if self.log is None else self.log[chosen]
-        return Course(score=self.score[chosen], curvature=self.curvature[chosen], log=log)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Course]) -> Course:
-        """One after another."""
-        logs = [p.log for p in parts if p.log is not None]
-        return cls(
-            score=np.concatenate([p.score for p in parts]), curvature=np.concatenate([p.curvature for p in parts]),
-            log=np.concatenate(logs) if logs else None,
-        )  # fmt: skip
 
     def swing(self, recording: NDArray[np.int64]) -> Floats:
         """(part,) Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment.

@@ -26,6 +26,7 @@ from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
 from measure.loop.columns import (
+    DOUBLE,
     THETA,
     Calibration,
     Column,
@@ -383,41 +384,65 @@ class Forecaster:
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> Tensor:
         """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
-        if isinstance(column, WrittenColumn):
-            seen, rest = self._real(segments.positions), self.specimen.mesh.rest
-            moved = column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
-            if segments.counted is None:
-                return moved
-            return moved * self._real(segments.counted.astype(np.float64))[:, :, None]
-        if not isinstance(column, StepColumn):
-            raise UsageError(f"{column.name} has no sensitivity", where="columns", fix="give a StepColumn")
-        system, state = column.system(*self.system(segments, calibrations))
-        return (base - self.errors(system, state, segments)) / column.step
+        return self._changes([column], segments, calibrations, base)[0]
 
     def sensitivities(
         self, columns: Sequence[Column], segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> list[Tensor]:
-        """The same of each parameter of `THETA`, then of each column.
+        """The same of each parameter of `THETA`, then of each column."""
+        return self._changes([*range(len(THETA)), *columns], segments, calibrations, base)
 
-        All that are steps run in one joint batch.
-        """
-        nominal = self.system(segments, calibrations)
-        steps = [
-            (size, self.system(segments, _moved(calibrations, place, size))) for place, (_, _, size) in enumerate(THETA)
-        ]
-        steps += [(column.step, column.system(*nominal)) for column in columns if isinstance(column, StepColumn)]
-        errors = self.errors_jointly([moved for _, moved in steps], segments)
-        changes = [(base - own) / size for own, (size, _) in zip(errors, steps, strict=True)]
-        found = iter(changes[len(THETA) :])
+    def _changes(
+        self,
+        wanted: Sequence[Column | int],
+        segments: Segments,
+        calibrations: Sequence[Calibration],
+        base: Tensor,
+    ) -> list[Tensor]:
+        """The same of columns and of places in `THETA`: steps in one joint batch, those of `DOUBLE` in one of their own
+        in double precision."""
+        steps = [place for place, one in enumerate(wanted) if not isinstance(one, WrittenColumn)]
+        exact = [place for place in steps if self.dtype != torch.float64 and _name(wanted[place]) in DOUBLE]
+        plain = [place for place in steps if place not in exact]
+        double = replace(self, dtype=torch.float64)
+        found = dict(zip(plain, self._stepped([wanted[p] for p in plain], segments, calibrations, base), strict=True))
+        if exact:
+            found |= zip(exact, double._stepped([wanted[p] for p in exact], segments, calibrations, None), strict=True)
         return [
-            *changes[: len(THETA)],
-            *(
-                next(found)
-                if isinstance(column, StepColumn)
-                else self.sensitivity(column, segments, calibrations, base)
-                for column in columns
-            ),
+            self._written(one, segments) if isinstance(one, WrittenColumn) else found[place].to(base)
+            for place, one in enumerate(wanted)
         ]
+
+    def _stepped(
+        self,
+        wanted: Sequence[Column | int],
+        segments: Segments,
+        calibrations: Sequence[Calibration],
+        base: Tensor | None,
+    ) -> list[Tensor]:
+        """The same of steps; the base's errors are found beside theirs where they are not given."""
+        nominal = self.system(segments, calibrations)
+        sizes: list[float] = []
+        batches: list[tuple[System, State]] = [] if base is not None else [nominal]
+        for one in wanted:
+            if isinstance(one, int):
+                sizes.append(THETA[one][2])
+                batches.append(self.system(segments, _moved(calibrations, one, sizes[-1])))
+            elif isinstance(one, StepColumn):
+                sizes.append(one.step)
+                batches.append(one.system(*nominal))
+            else:
+                raise UsageError(f"{one.name} has no sensitivity", where="columns", fix="give a StepColumn")
+        errors = self.errors_jointly(batches, segments)
+        start = errors.pop(0) if base is None else base
+        return [(start - own) / size for own, size in zip(errors, sizes, strict=True)]
+
+    def _written(self, column: WrittenColumn, segments: Segments) -> Tensor:
+        seen, rest = self._real(segments.positions), self.specimen.mesh.rest
+        moved = column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
+        if segments.counted is None:
+            return moved
+        return moved * self._real(segments.counted.astype(np.float64))[:, :, None]
 
     def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
         """`errors` of each of some batches of the same segments.
@@ -437,6 +462,10 @@ class Forecaster:
         with ThreadPoolExecutor(self.workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
             done = list(pool.map(run, shares))
         return [done[place % together][place // together] for place in range(len(batches))]
+
+
+def _name(one: Column | int) -> str:
+    return THETA[one][0] if isinstance(one, int) else one.name
 
 
 def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from flagdata.errors import UsageError
 from measure.loop.columns import PRIOR, THETA, Calibration
 from measure.loop.course import Course
 from measure.loop.growth import power
+from measure.loop.rows import Rows
 from measure.loop.statistics import Statistics
 from measure.loop.wind_log import by_recording
 
@@ -108,7 +110,7 @@ class NullModel:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Nulls:
+class Nulls(Rows):
     """Segments of null recordings, with what they were made with.
 
     Attributes:
@@ -135,26 +137,14 @@ class Nulls:
         _, index = np.unique(np.c_[self.numerics, self.calibration], axis=0, return_inverse=True)
         return index.reshape(-1)
 
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Nulls:
-        """Some segments."""
-        return Nulls(
-            statistics=self.statistics.select(chosen), speeds=self.speeds[chosen], calibration=self.calibration[chosen],
-            numerics=self.numerics[chosen], noise=self.noise[chosen], period=self.period[chosen],
-            cloth=self.cloth[chosen],
-        )  # fmt: skip
-
     @classmethod
-    def joined(cls, parts: Sequence[Nulls]) -> Nulls:
+    def joined(cls, parts: Sequence[Self]) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
         """One after another, of as many markers as all have; recordings and numerics are those of the parts."""
         least = min(part.statistics.marker_error.shape[1] for part in parts)
-        own = [replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]) for p in parts]
-        return cls(
-            statistics=Statistics.joined(own), speeds=np.concatenate([p.speeds for p in parts]),
-            calibration=np.concatenate([p.calibration for p in parts]),
-            numerics=np.concatenate([p.numerics for p in parts]),
-            noise=np.concatenate([p.noise for p in parts]), period=np.concatenate([p.period for p in parts]),
-            cloth=np.concatenate([p.cloth for p in parts]),
-        )  # fmt: skip
+        return super().joined([
+            replace(p, statistics=replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]))
+            for p in parts
+        ])  # fmt: skip
 
     def beyond(self, design: Design) -> Floats:
         """(segment, k) by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary."""
@@ -251,7 +241,7 @@ def _shrunk(covariance: Floats, count: int) -> Floats:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
+class Evidence(Rows):
     """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
 
     Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
@@ -268,6 +258,8 @@ class Evidence:
         course: of the wind, as the errors tell it; None where not looked at.
         prior: of the calibrated parameters, see `NullModel`.
     """
+
+    _WHOLE: ClassVar = frozenset({"columns", "prior"})
 
     recording: NDArray[np.int64]
     curvature: Floats
@@ -321,15 +313,6 @@ class Evidence:
         """Columns that are always fitted: the calibrated parameters, the shifts of the numerics, and what the logs of
         the wind may be off by."""
         return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
-
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Evidence:
-        """The same for some segments only; indices may repeat."""
-        return Evidence(
-            recording=self.recording[chosen], curvature=self.curvature[chosen], score=self.score[chosen],
-            energy=self.energy[chosen], columns=self.columns, lines=None if self.lines is None else self.lines[chosen],
-            turning=None if self.turning is None else self.turning.select(chosen),
-            course=None if self.course is None else self.course.select(chosen), prior=self.prior,
-        )  # fmt: skip
 
     @property
     def swing(self) -> Floats | None:

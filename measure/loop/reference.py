@@ -19,6 +19,7 @@ from measure.loop.fluctuation import fluctuation
 from measure.loop.growth import power
 from measure.loop.inference import Design, Evidence, NullModel, Nulls, best_gain
 from measure.loop.lines import Line, Lines, strongest
+from measure.loop.rows import Rows
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
@@ -120,74 +121,59 @@ class NullBank:
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
         """
-        plain, beside_gusts = _Groups(), _Groups()
+        plain: list[_Found] = []
+        beside_gusts: list[_Found] = []
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model)
             for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
-                picked, own = evidence.select(chosen), float(kept.outside.noise[chosen[0]])
-                kind, nominal = int(kept.outside.numerics[chosen[0]]), -kept.outside.calibration[chosen[0]]
-                plain.add(picked, self.columns, own, kind, nominal)
-                beside_gusts.add(picked.freed(self.columns.index(GUSTS)), self.columns, own, kind, nominal)
-        return Reference.of(plain, noise, beside_gusts=Reference.of(beside_gusts, noise))
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Groups:
-    """Statistics of null groups, as they are gathered."""
-
-    shares: list[Floats] = field(default_factory=list)
-    left: list[float] = field(default_factory=list)
-    gained: list[float] = field(default_factory=list)
-    swings: list[Floats] = field(default_factory=list)
-    lines: list[Floats] = field(default_factory=list)
-    noises: list[float] = field(default_factory=list)
-    kinds: list[int] = field(default_factory=list)
-    deviations: list[Floats] = field(default_factory=list)
-    damping: list[float] = field(default_factory=list)
-
-    def add(self, evidence: Evidence, columns: tuple[str, ...], noise: float, kind: int, nominal: Floats) -> None:
-        """Add a group whose statistics are at its true calibration, the nominal one so many steps away."""
-        self.shares.append(unscaled(evidence, columns))
-        self.left.append(evidence.fit(()).left)
-        self.gained.append(best_gain(evidence))
-        if evidence.swing is not None:
-            self.swings.append(evidence.swing)
-        if evidence.lines is not None:
-            self.lines.append(strongest(evidence.lines))
-        self.noises.append(noise)
-        self.kinds.append(kind)
-        self.damping.append(-float(nominal[_DAMPING]))
-        self.deviations.append(evidence.fit((), centre=nominal).in_errors(range(len(THETA))))
+                picked, own = evidence.select(chosen), kept.outside.select(chosen[:1])
+                plain.append(_Found.of(picked, self.columns, own))
+                beside_gusts.append(_Found.of(picked.freed(self.columns.index(GUSTS)), self.columns, own))
+        beside = Reference.of(_Found.joined(beside_gusts), noise)
+        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Found:
-    """Statistics of null groups: (group, column) shares, (group,) what is left, (group,) best held-out gains, (group,
-    part) swings of the wind's
-    course, of no part where it is not looked at, (group, shape · axis) lines, (group,) logarithms of the damping over
-    the nominal."""
+class _Found(Rows):
+    """Statistics of null groups.
+
+    Attributes:
+        shares: (group, column) of `unscaled`.
+        left: (group,) what the base model leaves.
+        gained: (group,) best held-out gains.
+        swings: (group, part) of the wind's course, of no part where it is not looked at.
+        lines: (group, shape · axis) `strongest`; None where spectra are not looked at.
+        deviations: (group, theta) of the calibrated parameters from the true ones, in standard errors.
+        noise: (group,) of the markers [m].
+        kinds: (group,) of numerics.
+        damping: (group,) logarithm of its ratio to the nominal one.
+    """
 
     shares: Floats
     left: Floats
     gained: Floats
     swings: Floats
     lines: Floats | None
+    deviations: Floats
+    noise: Floats
+    kinds: NDArray[np.int64]
     damping: Floats
 
     @classmethod
-    def of(cls, groups: _Groups) -> _Found:
-        lines = np.array(groups.lines) if groups.lines else None
-        swings = np.array(groups.swings).reshape(len(groups.left), -1)
-        return cls(
-            shares=np.array(groups.shares), left=np.array(groups.left), gained=np.array(groups.gained), swings=swings,
-            lines=lines, damping=np.array(groups.damping),
-        )  # fmt: skip
+    def of(cls, evidence: Evidence, columns: tuple[str, ...], own: Nulls) -> _Found:
+        """Of one group, whose statistics are at its true calibration.
 
-    def select(self, chosen: NDArray[np.bool_]) -> _Found:
-        lines = None if self.lines is None else self.lines[chosen]
-        return _Found(
-            shares=self.shares[chosen], left=self.left[chosen], gained=self.gained[chosen],
-            swings=self.swings[chosen], lines=lines, damping=self.damping[chosen],
+        Args:
+            own: one segment of it.
+        """
+        nominal = -own.calibration[0]
+        swing = np.zeros(0) if evidence.swing is None else evidence.swing
+        return cls(
+            shares=unscaled(evidence, columns)[None], left=np.array([evidence.fit(()).left]),
+            gained=np.array([best_gain(evidence)]), swings=swing[None],
+            lines=None if evidence.lines is None else strongest(evidence.lines)[None],
+            deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
+            noise=own.noise, kinds=own.numerics, damping=own.calibration[:, _DAMPING],
         )  # fmt: skip
 
 
@@ -277,14 +263,14 @@ class Reference:
     beside_gusts: Reference | None = None
 
     @classmethod
-    def of(cls, groups: _Groups, noise: float, *, beside_gusts: Reference | None = None) -> Reference:
+    def of(cls, found: _Found, noise: float, *, beside_gusts: Reference | None = None) -> Reference:
         """For data of some noise [m].
 
         Raises:
             InputError: no nulls of such noise.
         """
-        found, noises, kinds = _Found.of(groups), np.array(groups.noises), np.array(groups.kinds)
-        alike = np.abs(noises - noise) <= CRITERIA.alike_noise
+        kinds = found.kinds
+        alike = np.abs(found.noise - noise) <= CRITERIA.alike_noise
         count, needed = len(np.unique(kinds[alike])), kinds_needed(1 - CRITERIA.interval)
         if count < needed:
             raise InputError(
@@ -295,13 +281,13 @@ class Reference:
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
         for kind in np.unique(kinds):
             own = kinds == kind
-            near = np.abs(noises - noises[own][0]) <= CRITERIA.alike_noise
+            near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
             if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds:  # else no others have such noise
                 near &= ~own
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
         return cls(
-            scaled=scaled, spread=usual.spread, far=far, kinds=kinds, deviations=np.array(groups.deviations),
+            scaled=scaled, spread=usual.spread, far=far, kinds=kinds, deviations=found.deviations,
             centre=usual.centre, width=usual.width, lines=usual.lines, powers=usual.powers,
             beside_gusts=beside_gusts,
         )  # fmt: skip

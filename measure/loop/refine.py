@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError
-from measure.loop.columns import PRIOR, THETA, Calibration, Column, EffectColumn
+from measure.loop.columns import DOUBLE, PRIOR, THETA, Calibration, Column, EffectColumn
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.inference import Evidence, NullModel
 from measure.loop.model import Model, errors_of
@@ -169,6 +170,8 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
 
 
 def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
+    if any(column.name in DOUBLE for column, _ in model.effects):
+        forecaster = replace(forecaster, dtype=torch.float64)
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
     steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)

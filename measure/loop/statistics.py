@@ -14,23 +14,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import UsageError
 from measure.loop.columns import Calibration, Column, winds
 from measure.loop.course import Course, Gauge
 from measure.loop.forecast import Forecaster, Segments
 from measure.loop.lines import Spectrum
 from measure.loop.moment import PoleMoment
+from measure.loop.rows import Rows
 from measure.loop.wind_log import sensitivities
 
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
 _CHUNK = 64
 """Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
@@ -47,7 +45,7 @@ as for a point that moves evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Statistics:
+class Statistics(Rows):
     """Sums over the frames and markers of segments.
 
     Attributes:
@@ -74,57 +72,6 @@ class Statistics:
     course: Course | None = None
     log: Floats | None = None
 
-    @property
-    def spectra(self) -> Floats:
-        """`lines`, which must have been looked at.
-
-        Raises:
-            UsageError: they were not.
-        """
-        if self.lines is None:
-            raise UsageError("no spectra", where="statistics", fix="take them by `statistics`, not by `reduced` alone")
-        return self.lines
-
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Statistics:
-        """The same for some segments only."""
-        return Statistics(
-            recording=self.recording[chosen], r=self.r[chosen], response=self.response[chosen],
-            error=self.error[chosen], marker_error=self.marker_error[chosen],
-            lines=None if self.lines is None else self.lines[chosen],
-            turning=None if self.turning is None else self.turning.select(chosen),
-            course=None if self.course is None else self.course.select(chosen),
-            log=None if self.log is None else self.log[chosen],
-        )  # fmt: skip
-
-    @classmethod
-    def joined(cls, parts: Sequence[Statistics]) -> Statistics:
-        """One after another.
-
-        Raises:
-            UsageError: none, or lines, moments or courses of some alone.
-        """
-        if not parts:
-            raise UsageError("no statistics to join", where="statistics", fix="give at least one part")
-        lines = _all_or_none([p.lines for p in parts], "spectra")
-        turning = _all_or_none([p.turning for p in parts], "moments")
-        courses = _all_or_none([p.course for p in parts], "courses")
-        logs = _all_or_none([p.log for p in parts], "what the log may be off by")
-        return cls(
-            recording=np.concatenate([p.recording for p in parts]), r=np.concatenate([p.r for p in parts]),
-            response=np.concatenate([p.response for p in parts]), error=np.concatenate([p.error for p in parts]),
-            marker_error=np.concatenate([p.marker_error for p in parts]),
-            lines=np.concatenate(lines) if lines else None,
-            turning=cls.joined(turning) if turning else None, course=Course.joined(courses) if courses else None,
-            log=np.concatenate(logs) if logs else None,
-        )  # fmt: skip
-
-
-def _all_or_none(parts: Sequence[T | None], what: str) -> list[T]:
-    known = [part for part in parts if part is not None]
-    if known and len(known) < len(parts):
-        raise UsageError(f"{what} of some parts alone", where="statistics", fix="look at them in all or in none")
-    return known
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Projection:
@@ -149,19 +96,14 @@ class Projection:
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
         """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
-        directions: list[Tensor] = []
-        for place in range(scale.shape[1]):
-            moved = torch.stack([_scaled(change, scale, place) for change in changes])
-            directions.append(moved / moved.norm(dim=1, keepdim=True))
-        return cls(directions=torch.stack(directions), scale=scale)
+        moved = torch.stack([_plain(change, scale).flatten(1) for change in changes], dim=1)
+        moved /= moved.norm(dim=2, keepdim=True)
+        return cls(directions=moved, scale=scale)
 
     def of(self, errors: Tensor) -> Floats:
         """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
-        parts = [
-            direction @ _weighed(errors[..., place], self.scale[:, place]).to(direction.dtype)
-            for place, direction in enumerate(self.directions)
-        ]
-        return torch.stack(parts).double().cpu().numpy()
+        clipped = _clipped(errors, self.scale).flatten(1).to(self.directions)
+        return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
 
     def turned(self, errors: Tensor) -> Floats | None:
         """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
@@ -172,7 +114,7 @@ class Projection:
 
     def course(self, errors: Tensor) -> Course | None:
         """The wind's course, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
-        return None if self.gauge is None else self.gauge.course(_over_scale(errors, self.scale))
+        return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
 
     def lines(self, errors: Tensor) -> Floats | None:
         """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
@@ -180,16 +122,8 @@ class Projection:
 
     def response(self, changes: Sequence[Tensor]) -> Floats:
         """(segment, column, k) how r moves with k sensitivities (frame, marker, 3, segment) [m per unit]."""
-        parts = [
-            direction @ torch.stack([_scaled(change, self.scale, place) for change in changes], dim=1)
-            for place, direction in enumerate(self.directions)
-        ]
-        return torch.stack(parts).double().cpu().numpy()
-
-
-def _scaled(change: Tensor, scale: Tensor, place: int) -> Tensor:
-    """(frame · marker · 3,) of one segment, over its scale."""
-    return (change[..., place] / scale[None, :, place, None]).reshape(-1)
+        moved = torch.stack([_plain(change, self.scale).flatten(1) for change in changes], dim=2)
+        return (self.directions @ moved).double().cpu().numpy()
 
 
 def statistics(
@@ -258,7 +192,7 @@ def _pieces(
         found = replace(
             reduced(base, changes, recording, own.noise, own.counted),
             lines=_spectrum(forecaster, own).prominence(base), turning=turned,
-            course=gauge.course(_over_scale(base, scale)),
+            course=gauge.course(_clipped(base, scale)),
         )  # fmt: skip
         yield _Piece(
             segments=own, calibrations=starts, base=base, changes=changes, scale=scale, pole_moment=pole_moment,
@@ -281,11 +215,6 @@ def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statis
         scores = [piece.gauge.course(_plain(own, piece.scale)).score for own in off]
         course = replace(course, log=np.stack(scores, axis=-1))
     return replace(piece.found, log=along.response(off), turning=turning, course=course)
-
-
-def _plain(changes: Tensor, scale: Tensor) -> Tensor:
-    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
-    return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
 def _turned(
@@ -339,17 +268,16 @@ def error_scale(
     return scale
 
 
-def _over_scale(errors: Tensor, scale: Tensor) -> Tensor:
-    """(segment, frame, marker · 3) of errors (frame, marker, 3, segment) over (marker, segment), long ones clipped."""
-    parts = [_weighed(errors[..., place], scale[:, place]) for place in range(errors.shape[-1])]
-    return torch.stack(parts).unflatten(1, (errors.shape[0], -1))
+def _plain(changes: Tensor, scale: Tensor) -> Tensor:
+    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
+    return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
-def _weighed(error: Tensor, scale: Tensor) -> Tensor:
-    """(frame · marker · 3,) errors (frame, marker, 3) over their scale (marker,), long ones clipped."""
-    error = error / scale[None, :, None]
-    size = error.norm(dim=2, keepdim=True) / 3**0.5
-    return (error * (_CLIP / size.clamp(min=_CLIP))).reshape(-1)
+def _clipped(errors: Tensor, scale: Tensor) -> Tensor:
+    """The same of errors, long ones clipped."""
+    errors = errors / scale[None, :, None]
+    size = errors.norm(dim=2, keepdim=True) / 3**0.5
+    return (errors * (_CLIP / size.clamp(min=_CLIP))).permute(3, 0, 1, 2).flatten(2)
 
 
 def reduced(
@@ -369,8 +297,9 @@ def reduced(
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
     scale = error_scale(base, recording, noise, counted)
+    errors = _clipped(base, scale)
     for place in range(len(recording)):
-        error = _weighed(base[..., place], scale[:, place]).double()
+        error = errors[place].flatten().double()
         moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
         inner = (moved @ moved.T).cpu().numpy()
         length = np.sqrt(np.diag(inner))

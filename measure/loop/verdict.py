@@ -154,6 +154,10 @@ class NullTest:
         level: at which it was judged.
         critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
+        open: whether the interval of p holds the level, so that another draw of nulls could decide otherwise; None in
+            documents that do not tell.
+        settling: kinds of numerics whose interval would not hold it, if the same share of them is as far; None where
+            the test is not open, or 1,000 would not do.
     """
 
     statistic: float
@@ -163,6 +167,8 @@ class NullTest:
     level: float
     critical: float | None
     nulls: str
+    open: bool | None = None
+    settling: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,16 +9,16 @@ import numpy as np
 
 from measure.loop.attribution import heterogeneous
 from measure.loop.columns import FieldColumn
-from measure.loop.conformal import kinds_needed
+from measure.loop.conformal import MOST_KINDS, kinds_needed
 from measure.loop.course import ALONG, LEFT, Variation
 from measure.loop.criteria import CRITERIA
 from measure.loop.field import Mode
 from measure.loop.forecast import Cut
 from measure.loop.lines import STROUHAL, Line
-from measure.loop.quantity import number, probability, with_error, with_level
+from measure.loop.quantity import level_text, number, probability, with_error, with_level
 from measure.loop.refine import Refined
 from measure.loop.titles import readable, titles
-from measure.loop.verdict import Conclusion, Verdict
+from measure.loop.verdict import Conclusion, NullTest, Verdict
 from measure.observe.trajectory import Experiment
 
 _SEPARATES: dict[frozenset[str], str] = {
@@ -79,6 +79,23 @@ def _incomplete(verdict: Verdict) -> str:
                 f"(p = {probability(candidate.heterogeneity)}): another dependence on the wind would fit better"
             )
     return "the errors that remain are larger than those of simulated nulls"
+
+
+def by_draw(test: NullTest) -> tuple[str, ...]:
+    """That other nulls could decide otherwise, and how many would settle it; nothing where they hardly could."""
+    if not test.open:
+        return ()
+    p = test.p_value
+    more = (
+        f"more than {MOST_KINDS} kinds of numerics would be needed to settle it"
+        if test.settling is None
+        else f"{test.settling} kinds of numerics would settle it, if the same share of them is as far"
+    )
+    told = (
+        f"Another draw of nulls could decide otherwise: the interval of p, [{probability(p.low)}, "
+        f"{probability(p.high)}] {level_text(p.level)}, holds the level of {test.level:g}; {more}."
+    )
+    return (told,)
 
 
 def bounds(fitted: Refined) -> tuple[str, ...]:

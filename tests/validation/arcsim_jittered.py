@@ -1,9 +1,10 @@
-"""The loop closed on four experiments of ArcSim whose undeclared effect is known, by two draws of nulls.
+"""The loop closed on four experiments of ArcSim whose undeclared effect is known, by three draws of nulls.
 
 Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure of the air × 1.6, a
 linear tangential drag, and an internal damping of 30 ms. A verdict is right if it names what acted, alone or as one of
 several, and names nothing where only a calibrated parameter differs. All four are judged by the same bank of nulls, and
-once more by one that was drawn anew: verdicts that differ between the two depend on the draw.
+then by banks that were drawn anew: verdicts that differ between them depend on the draw. Beside these stands p by all
+kinds of all draws, and how it spreads over smaller draws of them.
 
 The other three are damped by ArcSim's steps alone, like 2.5 ms where a motion is slow beside them and less where it is
 not, so that whether the interval of damping holds is told of the fourth alone.
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,12 +31,15 @@ from measure.loop.verdict import Conclusion, Estimate, Verdict
 from measure.observe import Hold, Observation, Setup, from_arrays, observe
 from measure.observe.trajectory import Experiment, WindTrack
 from tests.validation.arcsim import RATE, folder
+from tests.validation.arcsim_jittered_draws import by_draws, page_of_all
 from tests.validation.flags_runs import CAMEL
 
 WINDS = (3, 5, 7)
-DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "2"))))
+DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "3"))))
 """Of the nulls, some 13 minutes of a core each; FLAGDATA_DRAWS says how many."""
 _UNIT = 1e-4  # m, of the stored positions
+_PARTS = (40,)
+"""Kinds of the smaller draws: as many as one draw has."""
 _SHOWN = 7
 """Candidates that are told."""
 
@@ -73,8 +78,26 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         wanted = batches(Setting.of(experiments["null"]), kinds=CRITERIA.simulated_kinds, seed=100 * seed + draw)
         banks.build(place / "nulls", wanted, workers=len(os.sched_getaffinity(0)))
         told[f"draw {draw}"] = {name: _once(place, name, own, seed) for name, own in experiments.items()}
+    told["all draws"] = _together(out / f"arcsim-jittered-{seed}-all", experiments, seed)
     (out / "validate-arcsim-jittered.md").write_text(_page(told), encoding="utf-8")
     return told
+
+
+def _together(place: Path, experiments: Mapping[str, Experiment], seed: int) -> dict[str, Any]:
+    """p by the kinds of all draws, from its file where it was made before."""
+    kept = place / f"{len(DRAWS)}.json"
+    if not kept.exists():
+        nulls = place / f"nulls-of-{len(DRAWS)}"
+        nulls.mkdir(parents=True, exist_ok=True)
+        made = [
+            path for draw in DRAWS for path in banks.files(place.parent / f"arcsim-jittered-{seed}-{draw}" / "nulls")
+        ]
+        for number, path in enumerate(made):
+            shutil.copyfile(path, nulls / path.with_stem(f"nulls-{number:04d}").name)
+        parts = [count for count in _PARTS if count < len(made)]
+        found = by_draws(experiments, banks.load(nulls, words="all draws"), kinds=parts, seed=seed)
+        kept.write_text(json.dumps(found, allow_nan=False), encoding="utf-8")
+    return json.loads(kept.read_text(encoding="utf-8"))
 
 
 def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str, Any]:
@@ -142,7 +165,7 @@ def _page(told: Mapping[str, Any]) -> str:
     lines = ["# The loop on four experiments of ArcSim", ""]
     for draw in DRAWS:
         lines += [
-            f"## Nulls drawn {'once' if draw == 1 else 'anew'}", "",
+            f"## Nulls of draw {draw}", "",
             "| what acted | verdict | p | density, of nominal | bending, of nominal | damping [ms] | right | s |",
             "|---|---|---|---|---|---|---|---|",
         ]  # fmt: skip
@@ -160,7 +183,7 @@ def _page(told: Mapping[str, Any]) -> str:
             for c in own["unseen"]
         ]
         lines.append("")
-    return "\n".join(lines)
+    return "\n".join([*lines, *page_of_all(told["all draws"])])
 
 
 def _span(found: Mapping[str, Any], unit: float = 1.0) -> str:

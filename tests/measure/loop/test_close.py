@@ -117,6 +117,17 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
         assert comparison.control is None or comparison.after.value < comparison.control.value
 
 
+def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_otherwise(dragged: Verdict) -> None:
+    """By twelve kinds of numerics of which none is as far, up to 22 % of all may be: 0.05^(1/12) = 0.78."""
+    test = dragged.test
+    assert test.p_value.value == pytest.approx(1 / 13)
+    assert test.p_value.high == pytest.approx(1 - 0.05 ** (1 / 12))
+    assert test.open
+    assert test.settling == 29  # 0.9^28 > 5 % > 0.9^29
+    assert "Another draw of nulls could decide otherwise" in dragged.words
+    assert "29 kinds of numerics would settle it" in dragged.words
+
+
 def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: Path, dragged: Verdict) -> None:
     data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
     again = close_loop(data, Options(bank=bank, level=0.1, workers=2))
@@ -170,6 +181,8 @@ def test_a_level_that_the_bank_cannot_test_is_said_to_be_so(specimen: Specimen, 
     assert verdict.test.p_value.value >= 1 / 13
     assert "cannot be tested at a level of 0.05" in verdict.words
     assert "At least 19 kinds" in verdict.words  # K + 1 ≥ 1/0.05
+    assert not verdict.test.open
+    assert "Another draw" not in verdict.words
     assert len(verdict.parameters) == 3
 
 

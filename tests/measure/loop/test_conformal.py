@@ -105,3 +105,24 @@ def test_one_more_kind_is_within_the_quantile_as_often_as_it_says() -> None:
     # 36 of 40 places.
     assert binomtest(inside, worlds, 0.9).pvalue > 1e-4
     assert GroupedConformal(null=np.arange(8.0), kinds=np.arange(8)).quantile(0.9) == math.inf
+
+
+@pytest.mark.parametrize(("reached", "expected"), [(0, 59), (20, 40), (40, 40)])
+def test_kinds_settle_a_level_once_their_interval_does_not_hold_it(reached: int, expected: int) -> None:
+    """With none as far, 0.95^n is below 5 % from 59 kinds on; half of 40 are far from a level of 5 % already."""
+    nulls = GroupedConformal(null=(np.arange(40) < reached).astype(float), kinds=np.arange(40))
+    assert nulls.settling(0.5, at=0.05, level=0.9) == expected
+
+
+def test_one_of_ten_kinds_as_far_needs_as_many_as_a_binomial_says() -> None:
+    nulls = GroupedConformal(null=(np.arange(40) < 4).astype(float), kinds=np.arange(40))
+    needed = nulls.settling(0.5, at=0.05, level=0.9)
+    assert needed is not None
+    # The chance of a tenth or more where 5 % are as far falls below 5 % there, and not ten kinds before.
+    tens = 10 * math.ceil(needed / 10)
+    assert binom.sf(tens // 10 - 1, tens, 0.05) < 0.05 < binom.sf(tens // 10 - 3, tens - 20, 0.05)
+
+
+def test_a_share_at_the_level_itself_is_settled_by_no_number_of_kinds() -> None:
+    nulls = GroupedConformal(null=(np.arange(40) < 2).astype(float), kinds=np.arange(40))
+    assert nulls.settling(0.5, at=0.05, level=0.9) is None

@@ -29,6 +29,7 @@ METHOD = {
         "PRIOR_WITHOUT_MASS",
     },
     "comparison": {"_ENOUGH"},
+    "conformal": {"MOST_KINDS"},
     "course": {"ALONG", "LEFT", "_WINDOW"},
     "floor": {"_DURATION"},
     "forecast": {"HORIZON", "_SEGMENT", "_SHORTEST", "WIDEST", "_WARM_UP"},

@@ -16,7 +16,7 @@ from measure.loop.lines import Line
 from measure.loop.model import Model
 from measure.loop.refine import Refined
 from measure.loop.verdict import Conclusion
-from measure.loop.words import blowing, bounds, proposal, sentence, shedding
+from measure.loop.words import blowing, bounds, by_draw, proposal, sentence, shedding
 from tests.measure.report.verdicts import verdict
 
 
@@ -73,3 +73,15 @@ def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
     few = verdict(Conclusion.SUFFICIENT)
     untested = replace(few, conclusion=Conclusion.UNTESTED, test=replace(few.test, kinds=20, level=0.03))
     assert "no p is below 0.048. At least 33 kinds are needed." in sentence(untested)
+
+
+def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_settle_it() -> None:
+    test = replace(verdict(Conclusion.EFFECT).test, level=0.05, open=True, settling=59)
+    test = replace(test, p_value=replace(test.p_value, value=0.024, low=0.0, high=0.072))
+    (told,) = by_draw(test)
+    assert told == (
+        "Another draw of nulls could decide otherwise: the interval of p, [0, 0.072] 90 %, holds the level of 0.05; "
+        "59 kinds of numerics would settle it, if the same share of them is as far."
+    )
+    assert "more than 1000 kinds" in by_draw(replace(test, settling=None))[0]
+    assert by_draw(replace(test, open=False)) == ()

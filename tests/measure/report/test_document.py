@@ -69,6 +69,13 @@ def test_missing_numbers_and_open_intervals_come_back() -> None:
     assert differences(from_document(document), whole) == []
 
 
+def test_a_document_that_does_not_tell_whether_another_draw_could_decide_otherwise_is_read() -> None:
+    document = written(verdict(Conclusion.EFFECT))
+    for name in ("open", "settling"):
+        del document["test"][name]
+    assert from_document(document).test.open is None
+
+
 def test_the_document_holds_every_field_by_its_name() -> None:
     """Walked beside the dataclasses, so that a field added to the verdict cannot be left out."""
 
