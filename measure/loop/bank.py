@@ -34,8 +34,9 @@ from sim.integrate.split import SplitEuler
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
 differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
-_VERSION = 2
-"""Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm."""
+_VERSION = 3
+"""Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
+3: sensitivities of how cloth bends in double precision."""
 _SEGMENTS = (
     "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
     "turned", "turning", "moment", "course", "course_curvature",
