@@ -32,7 +32,8 @@ from flagdata.ingest.anemometer.long_table import winds_by_name
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.sites import site_of_all, sites
-from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.ingest.anemometer.unitcheck import FASTEST
 from flagdata.units import spelled
 from flagdata.units import unit as unit_of

@@ -39,7 +39,7 @@ _SPEED = frozenset(
 _DIRECTION = frozenset(
     {
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
-        "dd", "vane", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
+        "dd", "vane", "angle", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
         "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire", "deg", "winddeg", "azimuth",
         "bearing",
     }
@@ -114,6 +114,8 @@ _INSIDE = {
     "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
 }  # fmt: skip
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
+_TURNED = re.compile(r"\bccw\b|counter.?clock|anti.?clock|from east|mathemat|\bmath\b", re.IGNORECASE)
+"""What a heading says of an angle that is not clockwise from north."""
 _SENSORS = frozenset(
     {"csat", "csat3", "sonic", "sat", "metek", "gill", "young", "wind", "comp", "component", "hs", "wm"}
 )
@@ -135,7 +137,8 @@ class Heading:
         label: words that tell instruments apart, lower-case.
         magnetic: of a direction, whether it is from magnetic north.
         towards: of a direction, whether the wind blows to it.
-        strange: what stands in brackets where a unit does, but spells none that is known; "" where nothing does.
+        strange: what stands in brackets where a unit does, but spells none that is known, or how an angle is turned that
+            is not clockwise from north; "" where nothing does.
     """
 
     name: str
@@ -184,7 +187,7 @@ def understand(name: str, stated: str = "") -> Heading:
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
         magnetic=bool(known & {"mag", "magnetic"}), towards=bool(_TOWARDS.search(text.replace("_", " "))),
-        strange=_strange(text) if unit is None else "",
+        strange=turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
 
 
@@ -329,9 +332,11 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
         away = known & _DIRECTION
         if (away or re.search(r"wind?.?dir|windrichtung|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
             sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane"}) or "dir" in compact
-            if known & {"deg", "azimuth", "bearing"} == away and not windy and not known & {"awa", "twa"}:
+            if away and away <= {"deg", "azimuth", "bearing", "angle"} and not windy and not known & {"awa", "twa"}:
                 return "", False, set()
             return _by_platform(known, "direction"), sure, known & (_DIRECTION | _APPARENT | _THEORETICAL)
+        if si == "rad" and windy and not known - _WIND - _MEAN - _PLAIN:
+            return _by_platform(known, "direction"), True, known & _WIND
     if si in (None, "m/s"):
         for word, channel in _ABBREVIATED.items():
             if word in known and (si == "m/s") <= channel.endswith("speed"):

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata import compass
 from flagdata.ingest.anemometer import unitcheck
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
-from flagdata.units import POINTS, spelled, unit
+from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -27,13 +28,6 @@ _FROM_NORTH = frozenset({"twd", "gwd"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
-_CALM = frozenset(
-    {
-        "calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr",
-        "静穏", "静风", "靜風", "無風",
-    }
-)  # fmt: skip
-"""What stands in a column of compass points where there is no direction."""
 _UNREADABLE = 0.1
 
 
@@ -124,10 +118,23 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        if heading.quantity.endswith("direction") and (degrees := compass_points(layout.column(index))) is not None:
-            found.values[index] = degrees
-            found.headings[index] = replace(heading, unit="points")
+        points = compass_unit(layout, index) if _may_be_points(heading) else None
+        if points is not None:
+            found.values[index] = _degrees(layout, index, points)
+            quantity = heading.quantity.replace("speed", "direction")
+            found.headings[index] = replace(
+                heading, unit=points, quantity=quantity, channel="" if heading.spread else quantity
+            )
         elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
+            filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
+            if heading.quantity.endswith("direction") and compass.may_be_two(filled, share=1 - _UNREADABLE):
+                fix = (
+                    f"say which: --columns, {heading.name}=wind_direction[points-de] (O is east) or [points-es] (west)"
+                )
+                found.remarks.append(
+                    f"column {heading.name!r} holds points whose O may be east or west: left out; {fix}"
+                )
+                continue
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
@@ -136,12 +143,16 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
     return found
 
 
-def compass_points(cells: Sequence[str]) -> NDArray[np.float64] | None:
-    """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
-    filled = [cell for cell in cells if cell_kind(cell) != "missing" and cell.lower() not in _CALM]
-    if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):
-        return None
-    return np.array([POINTS.get(cell.upper(), np.nan) for cell in cells])
+def compass_unit(layout: Layout, index: int) -> str | None:
+    """The unit of a column of points of the compass, by the language of its letters; `None` where it holds none."""
+    filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
+    headings = " ".join(layout.names)
+    return compass.table_of(filled, heading=f"{layout.names[index]} {headings}", share=1 - _UNREADABLE)
+
+
+def _degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:
+    points = compass.BY_UNIT[unit_name]
+    return np.array([points.get(cell.upper(), np.nan) for cell in layout.column(index)])
 
 
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
@@ -179,6 +190,11 @@ def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
 def beaufort(layout: Layout) -> tuple[str, ...]:
     """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
     return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def _may_be_points(heading: Heading) -> bool:
+    """Whether words below a heading may be points of the compass: of a direction, or of a wind in words."""
+    return heading.quantity.endswith(("wind_direction", "wind_speed"))
 
 
 def _day_of_month(layout: Layout, index: int) -> bool:
@@ -353,7 +369,7 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     )
     lone = candidates if len(candidates) == 1 else []
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
-    exact.sort(key=lambda i: (found.headings[i].unit == "points", found.headings[i].unit is None))
+    exact.sort(key=lambda i: (_points(found.headings[i]), found.headings[i].unit is None))
     chosen = exact or near[:1] or lone or plain
     if not chosen:
         if candidates:
@@ -361,8 +377,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             found.remarks.append(f"none of the directions {names} is surely that of {found.name(speed)!r}: left out")
         return None
     index = next((i for i in chosen if not found.headings[i].magnetic), chosen[0])
-    angles = [i for i in candidates if found.headings[i].unit != "points" and not found.headings[i].magnetic]
-    if found.headings[index].unit == "points" and len(angles) == 1:
+    angles = [i for i in candidates if not _points(found.headings[i]) and not found.headings[i].magnetic]
+    if _points(found.headings[index]) and len(angles) == 1:
         index = angles[0]  # the same in degrees
     heading, value = found.headings[index], found.values[index]
     known = value[np.isfinite(value)]
@@ -370,7 +386,7 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         return None
     if heading.strange:
         found.remarks.append(
-            f"column {heading.name!r} is in {heading.strange!r}, which is no unit that is known: left out"
+            f"column {heading.name!r} is in {heading.strange!r}, which is no direction clockwise from north: left out"
         )
         return None
     if heading.unit == "gon":
@@ -398,12 +414,16 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         return None
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"
-    if heading.unit == "points":
+    if _points(heading):
         told = "as points of the compass, 22.5° apart"
-        return channel, Column(index=index, unit="points", told=told, towards=heading.towards)
+        return channel, Column(index=index, unit=heading.unit, told=told, towards=heading.towards)
     told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
     told = f"{told}, to which the wind blows" if heading.towards else told
     return channel, Column(index=index, unit=heading.unit or "deg", told=told, towards=heading.towards)
+
+
+def _points(heading: Heading) -> bool:
+    return heading.unit in compass.BY_UNIT
 
 
 def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:

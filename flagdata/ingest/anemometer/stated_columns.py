@@ -12,19 +12,22 @@ An entry is the name of a channel with its unit in brackets, `wind_direction_to`
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
 from flagdata.ingest.anemometer.headings import fits, understand
-from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind, compass_points
+from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind, compass_unit
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.recipe import COLUMNS_LIMIT
 from flagdata.ingest.anemometer.stamps import EPOCH
-from flagdata.ingest.anemometer.timecolumns import CLOCKS, TimeChoice, date_forms, find_time, time_as
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+from flagdata.ingest.anemometer.timecolumns import find_time, time_as
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
@@ -248,12 +251,12 @@ def _column(layout: Layout, index: int, channel: str, detail: str, unit: str | N
         how = f"in {name} by its heading" if name else ""
         if CHANNELS[channel].unit == "m/s" and unit is not None:
             name, how = unit, f"in {unit}, as you said"
-    if name in (None, "deg") and CHANNELS[channel].unit == "rad" and compass_points(cells) is not None:
-        name, how = "points", "as points of the compass, 22.5° apart"
+    if name in (None, "deg") and CHANNELS[channel].unit == "rad" and (points := compass_unit(layout, index)):
+        name, how = points, "as points of the compass, 22.5° apart"
     if name is None and CHANNELS[channel].unit != "m/s":
         fix = f"write it in brackets: {channel}[{_unit_like(channel)}]"
         raise UsageError(f"no unit for {channel}, {named(layout, index)}", where=_WHERE, fix=fix)
-    if name != "points":
+    if name not in compass.BY_UNIT:
         parsed = numbers(cells, decimal=layout.decimal)
         words = [cell for cell, state in zip(cells, parsed.state, strict=True) if state == Cell.UNREADABLE]
         if 2 * len(words) > len(cells):
@@ -302,8 +305,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     if time is not None:
         forms = (time.form or "").split(" ")
         parts = {form: name for name, form in _PARTS.items()}
-        if len(time.columns) == len(forms) and all(form in parts for form in forms):
-            found |= {at: parts[form] for at, form in zip(time.columns, forms, strict=True)}
+        if 1 < len(time.columns) == len(forms):
+            found |= {at: _part(form, parts) for at, form in zip(time.columns, forms, strict=True)}
         elif len(time.columns) == 1:
             elapsed = time.form is not None and counted.is_elapsed(time.form)
             found[time.columns[0]] = f"time[{time.form}]" if elapsed else "time[?]" if time.counts else "time"
@@ -322,7 +325,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         if not timed and kinds and kinds[0] == "stamp":
             found[at] = "time"
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
-            if compass_points(layout.column(at)) is not None:
+            if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
                 continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
@@ -332,6 +335,15 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         elif (not winds and "number" in kinds) or (not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])):
             found[at] = "?"
     return found
+
+
+def _part(form: str, parts: Mapping[str, str]) -> str:
+    """The entry of a column that is a part of a time, written as `form`; `parts` are names by directives."""
+    if form in parts:
+        return parts[form]
+    if form in ("%Q", "%J"):
+        return f"{'hour' if form == '%Q' else 'day_of_year'}[{form}]"
+    return "time" if counted.is_time_of_day(form) else "date" if set("dmyYb") & set(form) else f"time[{form}]"
 
 
 def _guessed(channel: str) -> str:
