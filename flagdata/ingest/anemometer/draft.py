@@ -28,7 +28,6 @@ from flagdata.ingest.anemometer.instruments import (
     named_wind,
 )
 from flagdata.ingest.anemometer.layout import Layout, lay_out
-from flagdata.ingest.anemometer.long_table import winds_by_name
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.sites import site_of_all, sites
@@ -124,22 +123,20 @@ def draft(
         return None
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
-        time, winds, remarks, warnings, named = known.time, (known.wind,), (), (), ()
+        time, winds, remarks, warnings = known.time, (known.wind,), (), ()
         of_time = time.columns if time is not None else ()
         mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
     else:
         time = find_time(layout, order=order)
         of_time = time.columns if time is not None else ()
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
-        named = () if winds else winds_by_name(layout, time=of_time, told=unit)
-        winds = winds or named
-        if wind is not None and not named and wind not in {one.label for one in winds}:
+        if wind is not None and wind not in {one.label for one in winds}:
             said, odd = named_wind(layout, wind, time=of_time, told=unit)
             winds, warnings = (*winds, *said), (*warnings, *odd)
         if time is None and not winds:
             return None
         mixed = None
-        if time is not None and not named:
+        if time is not None:
             mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
     if mixed is not None:
         winds = tuple(

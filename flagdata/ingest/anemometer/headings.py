@@ -33,7 +33,7 @@ _SPEED = frozenset(
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
         "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
-        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
+        "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
     }
 )  # fmt: skip
 _DIRECTION = frozenset(
@@ -137,8 +137,8 @@ class Heading:
         label: words that tell instruments apart, lower-case.
         magnetic: of a direction, whether it is from magnetic north.
         towards: of a direction, whether the wind blows to it.
-        strange: what stands in brackets where a unit does, but spells none that is known, or how an angle is turned that
-            is not clockwise from north; "" where nothing does.
+        strange: what stands in brackets where a unit does, but spells none that is known, or how an angle is turned
+            that is not clockwise from north; "" where nothing does.
     """
 
     name: str

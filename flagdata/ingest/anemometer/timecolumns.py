@@ -14,7 +14,7 @@ from flagdata.ingest.anemometer import counted, dateparts
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
 from flagdata.ingest.anemometer.dates import Order, decide
-from flagdata.ingest.anemometer.headings import names_time, understand, words_of
+from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.stamps import Stamps
@@ -119,7 +119,7 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             yield found
     for date in dates:
         for clock in clocks:
-            if clock == date:
+            if clock == date or _of_other_zones(layout, date, clock, (*dates, *clocks)):
                 continue
             both = _with_half((date, clock), halves)
             texts = _joined(columns, both)
@@ -139,6 +139,12 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     for index, cells in enumerate(columns):
         if not any(index in choice.columns for choice in days):
             yield from _counts(layout, index, [cell for cell in cells if cell])
+
+
+def _of_other_zones(layout: Layout, date: int, clock: int, others: Sequence[int]) -> bool:
+    """Whether one of a date and a clock is said to be in a zone, as the other is not though a further column is."""
+    said = {index: zone_of(layout.names[index]) for index in others}
+    return said[date] != said[clock] and sum(zone is not None for zone in said.values()) > 1
 
 
 def _with_half(columns: tuple[int, ...], halves: Collection[int]) -> tuple[int, ...]:
