@@ -24,6 +24,7 @@ KINDS = (
     "flagdata.ingest.anemometer.labelled",
     "flagdata.ingest.anemometer.blocks",
     "flagdata.ingest.anemometer.bracketed",
+    "flagdata.ingest.anemometer.before_cells",
 )
 LOOKED_AT = 60
 """Lines by which a kind is told."""

@@ -2,10 +2,10 @@
 
 Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which here stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p", %a for a day of
-the week, which is not read. %Q is the hour with its fraction (14.25), %J the day of the year with its own (1.5 is noon
-of 1 January). 24:00 is the midnight that ends a day (ISO 8601:2004, 4.2.3). A blank stands for any run of blanks or a
-"T". Two-digit years are 1970 to 2069.
+optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p for
+"AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read. %Q is the hour with its fraction (14.25),
+%J the day of the year with its own (1.5 is noon of 1 January). 24:00 is the midnight that ends a day (ISO 8601:2004,
+4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -27,13 +27,20 @@ from flagdata.errors import UsageError
 from flagdata.timebase import NANOSECONDS
 
 DAY = 86_400 * NANOSECONDS
+ABBREVIATED = {
+    "WEST": 1, "CET": 1, "CEST": 2, "MEZ": 1, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AEST": 10,
+    "AEDT": 11, "AWST": 8, "NZST": 12, "NZDT": 13, "SAST": 2, "HKT": 8, "EST": -5, "EDT": -4, "CDT": -5, "MDT": -6,
+    "PST": -8, "PDT": -7, "AKST": -9, "AKDT": -8, "HST": -10, "BRT": -3,
+}  # fmt: skip
+"""Hours east of UTC by the abbreviation of a zone, of those that mean one (tz database)."""
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
     "Q": r"(?P<Q>\d{1,2}(?:\.\d{1,9})?)", "J": r"(?P<J>\d{1,3}(?:\.\d{1,9})?)",
     "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
     "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
-    "z": r"\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?",
+    "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]\d{{2}}(?::?\d{{2}})?)?",
+    "Z": r"\s*(?:[A-Z]{3,4})?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _CLOCK_RUN = re.compile(r"%H%M(?:%S)?")
@@ -44,7 +51,8 @@ _CLOCK_RUNS = {
 """Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
-    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?$"
+    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?"
+    rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]\d{{2}}(?::?\d{{2}})?)?$"
 )
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""
@@ -317,8 +325,11 @@ def _offset(found: pa.StructArray, n: int) -> tuple[NDArray[np.int64], NDArray[n
     for value in pc.unique(text).to_pylist():
         if value in ("", "Z", "UTC", "GMT"):
             continue
+        rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
+        if value in ABBREVIATED:
+            offset[rows] = ABBREVIATED[value] * 3600 * NANOSECONDS
+            continue
         sign = -1 if value[0] == "-" else 1
         minutes = int(value[1:3]) * 60 + int(value[3:].lstrip(":") or 0)
-        rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
         offset[rows] = sign * minutes * 60 * NANOSECONDS
     return offset, stated

@@ -332,7 +332,9 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
             continue
-        elif (not winds and "number" in kinds) or (not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])):
+        elif (not winds and {"number", "stamp"} & set(kinds)) or (
+            not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
+        ):
             found[at] = "?"
     return found
 

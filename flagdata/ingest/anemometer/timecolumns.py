@@ -17,7 +17,7 @@ from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
-from flagdata.ingest.anemometer.stamps import Stamps
+from flagdata.ingest.anemometer.stamps import ABBREVIATED, Stamps
 from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice
 
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
@@ -35,6 +35,8 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
+"""A date whose numbers are divided by blanks, and a clock."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
 _DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
@@ -159,6 +161,8 @@ def _joined(columns: Sequence[Sequence[str]], chosen: tuple[int, ...]) -> list[s
 
 def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None) -> TimeChoice | None:
     """Date and time in `texts`."""
+    if texts and share(_BLANKS, texts):
+        return _blank_divided(layout, columns, texts, order)
     if not any(_STAMPLIKE.search(text) for text in texts[:5]):
         return None
     # 2023070100 is an hour of July 2023 before it is the Unix time of a day in 2034.
@@ -172,12 +176,15 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         if fits(found):
             return time_choice(layout, columns, form, found, 2.0)
     shape = next(re.sub(r"\d", "0", text.strip()) for text in texts if text.strip())
-    zoned = "%z" if re.search(r"(Z|UTC|GMT|[+-]00(:?00)?)$", shape) and len(shape) > 12 else ""
+    zoned = "%z" if re.search(rf"(Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]00(:?00)?)$", shape) and len(shape) > 12 else ""
+    if not zoned and len(shape) > 12 and re.search(r"\d ?[A-Z]{3,4}$", shape) and not re.search(r"[AP]M$", shape):
+        zoned = "%Z"  # letters that mean several zones, as CST, IST and BST do
+    shape = re.sub(rf" ?(?:{'|'.join(ABBREVIATED)})$", "", shape) if zoned else shape
     for form in _compact(shape):
         found, _ = parse_with_bare_dates(texts, form + zoned)
         if fits(found):
             return time_choice(layout, columns, form + zoned, found, 2.0)
-    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT)$", "", shape)):
+    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT|[A-Z]{3,4})$", "", shape) if zoned else shape):
         if cell_kind(texts[0]) != "stamp":
             return None
         return _with_month_names(layout, columns, texts, zoned)
@@ -207,6 +214,17 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         if fits(found):
             return time_choice(layout, columns, form, found, 2.0)
     return None
+
+
+def _blank_divided(
+    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None
+) -> TimeChoice | None:
+    """Dates whose numbers are divided by blanks, as "01 12 2026 00:10"."""
+    hyphened = [re.sub(r"^(\d{1,4}) (\d{1,2}) (\d{1,4})(?= )", r"\1-\2-\3", text.strip()) for text in texts]
+    found = _whole(layout, columns, hyphened, order)
+    if found is None or found.form is None:
+        return found
+    return replace(found, form=found.form.replace("-", " ") if found.form != "iso" else "%Y %m %d %H:%M:%S%f")
 
 
 def _days(

@@ -56,11 +56,11 @@ def test_a_direction_with_stamps_of_its_own_stands_until_the_next_is_told(log_fi
 def test_speeds_with_stamps_of_their_own_are_anemometers_apart(log_file: Write) -> None:
     lines = ["item,time,value"]
     for at in range(20):
-        lines.append(f"north_wind_speed,2026-05-01T12:00:{at:02d}.100Z,{_SPEEDS[at]}")
-        lines.append(f"south_wind_speed,2026-05-01T12:00:{at:02d}.600Z,{_SPEEDS[at] + 2}")
+        lines.append(f"roof_wind_speed,2026-05-01T12:00:{at:02d}.100Z,{_SPEEDS[at]}")
+        lines.append(f"mast_wind_speed,2026-05-01T12:00:{at:02d}.600Z,{_SPEEDS[at] + 2}")
     path = log_file("\n".join(lines) + "\n")
-    assert anemometers(path, WindOptions(unit="m/s")) == ("north_wind_speed", "south_wind_speed")
-    log = read_log(path, WindOptions(unit="m/s", wind="south_wind_speed"))
+    assert anemometers(path, WindOptions(unit="m/s")) == ("roof_wind_speed", "mast_wind_speed")
+    log = read_log(path, WindOptions(unit="m/s", wind="mast_wind_speed"))
     np.testing.assert_allclose(log.series.channels["wind_speed"], np.add(_SPEEDS, 2))
 
 
