@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, stated_columns, unitcheck, zones
+from flagdata.ingest.anemometer import counted, stated_columns, unitcheck, unread, zones
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
@@ -82,6 +82,7 @@ class Draft:
         winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
         site: index of the column that tells sites apart, `None` where there is one site.
         delimiter: of the cells.
+        of_earth: whether the components of the wind are towards east (x) and north (y).
     """
 
     toml: str
@@ -94,6 +95,7 @@ class Draft:
     winds: tuple[str, ...] = ()
     site: int | None = None
     delimiter: str = ","
+    of_earth: bool = False
 
 
 @lru_cache(maxsize=4)
@@ -161,12 +163,15 @@ def draft(
     if time is not None and time.unnamed:
         shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
+    if columns is None and chosen is not None:
+        remarks = (*remarks, *unread.directions(layout, time, (chosen,) if len(winds) == 1 else winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
         doubts=tuple(doubts), needs=_needs(lines, time), unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+        of_earth=chosen is not None and chosen.of_earth,
     )  # fmt: skip
 
 

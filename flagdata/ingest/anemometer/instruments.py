@@ -29,6 +29,12 @@ _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
 _UNREADABLE = 0.1
+_AXES = (
+    frozenset({"north", "northward", "meridional", "vwn"}), frozenset({"east", "eastward", "zonal", "vwe"}),
+    frozenset({"south", "southward"}), frozenset({"west", "westward"}),
+)  # fmt: skip
+"""Words of the components towards north and east, and of what cannot be beside them."""
+_SPEED_UNITS = frozenset({"m/s", "km/h", "kn", "mph", "cm/s", "ft/s"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +64,7 @@ class Wind:
         columns: by channel.
         sure: whether the heading names the wind; false where only the unit or a lone "speed" speaks for it.
         site: column and text of the rows that are its own, where a table mixes sites.
+        of_earth: whether its components are said to be towards east (x) and north (y).
     """
 
     label: str
@@ -65,6 +72,7 @@ class Wind:
     columns: Mapping[str, Column]
     sure: bool
     site: tuple[int, str] | None = None
+    of_earth: bool = False
 
     def without_unit(self) -> tuple[str, ...]:
         """Channels of the wind's speed whose unit nothing tells."""
@@ -80,6 +88,7 @@ class _Found:
     values: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    of_earth: bool = False
 
     def of(self, *channels: str) -> list[int]:
         return [index for index in self.values if self.headings[index].channel in channels]
@@ -113,7 +122,8 @@ def find_winds(
 def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
     """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
     headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
-    found = _Found(layout=layout, headings=headings)
+    headings, of_earth = _along_axes(layout, headings)
+    found = _Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
@@ -141,6 +151,38 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     return found
+
+
+def _along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Heading], bool]:
+    """The headings with components towards north and east as what they are, and whether there are such.
+
+    One column of each, and none of south or west, which would be the sides of a mast. A lone U is no component, but
+    perhaps the speed itself.
+    """
+    words = [set(words_of(name)) for name in layout.names]
+    found = list(headings)
+    sides = [[at for at, said in enumerate(words) if _towards(said, headings[at], side)] for side in _AXES]
+    if [len(side) for side in sides[:2]] == [1, 1] and not any(sides[2:]):
+        for side, channel in ((sides[0][0], "wind_y"), (sides[1][0], "wind_x")):
+            found[side] = replace(headings[side], channel=channel, quantity=channel, sure=True, spread=False, label=())
+        for at, said in enumerate(words):
+            if said & {"up", "upward", "vertical"} and headings[at].quantity in ("", "wind_z") and "wind" in said:
+                found[at] = replace(headings[at], channel="wind_z", quantity="wind_z", sure=True, label=())
+        return found, True
+    if not any(heading.channel == "wind_y" for heading in headings):
+        for at, heading in enumerate(headings):
+            if heading.channel == "wind_x" and words_of(layout.names[at])[:1] == ["u"]:
+                found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=False)
+    return found, False
+
+
+def _towards(words: set[str], heading: Heading, side: frozenset[str]) -> bool:
+    """Whether a heading is of the wind along an axis of the Earth, and not of its direction or spread."""
+    if words & {"vwn", "vwe"}:
+        return bool(words & side)
+    windy = any("wind" in word for word in words) or heading.unit in _SPEED_UNITS
+    none = heading.quantity.endswith("direction") or heading.spread or words & {"variance", "pos", "position"}
+    return windy and bool(words & side) and not none
 
 
 def compass_unit(layout: Layout, index: int) -> str | None:
@@ -350,7 +392,14 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
             names = ", ".join(repr(found.name(at)) for at in own)
             fix = "to read it and the speed of its own column, say what the columns are (--columns)"
             found.remarks.append(f"the direction {names} is left out beside the components; {fix}")
-        winds.append(Wind(label=found.name(first), height=found.headings[first].height, columns=columns, sure=True))
+        if found.of_earth:
+            found.warnings.append(
+                "the headings name components of north and east: taken as towards which the wind blows"
+            )
+        winds.append(Wind(
+            label=found.name(first), height=found.headings[first].height, columns=columns, sure=True,
+            of_earth=found.of_earth,
+        ))  # fmt: skip
     return winds
 
 
@@ -447,7 +496,9 @@ def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
         elif len(known) > 1 and not many:
             names = ", ".join(repr(found.layout.names[i]) for i, _ in known)
             found.remarks.append(f"which of {names} is {channel} is not told: left out")
-    return Wind(label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site)
+    return Wind(
+        label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site, of_earth=wind.of_earth
+    )
 
 
 def _weather(found: _Found, index: int, channel: str) -> Column | None:

@@ -98,7 +98,7 @@ def wide(
     ]  # fmt: skip
     if apart or held:
         rows = list(_told_last(known, speeds, [name for name in names if name not in speeds], apart=apart))
-        heading = [*stamps, *(["anemometer", "wind speed"] if apart else speeds)]
+        heading = [*stamps, *(["sensor", "wind speed"] if apart else speeds)]
         heading += [name for name in names if name not in speeds]
     else:
         rows = [[*stamp, *(row.get(name, "") for name in names)] for stamp, row in together.items()]

@@ -1,9 +1,9 @@
 """From stamps as text to nanoseconds, in bulk: ISO 8601, Unix time and strptime directives.
 
-Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which here stands for an optional fraction with its mark ("" or
+Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p for
-"AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read. %Q is the hour with its fraction (14.25),
+optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
+for "AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read. %Q is the hour with its fraction,
 %J the day of the year with its own (1.5 is noon of 1 January). 24:00 is the midnight that ends a day (ISO 8601:2004,
 4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer.angles import may_be_direction
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
@@ -299,8 +300,15 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     return f'say what the columns are: --columns "{line}" {example} (the first row is {shown(layout)})'
 
 
-def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
-    """Entries of columns by their index."""
+def read_also(layout: Layout, time: TimeChoice, wind: Wind, direction: int) -> str:
+    """The line that says what was understood of a table, and that a further column is the wind's direction."""
+    points = compass_unit(layout, direction)
+    entries = _understood(time, (wind,)) | {direction: f"wind_direction[{points or 'deg'}]"}
+    return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
+
+
+def _understood(time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of the columns of the time and of the first wind, by their index."""
     found: dict[int, str] = {}
     if time is not None:
         forms = (time.form or "").split(" ")
@@ -316,6 +324,12 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         for channel, column in wind.columns.items():
             name = _TOWARDS if column.towards else channel
             found.setdefault(column.index, f"{name}[{column.unit or '?'}]")
+    return found
+
+
+def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of columns by their index."""
+    found = _understood(time, winds)
     timed = time is not None
     for at, name in enumerate(layout.names):
         if at in found:
@@ -332,6 +346,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
             continue
+        elif may_be_direction(layout, at) and not any("wind_direction" in entry for entry in found.values()):
+            found[at] = "wind_direction" if compass_unit(layout, at) else "wind_direction[deg]"
         elif (not winds and {"number", "stamp"} & set(kinds)) or (
             not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
         ):

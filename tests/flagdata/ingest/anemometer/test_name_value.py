@@ -59,7 +59,7 @@ def test_speeds_with_stamps_of_their_own_are_anemometers_apart(log_file: Write) 
         lines.append(f"roof_wind_speed,2026-05-01T12:00:{at:02d}.100Z,{_SPEEDS[at]}")
         lines.append(f"mast_wind_speed,2026-05-01T12:00:{at:02d}.600Z,{_SPEEDS[at] + 2}")
     path = log_file("\n".join(lines) + "\n")
-    assert anemometers(path, WindOptions(unit="m/s")) == ("roof_wind_speed", "mast_wind_speed")
+    assert anemometers(path, WindOptions(unit="m/s")) == ("mast_wind_speed", "roof_wind_speed")
     log = read_log(path, WindOptions(unit="m/s", wind="mast_wind_speed"))
     np.testing.assert_allclose(log.series.channels["wind_speed"], np.add(_SPEEDS, 2))
 

@@ -80,10 +80,32 @@ def test_statistics_of_a_wind_are_no_anemometer_of_their_own(log_file: Write, ot
     assert read_log(path).series.channels["wind_speed"][1] == pytest.approx(4.1)
 
 
-def test_a_component_along_an_axis_of_the_earth_is_no_speed(log_file: Write) -> None:
-    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,-4.{at},0.{at}\n" for at in range(9))
-    path = log_file(f"time,windspeed_north (m/s),windspeed_east (m/s)\n{rows}")
-    assert "no column is surely a wind" in refusal(path).what
+def test_a_component_along_one_axis_of_the_earth_is_no_speed(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,-4.{at}\n" for at in range(9))
+    assert "no column is surely a wind" in refusal(log_file(f"time,windspeed_north (m/s)\n{rows}")).what
+
+
+@pytest.mark.parametrize(
+    "names", ["windspeed_north (m/s),windspeed_east (m/s)", "northward wind m/s,eastward wind m/s"]
+)
+def test_components_towards_north_and_east_give_speed_and_direction(log_file: Write, names: str) -> None:
+    # Towards the south-east (north -3, east +3): the wind comes from the north-west.
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,-3.0,3.0\n" for at in range(9))
+    channels = read_log(log_file(f"time,{names}\n{rows}")).series.channels
+    np.testing.assert_allclose(channels["wind_speed"], 3 * np.sqrt(2))
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 315)
+
+
+def test_speeds_at_the_sides_of_a_mast_are_no_components(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,3.0,3.1,3.2\n" for at in range(9))
+    assert "no column is surely" in refusal(log_file(f"time,speed north,speed east,speed south\n{rows}")).what
+
+
+def test_a_lone_u_may_be_the_speed_and_is_asked_about(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,4.{at}\n" for at in range(9))
+    path = log_file(f"time,U (m/s)\n{rows}")
+    assert "--wind 'U (m/s)'" in refusal(path).fix
+    assert "wind_speed" in read_log(path, WindOptions(wind="U (m/s)")).series.channels
 
 
 def test_a_fast_count_may_be_of_microseconds(log_file: Write) -> None:

@@ -1,0 +1,35 @@
+"""Columns that may be the direction of a wind which was read without one: told, with the line that reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flagdata.ingest.anemometer import stated_columns
+from flagdata.ingest.anemometer.angles import may_be_direction
+from flagdata.ingest.anemometer.instruments import COMPONENTS, Wind
+from flagdata.ingest.anemometer.layout import Layout
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+
+
+def directions(
+    layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], remarks: Sequence[str]
+) -> tuple[str, ...]:
+    """A remark for each column that may be the direction of the one wind of a table, which has none.
+
+    Args:
+        remarks: what was said of columns already.
+    """
+    if time is None or len(winds) != 1 or not winds[0].sure:
+        return ()
+    wind = winds[0]
+    if any(name.endswith(("direction", "magnetic")) or name in COMPONENTS for name in wind.columns):
+        return ()
+    taken = {*time.columns, *(column.index for column in wind.columns.values())}
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        if index in taken or any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
+            continue
+        line = stated_columns.read_also(layout, time, wind, index)
+        called = repr(name) if name else f"number {index + 1}"
+        found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
+    return tuple(found)
