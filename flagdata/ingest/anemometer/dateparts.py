@@ -39,6 +39,7 @@ _YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
 _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
 _DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
+_SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
 _DECIMAL = re.compile(r"^\s*\d{1,3}\.\d+\s*$")
 _CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$")
 CLOCKS = (
@@ -63,7 +64,25 @@ def choices(
         yield found
     named = _named(layout, columns)
     yield from _of_parts(layout, columns, named)
+    yield from _by_heading(layout, columns)
     yield from _beside_dates(layout, columns, named, dates, order)
+
+
+_SPELLED = {"y": "%y", "yyyy": "%Y", "yy": "%y", "mm": "%m", "dd": "%d", "hh": "%H", "ss": "%S"}
+
+
+def _by_heading(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[TimeChoice]:
+    """Dates in digits whose heading spells their order, as YYMMDD, with the clock HHMMSS or HHMM in another column."""
+    compact = ["".join(words_of(name)) for name in layout.names]
+    clocks = [at for at, name in enumerate(compact) if re.fullmatch(r"hhmm(ss)?|time|hms", name)]
+    for index, name in enumerate(compact):
+        found = re.fullmatch(r"(?:date)?(yyyy|yy|mm|dd)(yyyy|yy|mm|dd)(yyyy|yy|mm|dd)", name)
+        cells = [cell for cell in columns[index] if cell]
+        if found is None or len({part[0] for part in found.groups()}) < 3 or not cells or not share(_SIX, cells):
+            continue
+        date = "".join(_SPELLED[part] for part in found.groups())
+        for clock in clocks:
+            yield from _read(layout, columns, [index, clock], [f"{date} {form}" for form in CLOCKS], score=2.3)
 
 
 def hour_alone(layout: Layout, columns: Sequence[Sequence[str]], index: int) -> bool:

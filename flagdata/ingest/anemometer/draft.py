@@ -164,6 +164,7 @@ def draft(
         shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
     if columns is None and chosen is not None:
+        remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, (chosen,) if len(winds) == 1 else winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(

@@ -114,6 +114,8 @@ _INSIDE = {
     "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
 }  # fmt: skip
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
+_NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
+"""What stands in brackets behind a direction for the north it is from."""
 _TURNED = re.compile(r"\bccw\b|counter.?clock|anti.?clock|from east|mathemat|\bmath\b", re.IGNORECASE)
 """What a heading says of an angle that is not clockwise from north."""
 _SENSORS = frozenset(
@@ -160,6 +162,8 @@ def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english(name[:120].strip().strip('"').strip())
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
+    north = _NORTH_BEHIND.search(text) if re.search(r"dir|bearing|wd", text, re.IGNORECASE) else None
+    text = text if north is None else text[: north.start()]
     rest, unit = _unit(text, stated)
     height = _height(rest)
     bare = _HEIGHT.sub(" ", rest) if height is not None else rest
@@ -186,7 +190,8 @@ def understand(name: str, stated: str = "") -> Heading:
     return Heading(
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
-        magnetic=bool(known & {"mag", "magnetic"}), towards=bool(_TOWARDS.search(text.replace("_", " "))),
+        magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
+         towards=bool(_TOWARDS.search(text.replace("_", " "))),
         strange=turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
 
@@ -330,7 +335,7 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
         return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
     if si in (None, "rad", "1") or windy:
         away = known & _DIRECTION
-        if (away or re.search(r"wind?.?dir|windrichtung|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
+        if (away or re.search(r"wind?.?dir|windricht|wind_?ri\b|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
             sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane"}) or "dir" in compact
             if away and away <= {"deg", "azimuth", "bearing", "angle"} and not windy and not known & {"awa", "twa"}:
                 return "", False, set()

@@ -23,8 +23,6 @@ _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0)
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
 _POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
-_FROM_NORTH = frozenset({"twd", "gwd"})
-"""Directions that instruments of boats compute, from whichever north their compass is set to."""
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
@@ -200,10 +198,6 @@ def _degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
     """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
     words = [set(words_of(name)) for name in found.layout.names]
-    for name, said in zip(found.layout.names, words, strict=True):
-        if said & _FROM_NORTH:
-            fix = f"say which by --columns, {name}=wind_direction[deg] or {name}=wind_direction_magnetic[deg]"
-            found.remarks.append(f"column {name!r} may be from true or magnetic north: left out; {fix}")
     windy = any("wind" in word for name in words for word in name) or any(found.of("wind_direction", *COMPONENTS))
     for wind in winds:
         speed = wind.columns.get("wind_speed")
@@ -307,7 +301,12 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
         kept = {channel: _distinct(found, indices) for channel, indices in by_channel.items()}
         for at in range(max(map(len, kept.values()))):
             speeds = {channel: indices[at] for channel, indices in kept.items() if at < len(indices)}
-            columns = {channel: _column(found, index, channel, told) for channel, index in speeds.items()}
+            # The user's unit is that of the speeds without one, where others of the table state theirs.
+            open_ones = [index for index in speeds.values() if not fits("wind_speed", found.headings[index].unit)]
+            columns = {
+                channel: _column(found, index, channel, told if not open_ones or index in open_ones else None)
+                for channel, index in speeds.items()
+            }
             first = next(iter(speeds.values()))
             for channel, index in speeds.items():
                 towards = _direction(found, index, _DIRECTION_OF[channel])

@@ -224,7 +224,9 @@ def _blank_divided(
     found = _whole(layout, columns, hyphened, order)
     if found is None or found.form is None:
         return found
-    return replace(found, form=found.form.replace("-", " ") if found.form != "iso" else "%Y %m %d %H:%M:%S%f")
+    forms = [found.form.replace("-", " ")] if found.form != "iso" else [f"%Y %m %d {clock}" for clock in CLOCKS[:2]]
+    form = next((form for form in forms if fits(parse_with_bare_dates(texts, form)[0])), None)
+    return None if form is None else replace(found, form=form)
 
 
 def _days(

@@ -6,9 +6,27 @@ from collections.abc import Sequence
 
 from flagdata.ingest.anemometer import stated_columns
 from flagdata.ingest.anemometer.angles import may_be_direction
+from flagdata.ingest.anemometer.headings import words_of
 from flagdata.ingest.anemometer.instruments import COMPONENTS, Wind
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.timechoice import TimeChoice
+
+_FROM_NORTH = frozenset({"twd", "gwd"})
+"""Directions that instruments of boats compute, from whichever north their compass is set to."""
+
+
+def from_either_north(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> tuple[str, ...]:
+    """A remark for each direction that may be from true or from magnetic north."""
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        if not set(words_of(name)) & _FROM_NORTH:
+            continue
+        what = f"column {name!r} may be from true or magnetic north: left out"
+        if time is not None and winds:
+            line = stated_columns.read_also(layout, time, winds[0], index)
+            what += f'; if from true north: --columns "{line}", else with wind_direction_magnetic for wind_direction'
+        found.append(what)
+    return tuple(found)
 
 
 def directions(
