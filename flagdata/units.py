@@ -44,6 +44,7 @@ UNITS: dict[str, Unit] = {
     "ft/min": Unit(si="m/s", scale=0.3048 / 60),
     "rad": Unit(si="rad", scale=1.0),
     "deg": Unit(si="rad", scale=math.pi / 180),
+    "sixteenths": Unit(si="rad", scale=math.pi / 8),
     **{name: Unit(si="rad", scale=math.pi / 180) for name in compass.BY_UNIT},
     "gon": Unit(si="rad", scale=math.pi / 200),
     "10 deg": Unit(si="rad", scale=math.pi / 18),

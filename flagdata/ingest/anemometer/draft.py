@@ -165,7 +165,7 @@ def draft(
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
     if columns is None and chosen is not None:
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
-        remarks = (*remarks, *unread.directions(layout, time, (chosen,) if len(winds) == 1 else winds, remarks))
+        remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),

@@ -31,7 +31,7 @@ _WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed"
 _SPEED = frozenset(
     {
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
-        "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
+        "windgeschwindigkeit", "vit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
         "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
     }
@@ -81,7 +81,7 @@ _PLAIN = frozenset(
         "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
     }
 )  # fmt: skip
-_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd"})
+_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd", "app", "apparente"})
 _THEORETICAL = frozenset({"tws", "twa", "theoretical"})
 _ABBREVIATED = {
     "aws": "apparent_wind_speed", "awa": "apparent_wind_direction", "awd": "apparent_wind_direction",
@@ -191,7 +191,7 @@ def understand(name: str, stated: str = "") -> Heading:
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
         magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
-         towards=bool(_TOWARDS.search(text.replace("_", " "))),
+        towards=bool(_TOWARDS.search(text.replace("_", " "))),
         strange=turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
 
@@ -380,6 +380,8 @@ def _component(words: list[str], si: str | None) -> str | None:
 
 
 def _by_platform(known: set[str], quantity: str) -> str:
+    if quantity == "direction" and "angle" in known and known & {"true", "réel", "reel", "real"}:
+        return "theoretical_wind_direction"  # an angle of the true wind is from the bow
     if known & _APPARENT:
         return f"apparent_wind_{quantity}"
     if known & _THEORETICAL:

@@ -451,7 +451,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         and len(np.unique(known)) > 3
     ):
         found.remarks.append(
-            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out"
+            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out; if they "
+            f"are the sixteen from north on, counted from 0: --columns, {heading.name}=wind_direction[sixteenths]"
         )
         return None
     if heading.unit is None and float(known.max()) <= 36 and bool(np.all(known % 1 == 0)) and len(np.unique(known)) > 3:

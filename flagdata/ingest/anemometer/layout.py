@@ -107,7 +107,14 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     if width < 2 or not typed:
         return None
     fits = [_is_row(cells, width, typed) for _, cells in table]
-    first = next((at for at in range(len(table)) if fits[at] and _mostly(fits[at : at + 20])), None)
+    first = next(
+        (
+            at for at in range(len(table))
+            if fits[at] and _mostly(fits[at : at + 20])
+            and not _names_follow(table[at + 1 : at + 3], fits[at + 1 : at + 3], interest)
+        ),
+        None,
+    )  # fmt: skip
     if first is None:
         return None
     start = table[first][0]
@@ -132,6 +139,15 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         header=0 if at is None else start - at, names=names, units=units, by_name=by_name, rows=rows,
         lines=tuple(number + 1 for number, _ in kept), suffixes=suffixes, unit_columns=beside, strange=strange,
         short=short,
+    )  # fmt: skip
+
+
+def _names_follow(rows: Sequence[tuple[int, list[str]]], fits: Sequence[bool], interest: Callable[[str], int]) -> bool:
+    """Whether a line of names comes behind a line of numbers, which then numbers the columns."""
+    return any(
+        not fit and sum(interest(cell) > 0 for cell in cells) > 1
+        and sum(cell_kind(cell) in ("number", "stamp") for cell in cells) == 0
+        for (_, cells), fit in zip(rows, fits, strict=True)
     )  # fmt: skip
 
 

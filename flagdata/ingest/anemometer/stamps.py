@@ -49,6 +49,8 @@ _CLOCK_RUNS = {
     "%H%M%S": r"(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})",
 }
 """Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
+_NUMERIC = re.compile(r"%[YymdjHIMS]")
+"""Directives of numbers; those with nothing between them have all their digits."""
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
     r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?"
@@ -115,7 +117,9 @@ def pattern(form: str) -> str:
                 position = run.end()
                 continue
             used.append(directive)
-            out.append(_GROUPS[directive])
+            beside = _NUMERIC.match(form, position + 2) or (position > 1 and _NUMERIC.match(form, position - 2))
+            fixed = bool(beside) and directive in "mdHMSI"
+            out.append(f"(?P<{directive}>\\d{{2}})" if fixed else _GROUPS[directive])
             position += 2
             continue
         out.append(r"[T\s]+" if letter == " " else re.escape(letter))

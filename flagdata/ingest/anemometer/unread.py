@@ -30,19 +30,20 @@ def from_either_north(layout: Layout, time: TimeChoice | None, winds: Sequence[W
 
 
 def directions(
-    layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], remarks: Sequence[str]
+    layout: Layout, time: TimeChoice | None, wind: Wind, winds: Sequence[Wind], remarks: Sequence[str]
 ) -> tuple[str, ...]:
-    """A remark for each column that may be the direction of the one wind of a table, which has none.
+    """A remark for each column that may be the direction of a wind which has none.
 
     Args:
+        wind: the one that is read.
+        winds: all of the table.
         remarks: what was said of columns already.
     """
-    if time is None or len(winds) != 1 or not winds[0].sure:
+    if time is None or not wind.sure:
         return ()
-    wind = winds[0]
     if any(name.endswith(("direction", "magnetic")) or name in COMPONENTS for name in wind.columns):
         return ()
-    taken = {*time.columns, *(column.index for column in wind.columns.values())}
+    taken = {*time.columns, *(column.index for one in (wind, *winds) for column in one.columns.values())}
     found: list[str] = []
     for index, name in enumerate(layout.names):
         if index in taken or any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
