@@ -20,6 +20,7 @@ KINDS = (
     "flagdata.ingest.anemometer.expedition",
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.global_hourly",
+    "flagdata.ingest.anemometer.line_breaks",
     "flagdata.ingest.anemometer.wrapped",
     "flagdata.ingest.anemometer.name_value",
     "flagdata.ingest.anemometer.labelled",

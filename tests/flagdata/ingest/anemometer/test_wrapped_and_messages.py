@@ -90,3 +90,18 @@ def test_the_line_for_a_direction_from_either_north_reads_the_rest_too(log_file:
     remark = next(finding.what for finding in read_log(path).findings if finding.kind == "columns-not-read")
     channels = read_log(path, WindOptions(columns=remark.split('"')[1])).series.channels
     assert {"apparent_wind_speed", "apparent_wind_direction", "wind_direction"} <= set(channels)
+
+
+def test_line_breaks_of_html_at_the_ends_of_lines_are_nothing(log_file: Write) -> None:
+    rows = "".join(
+        f"2026-05-01 12:00:{at:02d},{speed},{direction},x,\n<br>\n"
+        for at, (speed, direction) in enumerate(zip(_SPEEDS, _DIRECTIONS, strict=True))
+    )
+    _check(log_file(f"Time,WindSpeedMPH,WindDirectionDegrees,Note<br>\n{rows}"), zone="UTC", unit="m/s")
+
+
+def test_stamps_of_a_flux_tower_without_seconds_are_read_to_the_minute(log_file: Write) -> None:
+    rows = "".join(f"2026050112{at:02d},3.5,{200 + at}\n" for at in range(12))
+    log = read_log(log_file(f"TIMESTAMP,WS_1_1_1,WD_1_1_1\n{rows}"), WindOptions(zone="UTC"))
+    assert log.format == "fluxnet"
+    assert np.all(np.diff(log.series.time) == 60_000_000_000)
