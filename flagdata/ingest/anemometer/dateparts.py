@@ -35,6 +35,8 @@ _WORDS = {
     "second": r"seconds?|sec|secs|ss|sekunde|seconde|segundo",
 }
 """Headings of the parts of a time in columns of their own, wherever these stand."""
+_OR_LEAST = frozenset({"min", "mins", "mm"})
+"""Headings of minutes that may as well be of minima or millimetres."""
 _YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
 _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
@@ -104,11 +106,19 @@ def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int
     for index, heading in enumerate(layout.names):
         name = " ".join(words_of(heading))
         for part, words in _WORDS.items():
+            if name in _OR_LEAST and not _behind_hours(layout, index):
+                continue
             fitting = part not in found and re.fullmatch(rf"(?:{words})( utc| gmt| local| lst)?", name)
             if fitting and whole_numbers([cell for cell in columns[index] if cell], *limits[part]):
                 found[part] = index
                 break
     return found
+
+
+def _behind_hours(layout: Layout, index: int) -> bool:
+    """Whether a column called "min" is of minutes: it follows the hours, and no column is of maxima."""
+    names = [" ".join(words_of(name)) for name in layout.names]
+    return index > 0 and bool(re.fullmatch(_WORDS["hour"], names[index - 1])) and "max" not in names
 
 
 def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:
@@ -149,9 +159,17 @@ def _beside_dates(
 ) -> Iterator[TimeChoice]:
     """A whole date in one column, and the hour, with minute and second or with its fraction, in others."""
     clock, of_clock = _clock(columns, named)
-    if not clock:
+    if not of_clock:
         return
     for index in dates:
+        if not clock:
+            cell = next(filter(None, columns[of_clock[0]]))
+            yield TimeChoice(
+                columns=(index, *of_clock), form=None, zone=None, zoned=False, score=2.2,
+                doubt=f"hours as {cell!r} may be hours and minutes, or hours with a fraction",
+                fix='say which by --columns: "date,hour[%H.%M],wind_speed[m/s]" for minutes, hour[%Q] for a fraction',
+            )  # fmt: skip
+            continue
         try:
             forms = date_forms(layout, index, order)
         except TimeError as error:
@@ -169,7 +187,7 @@ def _clock(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> tuple[
         return "", []
     hours = columns[named["hour"]]
     if share(_DECIMAL, [cell for cell in hours if cell]):
-        return "%Q", [named["hour"]]
+        return _pointed(hours), [named["hour"]]
     if not share(_TWO_DIGITS, [cell for cell in hours if cell]):
         return "", []
     form, taken = "%H", [named["hour"]]
@@ -178,6 +196,20 @@ def _clock(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> tuple[
             break
         form, taken = f"{form} {directive}", [*taken, named[part]]
     return form, taken
+
+
+def _pointed(cells: Sequence[str]) -> str:
+    """Whether hours with a point are hours and minutes (9.30 is half past nine) or with a fraction (9.50 is).
+
+    Where all could be minutes, it is what makes the rows more even; "" where that does not tell either.
+    """
+    parts = [cell.split(".") for cell in cells if cell]
+    if any(len(part) != 2 or len(part[1]) != 2 or int(part[1]) > 59 for part in parts):
+        return "%Q"
+    minutes = {int(hour) * 60 + int(rest) for hour, rest in parts}
+    decimals = {round(float(f"{hour}.{rest}") * 60) for hour, rest in parts}
+    uneven = [len(set(np.diff(sorted(kind)).tolist())) for kind in (minutes, decimals)]
+    return "" if uneven[0] == uneven[1] else "%H.%M" if uneven[0] < uneven[1] else "%Q"
 
 
 def _read(

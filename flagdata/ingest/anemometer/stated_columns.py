@@ -201,6 +201,8 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
         return choice
     choice = find_time(_only(layout, entries), order=order)
     choice = choice if choice is not None and set(choice.columns) == set(columns) else None
+    if choice is not None and choice.form is None and any(entry.detail for _, entry in entries):
+        choice = None  # what the columns alone leave open, the formats in brackets tell
     if choice is None and known and forms.count(None) == 1:
         index, entry = entries[forms.index(None)]
         missing = CLOCKS if entry.name == "time" else date_forms(layout, index, order)

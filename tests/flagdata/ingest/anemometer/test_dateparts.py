@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import TimeError
+from flagdata.errors import InputError, TimeError
 from flagdata.ingest.anemometer import WindOptions, read_log
 
 Write = Callable[[str], Path]
@@ -74,3 +74,31 @@ def test_a_clock_with_an_h_between_is_a_clock(log_file: Write, clock: str) -> No
     rows = "".join(f"14/05/2026;{clock.format(9, at)};3,{at}\n" for at in range(9))
     time = _times(log_file(f"Date;Heure;Vitesse du vent (km/h)\n{rows}"), zone="UTC")
     assert time[0] == np.datetime64("2026-05-14T09:00")
+
+
+def test_a_minimum_behind_the_hour_is_no_minute(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01,{at},{2 + at % 3},{9 + at % 3},{5 + at % 3}.5\n" for at in range(12))
+    time = _times(log_file(f"date,hour,Min,Max,wind speed (m/s)\n{rows}"), zone="UTC")
+    assert np.all(np.diff(time) == _HOUR)
+
+
+@pytest.mark.parametrize(
+    ("clocks", "minutes"), [(["9.00", "9.30", "10.00", "10.30"], 30), (["9.00", "9.50", "10.00", "10.50"], 30),
+                            (["9.00", "9.25", "9.50", "9.75"], 15)],
+)  # fmt: skip
+def test_hours_with_a_point_are_minutes_or_fractions_as_makes_them_even(
+    log_file: Write, clocks: list[str], minutes: int
+) -> None:
+    rows = "".join(f"2026-05-01;{clock};3.5\n" for clock in clocks)
+    time = _times(log_file(f"date;hour;wind speed (m/s)\n{rows}"), zone="UTC")
+    assert np.all(np.diff(time) == np.timedelta64(minutes, "m"))
+
+
+def test_hours_with_a_point_that_may_be_either_are_asked_about(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01;9.{at}0;3.5\n" for at in range(1, 5))
+    path = log_file(f"date;hour;wind speed (m/s)\n{rows}")
+    with pytest.raises(InputError, match="fraction"):
+        _times(path, zone="UTC")
+    for form, minutes in (("%H.%M", 10), ("%Q", 6)):
+        time = _times(path, zone="UTC", columns=f"date,hour[{form}],wind_speed[m/s]")
+        assert np.all(np.diff(time) == np.timedelta64(minutes, "m"))
