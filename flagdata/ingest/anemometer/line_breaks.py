@@ -7,12 +7,11 @@ Time,WindSpeedMPH,DateUTC<br>
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
-_BREAK = re.compile(r"\s*<br\s*/?>\s*$", re.IGNORECASE)
+_BREAKS = ("<br>", "<br/>", "<br />")
 _SHARE = 0.3
 
 
@@ -21,10 +20,16 @@ def matches(lines: Sequence[str]) -> bool:
     filled = [line for line in lines if line.strip()]
     if not filled or filled[0].lstrip().lower().startswith(("<!doctype", "<html", "<?xml")):
         return False
-    return sum(_BREAK.search(line) is not None for line in filled) >= max(2, _SHARE * len(filled))
+    return sum(line.rstrip().lower().endswith(_BREAKS) for line in filled) >= max(2, _SHARE * len(filled))
 
 
 def as_table(source: TextFile) -> TableText | None:
     """The lines without the breaks, and without those that are nothing else."""
-    bare = (_BREAK.sub("", line) for _, lines in source.blocks() for line in lines)
+    bare = (_bare(line) for _, lines in source.blocks() for line in lines)
     return TableText.of(source, [line for line in bare if line.strip()])
+
+
+def _bare(line: str) -> str:
+    text = line.rstrip()
+    ends = text.lower()
+    return next((text[: -len(end)] for end in _BREAKS if ends.endswith(end)), line)
