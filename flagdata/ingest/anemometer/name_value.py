@@ -26,6 +26,8 @@ from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.units import spelled
 
 _VALUES = frozenset({"value", "val", "state", "payload", "reading", "measurement", "wert", "valor", "valeur", "data"})
+_NUMBERED = frozenset({"code", "id", "number", "num", "no"})
+"""Words beside which a state is one of a country."""
 _UNITS = frozenset({"unit", "units", "einheit", "unidad", "unité"})
 _MOST = 500
 """Names of quantities beyond which a column of words is something else."""
@@ -169,7 +171,8 @@ def _value(layout: Layout, rest: Sequence[int]) -> int | None:
     """The column of the values: the only one that is called so, or the only one of numbers."""
     told = [
         index for index in rest
-        if set(words_of(layout.names[index])) & _VALUES and _share_of(layout, index, "number") >= _FEW
+        if set(words_of(layout.names[index])) & _VALUES and not set(words_of(layout.names[index])) & _NUMBERED
+        and _share_of(layout, index, "number") >= _FEW
     ]  # fmt: skip
     numbers = [index for index in rest if _share_of(layout, index, "number") >= _SHARE and not _measured(layout, index)]
     values = told if len(told) == 1 else numbers

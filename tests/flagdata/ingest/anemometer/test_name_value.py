@@ -25,7 +25,7 @@ def _stamp(at: int) -> str:
         ("item,time,value", "{name},{stamp},{value}"),
         ("time,measurement,value", "{stamp},{name},{value}"),
         ("entity_id,state,last_changed", "sensor.mast_{name},{value},{stamp}"),
-        ("Site;Parameter Name;When;Sample Measurement;Units of Measure", "6;{name};{stamp};{value};{unit}"),
+        ("State Code;Parameter Name;When;Sample Measurement;Units of Measure", "6;{name};{stamp};{value};{unit}"),
         ("", "{stamp} weather/{name} {value}"),
     ],
 )
