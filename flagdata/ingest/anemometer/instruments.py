@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer import unitcheck
+from flagdata.ingest.anemometer.axes import along_axes
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
@@ -27,12 +28,6 @@ _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
 _UNREADABLE = 0.1
-_AXES = (
-    frozenset({"north", "northward", "meridional", "vwn"}), frozenset({"east", "eastward", "zonal", "vwe"}),
-    frozenset({"south", "southward"}), frozenset({"west", "westward"}),
-)  # fmt: skip
-"""Words of the components towards north and east, and of what cannot be beside them."""
-_SPEED_UNITS = frozenset({"m/s", "km/h", "kn", "mph", "cm/s", "ft/s"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +115,7 @@ def find_winds(
 def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
     """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
     headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
-    headings, of_earth = _along_axes(layout, headings)
+    headings, of_earth = along_axes(layout, headings)
     found = _Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):
         if index in time or not heading.quantity or _day_of_month(layout, index):
@@ -149,38 +144,6 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     return found
-
-
-def _along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Heading], bool]:
-    """The headings with components towards north and east as what they are, and whether there are such.
-
-    One column of each, and none of south or west, which would be the sides of a mast. A lone U is no component, but
-    perhaps the speed itself.
-    """
-    words = [set(words_of(name)) for name in layout.names]
-    found = list(headings)
-    sides = [[at for at, said in enumerate(words) if _towards(said, headings[at], side)] for side in _AXES]
-    if [len(side) for side in sides[:2]] == [1, 1] and not any(sides[2:]):
-        for side, channel in ((sides[0][0], "wind_y"), (sides[1][0], "wind_x")):
-            found[side] = replace(headings[side], channel=channel, quantity=channel, sure=True, spread=False, label=())
-        for at, said in enumerate(words):
-            if said & {"up", "upward", "vertical"} and headings[at].quantity in ("", "wind_z") and "wind" in said:
-                found[at] = replace(headings[at], channel="wind_z", quantity="wind_z", sure=True, label=())
-        return found, True
-    if not any(heading.channel == "wind_y" for heading in headings):
-        for at, heading in enumerate(headings):
-            if heading.channel == "wind_x" and words_of(layout.names[at])[:1] == ["u"]:
-                found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=False)
-    return found, False
-
-
-def _towards(words: set[str], heading: Heading, side: frozenset[str]) -> bool:
-    """Whether a heading is of the wind along an axis of the Earth, and not of its direction or spread."""
-    if words & {"vwn", "vwe"}:
-        return bool(words & side)
-    windy = any("wind" in word for word in words) or heading.unit in _SPEED_UNITS
-    none = heading.quantity.endswith("direction") or heading.spread or words & {"variance", "pos", "position"}
-    return windy and bool(words & side) and not none
 
 
 def compass_unit(layout: Layout, index: int) -> str | None:
