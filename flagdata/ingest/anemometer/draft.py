@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, stated_columns, unitcheck, unread, zones
+from flagdata.ingest.anemometer import counted, stated_columns, stated_rate, unitcheck, unread, zones
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
@@ -207,6 +207,8 @@ def _doubts(
     if time is None:
         offered = stated_columns.offer(layout, time, winds)
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
+        above = stated_rate.advice(lines[: layout.preamble])
+        fix += f" ({above})" if above else ""
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
         offered = f"; {stated_columns.offer(layout, time, winds)}" if time.counts else ""

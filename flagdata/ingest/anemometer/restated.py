@@ -22,6 +22,7 @@ KINDS = (
     "flagdata.ingest.anemometer.global_hourly",
     "flagdata.ingest.anemometer.line_breaks",
     "flagdata.ingest.anemometer.wrapped",
+    "flagdata.ingest.anemometer.two_in_a_cell",
     "flagdata.ingest.anemometer.name_value",
     "flagdata.ingest.anemometer.labelled",
     "flagdata.ingest.anemometer.blocks",

@@ -127,3 +127,13 @@ def test_objects_between_lines_of_text_are_counted_from_the_start_at_the_rate(re
     assert since_start(log) == pytest.approx([60.0 * at for at in range(6)])
     assert log.series.channels["wind_speed"].tolist() == pytest.approx([(3.6 + at) / 3.6 for at in range(6)])
     assert {"rate-given", "malformed-lines"} <= {finding.kind for finding in log.findings}
+
+
+def test_the_rate_and_the_start_above_a_table_are_proposed_but_not_taken(read: Read, log_file: Write) -> None:
+    head = "Sampling rate: 20 Hz\nStart: 2026-05-01 12:00:00\n"
+    rows = "".join(f"{3 + at},0.2\n" for at in range(8))
+    path = log_file(f"{head}u (m/s),v (m/s)\n{rows}")
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path)
+    assert "--rate 20" in (caught.value.fix or "")
+    assert "--start 2026-05-01T12:00:00" in (caught.value.fix or "")
