@@ -38,3 +38,14 @@ def may_be_direction(layout: Layout, index: int) -> bool:
     value = numbers(layout.column(index), decimal=layout.decimal).value
     known = value[np.isfinite(value)]
     return len(known) > 0 and bool(np.all((known >= 0) & (known <= _TURN)))
+
+
+def unit_of(layout: Layout, index: int) -> str:
+    """The unit that a column of angles is likely in: points of the compass, radians, or degrees."""
+    points = compass_unit(layout, index)
+    if points is not None:
+        return points
+    value = numbers(layout.column(index), decimal=layout.decimal).value
+    known = value[np.isfinite(value)]
+    turned = len(known) > 0 and float(np.abs(known).max()) <= 2 * np.pi and bool(np.any(known % 1 != 0))
+    return "rad" if turned else "deg"

@@ -32,6 +32,13 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
             if said & {"up", "upward", "vertical"} and headings[at].quantity in ("", "wind_z") and "wind" in said:
                 found[at] = replace(headings[at], channel="wind_z", quantity="wind_z", sure=True, label=())
         return found, True
+    if not any(heading.quantity for heading in headings if heading.sure and "wind" in heading.quantity):
+        triple = {name: at for at, said in enumerate(words) for name in ("vx", "vy", "vz") if name in said}
+        if {"vx", "vy"} <= set(triple):
+            for name, at in triple.items():
+                channel = f"wind_{name[1]}"
+                found[at] = replace(headings[at], channel=channel, quantity=channel, sure=False, label=())
+            return found, False
     if not any(heading.channel == "wind_y" for heading in headings):
         for at, heading in enumerate(headings):
             if heading.channel == "wind_x" and words_of(layout.names[at])[:1] == ["u"]:

@@ -21,14 +21,14 @@ from flagdata.ingest.anemometer.timechoice import TimeChoice, fits, share, time_
 MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 """Dates with the name of the month; {s} is the sign between their parts."""
 _PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|da|dd|day|dom|tag", 1, 31),
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|da|dd|dy|day|dom|tag", 1, 31),
     ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 24),
-    ("%M", r"mi|min|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
+    ("%M", r"mi|min|mn|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
 )  # fmt: skip
 _WORDS = {
     "year": r"year|yyyy|yr|yy|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год",
-    "month": r"month|mon|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц",
-    "day": r"day|dom|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
+    "month": r"month|mon|mo|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц",
+    "day": r"day|dy|dom|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
     "doy": r"doy|jday|julian|day of year|julian day|yday|jd|dayofyear",
     "hour": r"hour|hours|hr|hrs|hh|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day",
     "minute": r"minute|minutes|min|mins|minuto|минута|mm",
@@ -42,6 +42,7 @@ _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
 _DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
+_MONTH_NAME = re.compile(r"^\s*(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?\s*$", re.IGNORECASE)
 _DECIMAL = re.compile(r"^\s*\d{1,3}\.\d+\s*$")
 _CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$")
 CLOCKS = (
@@ -67,6 +68,7 @@ def choices(
     named = _named(layout, columns)
     yield from _of_parts(layout, columns, named)
     yield from _by_heading(layout, columns)
+    yield from _month_by_name(layout, columns)
     yield from _beside_dates(layout, columns, named, dates, order)
 
 
@@ -85,6 +87,21 @@ def _by_heading(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[Ti
         date = "".join(_SPELLED[part] for part in found.groups())
         for clock in clocks:
             yield from _read(layout, columns, [index, clock], [f"{date} {form}" for form in CLOCKS], score=2.3)
+
+
+def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[TimeChoice]:
+    """A month's name with day, year and clock in the columns around it, as ctime and date write them."""
+    for index, cells in enumerate(columns):
+        filled = [cell for cell in cells if cell]
+        if not filled or not share(_MONTH_NAME, filled):
+            continue
+        for first, parts in ((index, ("%b", "%d", "clock", "%Y")), (index, ("%b", "%d", "%Y", "clock")),
+                             (index - 1, ("%d", "%b", "%Y", "clock"))):  # fmt: skip
+            taken = list(range(first, first + 4))
+            if first < 0 or taken[-1] >= len(columns) or not share(_YEAR, columns[first + parts.index("%Y")]):
+                continue
+            forms = [" ".join(form if part == "clock" else part for part in parts) for form in CLOCKS[:4]]
+            yield from _read(layout, columns, taken, forms, score=2.2)
 
 
 def hour_alone(layout: Layout, columns: Sequence[Sequence[str]], index: int) -> bool:
@@ -109,6 +126,9 @@ def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int
             if name in _OR_LEAST and not _behind_hours(layout, index):
                 continue
             fitting = part not in found and re.fullmatch(rf"(?:{words})( utc| gmt| local| lst)?", name)
+            if fitting and part == "month" and share(_MONTH_NAME, [cell for cell in columns[index] if cell]):
+                found[part] = index
+                break
             if fitting and whole_numbers([cell for cell in columns[index] if cell], *limits[part]):
                 found[part] = index
                 break
@@ -125,7 +145,8 @@ def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[s
     """A year with its month and day or day of the year, in any order, and the time of day beside; or that alone."""
     year = "%Y" if "year" in named and any(len(cell) == 4 for cell in columns[named["year"]]) else "%y"
     if {"year", "month", "day"} <= set(named):
-        date, of_date = f"{year} %m %d", [named[part] for part in ("year", "month", "day")]
+        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        date, of_date = f"{year} {month} %d", [named[part] for part in ("year", "month", "day")]
     elif {"year", "doy"} <= set(named) and year == "%Y":
         whole = not share(_DECIMAL, columns[named["doy"]])
         date, of_date = f"%Y {'%j' if whole else '%J'}", [named["year"], named["doy"]]

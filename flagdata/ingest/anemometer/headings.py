@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.languages import in_english
 from flagdata.schema import CHANNELS
 from flagdata.timebase import zone
@@ -230,7 +231,9 @@ def zone_of(name: str) -> str | None:
     if found is None and re.search(r"utc|gmt", name, re.IGNORECASE):
         return "UTC"
     if found is None:
-        return None
+        short = re.search(r"(?<![A-Za-z])([A-Z]{3,4})\W*$", name.replace("_", " "))
+        hours = ABBREVIATED.get(short[1]) if short is not None else None
+        return None if hours is None else f"{hours:+03d}:00"
     if not found[1]:
         return "UTC"
     sign, digits = found[1][0], found[1][1:].strip().replace(":", "")

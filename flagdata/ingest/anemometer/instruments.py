@@ -359,8 +359,8 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
                 "the headings name components of north and east: taken as towards which the wind blows"
             )
         winds.append(Wind(
-            label=found.name(first), height=found.headings[first].height, columns=columns, sure=True,
-            of_earth=found.of_earth,
+            label=found.name(first), height=found.headings[first].height, columns=columns,
+            sure=found.headings[first].sure, of_earth=found.of_earth,
         ))  # fmt: skip
     return winds
 
@@ -422,7 +422,10 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         found.remarks.append(f"column {heading.name!r} may be in degrees or in tens of degrees: left out")
         return None
     if heading.unit is None and float(np.abs(known).max()) <= 6.3:
-        found.remarks.append(f"column {heading.name!r} may be in degrees or radians: left out")
+        fix = f"{heading.name}={channel}[rad] or {heading.name}={channel}[deg]"
+        found.remarks.append(
+            f"column {heading.name!r} may be in degrees or radians: left out; say which by --columns, {fix}"
+        )
         return None
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"

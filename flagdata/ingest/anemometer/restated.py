@@ -21,6 +21,7 @@ KINDS = (
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.global_hourly",
     "flagdata.ingest.anemometer.line_breaks",
+    "flagdata.ingest.anemometer.quoted_commas",
     "flagdata.ingest.anemometer.wrapped",
     "flagdata.ingest.anemometer.two_in_a_cell",
     "flagdata.ingest.anemometer.name_value",

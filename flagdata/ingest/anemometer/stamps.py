@@ -24,15 +24,10 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
+from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.timebase import NANOSECONDS
 
 DAY = 86_400 * NANOSECONDS
-ABBREVIATED = {
-    "WEST": 1, "CET": 1, "CEST": 2, "MEZ": 1, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AEST": 10,
-    "AEDT": 11, "AWST": 8, "NZST": 12, "NZDT": 13, "SAST": 2, "HKT": 8, "EST": -5, "EDT": -4, "CDT": -5, "MDT": -6,
-    "PST": -8, "PDT": -7, "AKST": -9, "AKDT": -8, "HST": -10, "BRT": -3,
-}  # fmt: skip
-"""Hours east of UTC by the abbreviation of a zone, of those that mean one (tz database)."""
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
-from flagdata.ingest.anemometer.angles import may_be_direction
+from flagdata.ingest.anemometer.angles import may_be_direction, unit_of
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
@@ -304,8 +304,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
 
 def read_also(layout: Layout, time: TimeChoice, wind: Wind, direction: int) -> str:
     """The line that says what was understood of a table, and that a further column is the wind's direction."""
-    points = compass_unit(layout, direction)
-    entries = _understood(time, (wind,)) | {direction: f"wind_direction[{points or 'deg'}]"}
+    entries = _understood(time, (wind,)) | {direction: f"wind_direction[{unit_of(layout, direction)}]"}
     return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
 
 
@@ -339,7 +338,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = understand(name, layout.units[at])
         if not timed and kinds and kinds[0] == "stamp":
-            found[at] = "time"
+            found[at] = "time[?]"
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
@@ -361,6 +360,8 @@ def _part(form: str, parts: Mapping[str, str]) -> str:
     """The entry of a column that is a part of a time, written as `form`; `parts` are names by directives."""
     if form in parts:
         return parts[form]
+    if form == "%b":
+        return "month"
     if form in ("%Q", "%J"):
         return f"{'hour' if form == '%Q' else 'day_of_year'}[{form}]"
     return "time" if counted.is_time_of_day(form) else "date" if set("dmyYb") & set(form) else f"time[{form}]"

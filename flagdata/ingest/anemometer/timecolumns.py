@@ -11,13 +11,14 @@ import numpy as np
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted, dateparts
+from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
-from flagdata.ingest.anemometer.stamps import ABBREVIATED, Stamps
+from flagdata.ingest.anemometer.stamps import Stamps
 from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice
 
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
@@ -32,7 +33,7 @@ _HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
 """Before or after noon, in a column of its own."""
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
-    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
@@ -272,6 +273,8 @@ def _compact(shape: str) -> tuple[str, ...]:
         "00000000 000000": "%Y%m%d %H%M%S", "00000000 0000": "%Y%m%d %H%M", "00000000 00:00:00": "%Y%m%d %H:%M:%S%f",
         "00000000T0000": "%Y%m%d %H%M", "00000000_000000": "%Y%m%d_%H%M%S", "00000000 00:00": "%Y%m%d %H:%M",
         "00000000-000000": "%Y%m%d-%H%M%S", "00000000 00": "%Y%m%d %H", "00000000 0": "%Y%m%d %H",
+        "00000000:0000": "%Y%m%d:%H%M",
+        "00000000:000000": "%Y%m%d:%H%M%S", "00000000_0000": "%Y%m%d_%H%M",
     }  # fmt: skip
     known = forms.get(bare.split(".")[0])
     return (known,) if known else ()

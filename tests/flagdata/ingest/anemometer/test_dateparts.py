@@ -102,3 +102,23 @@ def test_hours_with_a_point_that_may_be_either_are_asked_about(log_file: Write) 
     for form, minutes in (("%H.%M", 10), ("%Q", 6)):
         time = _times(path, zone="UTC", columns=f"date,hour[{form}],wind_speed[m/s]")
         assert np.all(np.diff(time) == np.timedelta64(minutes, "m"))
+
+
+@pytest.mark.parametrize(
+    ("heading", "row"),
+    [
+        ("YEAR MO DY HR MN wspd", "2026 05 14 7 {at:02d} 3.5"),
+        ("Day Mon Year Time wspd", "14 May 2026 07:{at:02d} 3.5"),
+        ("# dow mon day clock year wspd", "Thu May 14 07:{at:02d}:00 2026 3.5"),
+    ],
+)  # fmt: skip
+def test_months_by_number_or_name_are_parts_of_the_date(log_file: Write, heading: str, row: str) -> None:
+    rows = "".join(row.format(at=at) + "\n" for at in range(12))
+    time = _times(log_file(f"{heading}\n{rows}"), zone="UTC", unit="m/s")
+    assert time[1] == np.datetime64("2026-05-14T07:01")
+
+
+def test_the_abbreviation_in_a_heading_is_the_zone_of_its_stamps(log_file: Write) -> None:
+    rows = "".join(f"20260514:07{at:02d},3.5\n" for at in range(12))
+    time = _times(log_file(f"Date(NZST),Speed(m/s)\n{rows}"))
+    assert time[0] == np.datetime64("2026-05-13T19:00")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
 
 Write = Callable[[str], Path]
@@ -105,3 +106,33 @@ def test_stamps_of_a_flux_tower_without_seconds_are_read_to_the_minute(log_file:
     log = read_log(log_file(f"TIMESTAMP,WS_1_1_1,WD_1_1_1\n{rows}"), WindOptions(zone="UTC"))
     assert log.format == "fluxnet"
     assert np.all(np.diff(log.series.time) == 60_000_000_000)
+
+
+def test_decimal_commas_in_quotes_are_decimal_points(log_file: Write) -> None:
+    rows = "".join(
+        f'"01.05.2026 12:00:{at:02d}","{speed:.2f}","{direction:.1f}"\n'.replace(".", ",").replace(
+            ",05,2026", ".05.2026"
+        )
+        for at, (speed, direction) in enumerate(zip(_SPEEDS, _DIRECTIONS, strict=True))
+    )
+    _check(log_file(f'"Zeit","Wind (m/s)","Richtung (°)"\n{rows}'), zone="UTC")
+
+
+def test_commas_before_three_digits_may_divide_thousands_and_stay(log_file: Write) -> None:
+    rows = "".join(f'2026-05-01T12:00:{at:02d}Z,3.5,"1,013"\n' for at in range(12))
+    log = read_log(log_file(f'time,Wind (m/s),"Pressure"\n{rows}'))
+    assert "air_pressure" not in log.series.channels
+
+
+def test_three_velocities_along_axes_are_offered_as_components(log_file: Write) -> None:
+    rows = "".join(f"{at / 10},3.5,0.1,0.2\n" for at in range(12))
+    path = log_file(f"t[s],Vx[m/s],Vy[m/s],Vz[m/s]\n{rows}")
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path)
+    assert "wind_x[m/s],wind_y[m/s],wind_z[m/s]" in (caught.value.fix or "")
+
+
+def test_radians_are_offered_where_angles_are_a_turn_at_most(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,4.{at:02d}\n" for at in range(12))
+    log = read_log(log_file(f"time,wind speed (m/s),angle\n{rows}"))
+    assert any("wind_direction[rad]" in finding.what for finding in log.findings)
