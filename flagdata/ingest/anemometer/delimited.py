@@ -87,7 +87,10 @@ class Delimited:
             reading = _read(source, recipe, turned, where)
         except TimeError as error:
             rest = [n.fix for n in proposal.needs if n.without(options) and f"--{n.option}" not in error.fix]
-            raise type(error)(error.what, where=error.where, fix="; ".join([error.fix, *rest])) from None
+            told = next(
+                (n.fix for n in proposal.needs if f"--{n.option}" in error.fix and "(line " in n.fix), error.fix
+            )
+            raise type(error)(error.what, where=error.where, fix="; ".join([told, *rest])) from None
         found = [
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in proposal.warnings

@@ -170,7 +170,8 @@ def draft(
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), needs=_needs(lines, time), unsure=tuple(one.label for one in winds if not one.sure),
+        doubts=tuple(doubts), needs=_needs(lines, layout, time),
+        unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth,
     )  # fmt: skip
@@ -180,12 +181,14 @@ def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
     return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
 
 
-def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
+def _needs(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tuple[Need, ...]:
     """What the stamps of a time leave open: its start, its day, its zone."""
     if time is None or time.counts:
         return ()
     if time.form is not None and counted.is_elapsed(time.form):
         fix = "give the instant of the first: --start TIME"
+        above = stated_rate.advice(lines[: layout.preamble + max(1, layout.header)] if layout.header else ())
+        fix += f" ({above})" if above else ""
         return (Need(what="its rows count from a start", fix=fix, option="start"),)
     found: list[Need] = []
     if time.form is not None and counted.is_time_of_day(time.form):

@@ -10,7 +10,8 @@ _RATE = re.compile(
     re.IGNORECASE,
 )
 _START = re.compile(
-    r"(?:start\w*|begin\w*|date|time|recorded)\b[^\d]{0,25}(?P<start>\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?)",
+    r"(?:start\w*|begin\w*|since|date|time|recorded)\b[^\d]{0,25}"
+    r"(?P<start>\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?)",
     re.IGNORECASE,
 )
 

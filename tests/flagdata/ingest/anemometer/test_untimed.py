@@ -137,3 +137,11 @@ def test_the_rate_and_the_start_above_a_table_are_proposed_but_not_taken(read: R
         read_log(path)
     assert "--rate 20" in (caught.value.fix or "")
     assert "--start 2026-05-01T12:00:00" in (caught.value.fix or "")
+
+
+def test_the_instant_that_a_heading_counts_from_is_proposed(log_file: Write) -> None:
+    rows = "".join(f"{60 * at},{3 + at}.5\n" for at in range(8))
+    path = log_file(f"seconds since 2026-05-01 12:00:00 UTC,wind speed (m/s)\n{rows}")
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path)
+    assert "--start 2026-05-01T12:00:00" in (caught.value.fix or "")
