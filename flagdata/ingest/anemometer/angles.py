@@ -49,3 +49,10 @@ def unit_of(layout: Layout, index: int) -> str:
     known = value[np.isfinite(value)]
     turned = len(known) > 0 and float(np.abs(known).max()) <= 2 * np.pi and bool(np.any(known % 1 != 0))
     return "rad" if turned else "deg"
+
+
+def in_tens(layout: Layout, index: int) -> bool:
+    """Whether a column may hold tens of degrees: whole numbers to 36, and 99 for a variable wind."""
+    value = numbers(layout.column(index), decimal=layout.decimal).value
+    known = value[np.isfinite(value) & (value != 99)]
+    return len(known) > 0 and float(known.max()) <= 36 and bool(np.all(known % 1 == 0))

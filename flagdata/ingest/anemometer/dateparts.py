@@ -62,7 +62,7 @@ def choices(
         dates: columns that hold whole dates.
         order: of dates written with numbers only, as the user says.
     """
-    found = _parts(layout, columns) or _unnamed_parts(layout, columns)
+    found = _parts(layout, columns) or _unnamed_parts(layout, columns) or _unnamed_ordinal(layout, columns)
     if found is not None:
         yield found
     named = _named(layout, columns)
@@ -297,7 +297,7 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
         elif form == "%Y %m %d" and clock and share(_CLOCK, clock):
             known = next((found for found in CLOCKS if fits(counted.parse(clock, found))), None)
             taken, form = [*taken, at], f"{form} {known}" if known else form
-        if "%H" not in form and "%I" not in form:
+        if ("%H" not in form and "%I" not in form) or ("%d" not in form and "%j" not in form):
             continue
         texts = [" ".join(cells) for cells in zip(*(columns[i] for i in taken), strict=True)]
         found, _ = parse_with_bare_dates(texts, form)
@@ -331,6 +331,28 @@ def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoi
         found, _ = parse_with_bare_dates(texts, form)
         if fits(found) and bool(np.all(np.diff(found.ns[found.valid]) >= 0)):
             return replace(time_choice(layout, tuple(taken), form, found, 2.2), unnamed=True)
+    return None
+
+
+def _unnamed_ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, day of the year and a clock of one number side by side, as arrays of Campbell's older loggers have them.
+
+    They are told by their numbers alone: the clock has no minutes above 59, and the rows rise.
+    """
+    if any(layout.names):
+        return None
+    for index in range(len(columns) - 2):
+        year, day, clock = columns[index : index + 3]
+        if not share(_YEAR, year) or not share(_DIGITS, clock) or not whole_numbers(day, 1, 366):
+            continue
+        if not whole_numbers(clock, 0, 2400) or any(int(cell) % 100 > 59 for cell in clock if cell.isdigit()):
+            continue
+        texts = [" ".join(row) for row in zip(year, day, clock, strict=True)]
+        found, _ = parse_with_bare_dates(texts, "%Y %j %H%M")
+        rising = np.diff(found.ns[found.valid])
+        if fits(found) and len(rising) and bool(np.all(rising >= 0)) and bool(np.any(rising > 0)):
+            choice = time_choice(layout, (index, index + 1, index + 2), "%Y %j %H%M", found, 2.2)
+            return replace(choice, unnamed=True)
     return None
 
 

@@ -43,6 +43,8 @@ _STATED = re.compile(
     r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
 )
 """How lines above a heading state a unit."""
+_BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
+"""Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
 
 
@@ -148,6 +150,7 @@ def draft(
     labels = tuple(one.label for one in winds)
     chosen = next((one for one in winds if one.label == wind), None)
     doubts = list(_doubts(lines, layout, time, winds, chosen))
+    doubts += _below_zero(layout, time, winds) if columns is None and wind is None else []
     if wind is not None and chosen is None and mixed is not None and winds:
         # A site that the first rows do not hold.
         label, _, rest = wind.partition(":")
@@ -244,6 +247,26 @@ def _doubts(
         fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
+        found.append(Doubt(what=what, fix=fix))
+    return found
+
+
+def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[Doubt]:
+    """A doubt for each speed that is below zero too often and too far to be one: it is a component."""
+    found: list[Doubt] = []
+    for wind in winds:
+        column = wind.columns.get("wind_speed")
+        if column is None:
+            continue
+        value = numbers(layout.column(column.index), decimal=layout.decimal).value
+        known = value[np.isfinite(value) & ~np.isin(value, CODES)]
+        if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
+            continue
+        what = f"column {wind.label!r} goes below zero, to {known.min():g}: a component of the wind, not its speed"
+        line = stated_columns.offer(layout, time, ())
+        fix = (
+            f"if two columns are its components, say so with wind_x and wind_y (x to the east, y to the north): {line}"
+        )
         found.append(Doubt(what=what, fix=fix))
     return found
 

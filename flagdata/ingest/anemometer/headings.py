@@ -289,7 +289,7 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
     if len(text) > 1 and below is None and (whole := _known(text)) is not None:
         return text, whole
     for found in _BRACKET.finditer(text):
-        inside = _known(found[1])
+        inside = _known(re.sub(r"^\s*units?\s*[=:]\s*|[\"']", "", found[1]))
         if inside is not None:
             return text[: found.start()] + " " + text[found.end() :], inside
     # HOBO writes the serial numbers of logger and sensor in brackets: they tell no instruments of one file apart.

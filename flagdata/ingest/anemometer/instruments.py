@@ -141,6 +141,8 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
+            if _is_vane(heading, parsed.value):
+                found.headings[index] = replace(heading, channel="wind_direction", quantity="wind_direction")
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     return found
@@ -189,6 +191,13 @@ def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
 def beaufort(layout: Layout) -> tuple[str, ...]:
     """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
     return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def _is_vane(heading: Heading, value: NDArray[np.float64]) -> bool:
+    """Whether WV is a wind vane, not a velocity: its numbers go beyond every wind, and not beyond a turn."""
+    known = value[np.isfinite(value)]
+    vane = heading.quantity == "wind_speed" and heading.unit is None and words_of(heading.name)[:1] == ["wv"]
+    return vane and len(known) > 0 and float(known.min()) >= 0 and 100 < float(known.max()) <= 360
 
 
 def _may_be_points(heading: Heading) -> bool:
@@ -378,7 +387,12 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             found.headings[i].label != found.headings[speed].label,
         )
     )
-    lone = candidates if len(candidates) == 1 else []
+    own = found.key(candidates[0]) if len(candidates) == 1 else ()
+    of_another = bool(own[:-1]) and own != found.key(speed) and any(found.key(i) == own for i in found.of(*SPEEDS))
+    lone = candidates if len(candidates) == 1 and not of_another else []
+    alike = [index for index in found.of(found.headings[speed].channel) if found.key(index) == found.key(speed)]
+    if len(exact) == len(alike) > 1:
+        exact = [exact[alike.index(speed)]]  # blocks of columns with the same headings, one an instrument
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
     exact.sort(key=lambda i: (_points(found.headings[i]), found.headings[i].unit is None))
     chosen = exact or near[:1] or lone or plain
@@ -402,8 +416,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         return None
     if heading.unit == "gon":
         return channel, Column(index=index, unit="gon", told="in gon by its heading", towards=heading.towards)
-    coded = np.isin(known, NO_ANGLE)
-    known = known[~coded] if float(coded.mean() if len(known) else 0.0) < 0.5 else known
+    coded = np.isin(known, NO_ANGLE) | (known <= -999)  # no log writes an angle so
+    known = known[~coded] if not bool(coded.all()) else known
     if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
         found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
         return None

@@ -20,6 +20,7 @@ KINDS = (
     "flagdata.ingest.anemometer.expedition",
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.global_hourly",
+    "flagdata.ingest.anemometer.broken_headings",
     "flagdata.ingest.anemometer.line_breaks",
     "flagdata.ingest.anemometer.quoted_commas",
     "flagdata.ingest.anemometer.wrapped",

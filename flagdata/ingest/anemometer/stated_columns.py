@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
-from flagdata.ingest.anemometer.angles import may_be_direction, unit_of
+from flagdata.ingest.anemometer.angles import in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
@@ -337,13 +337,15 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = understand(name, layout.units[at])
-        if not timed and kinds and kinds[0] == "stamp":
+        if not timed and kinds and kinds[0] == "stamp" and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
                 continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
+            if guessed is None and CHANNELS[heading.channel].unit == "rad" and in_tens(layout, at):
+                guessed = "?"
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
             continue
@@ -362,6 +364,8 @@ def _part(form: str, parts: Mapping[str, str]) -> str:
         return parts[form]
     if form == "%b":
         return "month"
+    if form == "%H%M":
+        return "time[%H%M]"
     if form in ("%Q", "%J"):
         return f"{'hour' if form == '%Q' else 'day_of_year'}[{form}]"
     return "time" if counted.is_time_of_day(form) else "date" if set("dmyYb") & set(form) else f"time[{form}]"

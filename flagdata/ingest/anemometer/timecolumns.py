@@ -36,6 +36,8 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_OF_EXTREME = re.compile(r"(?:time|hora|hour|zeit).*(?:max|min|gust|racha|peak)|(?:max|min|gust|peak).*(?:time|hora)")
+"""Headings of the times at which extremes of other quantities came."""
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
 """A date whose numbers are divided by blanks, and a clock."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
@@ -110,7 +112,7 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             continue
         if share(_DATE, texts):
             dates.append(index)
-        elif dateparts.hour_alone(layout, columns, index):
+        elif dateparts.hour_alone(layout, columns, index) or _OF_EXTREME.search("".join(words_of(layout.names[index]))):
             continue
         elif share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
                                        and share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip

@@ -41,7 +41,8 @@ def directions(
     """
     if time is None or not wind.sure:
         return ()
-    if any(name.endswith(("direction", "magnetic")) or name in COMPONENTS for name in wind.columns):
+    told = [name for name in wind.columns if not name.startswith("apparent")]
+    if any(name.endswith(("direction", "magnetic")) or name in COMPONENTS for name in told):
         return ()
     taken = {*time.columns, *(column.index for one in (wind, *winds) for column in one.columns.values())}
     found: list[str] = []

@@ -62,8 +62,8 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         text, short = _table(source, rate, start, where, told=True)
         return _counted(source, text, rate, start, short=short)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
-        _refuse_times(any(_TIMED.search(line) for line in lines), where)
-        text = list(_sentences(source, rate, start))
+        _refuse_times(sum(bool(_TIMED.search(line)) for line in lines) > 1, where)
+        text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
     else:
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)

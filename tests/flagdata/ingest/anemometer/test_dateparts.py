@@ -122,3 +122,13 @@ def test_the_abbreviation_in_a_heading_is_the_zone_of_its_stamps(log_file: Write
     rows = "".join(f"20260514:07{at:02d},3.5\n" for at in range(12))
     time = _times(log_file(f"Date(NZST),Speed(m/s)\n{rows}"))
     assert time[0] == np.datetime64("2026-05-13T19:00")
+
+
+def test_a_year_a_day_of_it_and_a_clock_that_nothing_names_are_offered_as_such(log_file: Write) -> None:
+    rows = "".join(f"110,2026,121,{7 * 100 + at},3.{at % 10},240.1\n" for at in range(12))
+    path = log_file(rows)
+    with pytest.raises(InputError) as caught:
+        _times(path)
+    assert ",year,day_of_year,time[%H%M]," in (caught.value.fix or "")
+    time = _times(path, zone="UTC", columns=",year,day_of_year,time[%H%M],wind_speed[m/s],wind_direction[deg]")
+    assert time[0] == np.datetime64("2026-05-01T07:00")
