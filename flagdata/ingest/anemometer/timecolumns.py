@@ -36,7 +36,9 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
-_OF_EXTREME = re.compile(r"(?:time|hora|hour|zeit).*(?:max|min|gust|racha|peak)|(?:max|min|gust|peak).*(?:time|hora)")
+_OF_EXTREME = re.compile(
+    r"hora.*(?:max|min(?!u)|racha)|time(?:of|at)(?:max|min|gust|peak)|time(?:max|gust|peak)|(?:max|gust|peak).*time"
+)
 """Headings of the times at which extremes of other quantities came."""
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
 """A date whose numbers are divided by blanks, and a clock."""

@@ -108,3 +108,10 @@ def test_directions_beside_one_that_is_relative_are_told(log_file: Write) -> Non
     )
     log = read_log(path, WindOptions(unit="m/s"))
     assert any("'WindDir_True'" in finding.what for finding in log.findings if finding.kind == "columns-not-read")
+
+
+@pytest.mark.parametrize("heading", ["Hour:Minute", "Hour:Min", "time (h:min)", "hora:minuto"])
+def test_a_clock_of_hours_and_minutes_is_the_time_of_the_row(log_file: Write, heading: str) -> None:
+    rows = "".join(f"2026-05-01,14:{at:02d},3.{at % 10}\n" for at in range(12))
+    log = read_log(log_file(f"date,{heading},wind speed (m/s)\n{rows}"), WindOptions(zone="UTC"))
+    assert log.series.time.astype("datetime64[ns]")[1] == np.datetime64("2026-05-01T14:01")

@@ -69,7 +69,10 @@ def test_sentences_of_the_most_frequent_wind_tick_and_the_others_come_with_them(
     [
         "time,wind speed [m/s]\n2026-05-01 12:00:00,3\n2026-05-01 12:00:01,4\n2026-05-01 12:00:02,3\n",
         "millis,wind speed [m/s]\n0,3\n100,4\n200,3\n300,4\n",
-        sentence("GPRMC,120000,A,5200.0,N,00500.0,E,5.0,90.0,010526,,,A") + sentence("WIMWV,1.0,R,4.0,N,A"),
+        "".join(
+            sentence(f"GPRMC,12000{at},A,5200.0,N,00500.0,E,5.0,90.0,010526,,,A") + sentence("WIMWV,1.0,R,4.0,N,A")
+            for at in range(2)
+        ),
         "12:00:01 Wind Speed: 3.21 m/s\n12:00:02 Wind Speed: 3.31 m/s\n12:00:03 Wind Speed: 3.21 m/s\n",
     ],
 )
