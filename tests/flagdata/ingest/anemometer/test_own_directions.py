@@ -115,3 +115,24 @@ def test_a_clock_of_hours_and_minutes_is_the_time_of_the_row(log_file: Write, he
     rows = "".join(f"2026-05-01,14:{at:02d},3.{at % 10}\n" for at in range(12))
     log = read_log(log_file(f"date,{heading},wind speed (m/s)\n{rows}"), WindOptions(zone="UTC"))
     assert log.series.time.astype("datetime64[ns]")[1] == np.datetime64("2026-05-01T14:01")
+
+
+@pytest.mark.parametrize("ahead", [True, False])
+def test_the_one_time_of_a_stream_moves_no_reading(log_file: Write, ahead: bool) -> None:
+    def sentence(text: str) -> str:
+        return f"${text}*{reduce(xor, text.encode(), 0):02X}\n"
+
+    time = sentence("GPRMC,120000,A,5200.0,N,00500.0,E,5.0,90.0,010526,,,A")
+    wind = [sentence(f"WIMWV,{80 + at}.0,R,1{at}.0,M,A") for at in range(5)]
+    log = read_log(log_file("".join([time, *wind] if ahead else [*wind, time])), WindOptions(start=_START, rate=1.0))
+    assert log.series.channels["apparent_wind_speed"].tolist() == [10, 11, 12, 13, 14]
+
+
+def test_sentences_after_stamps_of_any_writing_are_read(log_file: Write) -> None:
+    def sentence(text: str) -> str:
+        return f"${text}*{reduce(xor, text.encode(), 0):02X}\n"
+
+    text = "".join(f"14/05/2026 12:00:0{at}, " + sentence(f"WIMWV,{80 + at}.0,R,1{at}.0,M,A") for at in range(5))
+    log = read_log(log_file(text), WindOptions(zone="UTC"))
+    assert log.series.channels["apparent_wind_speed"].tolist() == [10, 11, 12, 13, 14]
+    assert log.series.time.astype("datetime64[ns]")[0] == np.datetime64("2026-05-14T12:00:00")
