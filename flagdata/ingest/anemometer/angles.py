@@ -1,13 +1,14 @@
-"""Which columns may be angles of a wind's direction, though their headings do not say so."""
+"""Columns of angles: points of the compass, vanes, and what may be a direction though its heading does not say so."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from flagdata import compass
 from flagdata.ingest.anemometer.cells import numbers
-from flagdata.ingest.anemometer.headings import understand, words_of
-from flagdata.ingest.anemometer.instruments import compass_unit
-from flagdata.ingest.anemometer.layout import Layout
+from flagdata.ingest.anemometer.headings import Heading, understand, words_of
+from flagdata.ingest.anemometer.layout import Layout, cell_kind
 
 _DIRECTIONS = frozenset(
     {"dir", "direction", "degrees", "degree", "deg", "bearing", "angle", "wd", "dd", "azimuth", "wa"}
@@ -21,6 +22,7 @@ _OTHERS = frozenset(
 )  # fmt: skip
 """Words of angles and degrees of other quantities."""
 _TURN = 361.0
+_UNREADABLE = 0.1
 _NORTHS = frozenset({"true", "mag", "degt", "degm", "deg true", "deg mag"})
 """Units of directions, from true or magnetic north."""
 
@@ -56,3 +58,28 @@ def in_tens(layout: Layout, index: int) -> bool:
     value = numbers(layout.column(index), decimal=layout.decimal).value
     known = value[np.isfinite(value) & (value != 99)]
     return len(known) > 0 and float(known.max()) <= 36 and bool(np.all(known % 1 == 0))
+
+
+def compass_unit(layout: Layout, index: int) -> str | None:
+    """The unit of a column of points of the compass, by the language of its letters; `None` where it holds none."""
+    filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
+    headings = " ".join(layout.names)
+    return compass.table_of(filled, heading=f"{layout.names[index]} {headings}", share=1 - _UNREADABLE)
+
+
+def degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:
+    """The cells of a column of points of the compass in degrees, NaN where they are none."""
+    points = compass.BY_UNIT[unit_name]
+    return np.array([points.get(cell.upper(), np.nan) for cell in layout.column(index)])
+
+
+def is_vane(heading: Heading, value: NDArray[np.float64]) -> bool:
+    """Whether WV is a wind vane, not a velocity: its numbers go beyond every wind, and not beyond a turn."""
+    known = value[np.isfinite(value)]
+    vane = heading.quantity == "wind_speed" and heading.unit is None and words_of(heading.name)[:1] == ["wv"]
+    return vane and len(known) > 0 and float(known.min()) >= 0 and 100 < float(known.max()) <= 360
+
+
+def may_be_points(heading: Heading) -> bool:
+    """Whether words below a heading may be points of the compass: of a direction, or of a wind in words."""
+    return heading.quantity.endswith(("wind_direction", "wind_speed"))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer import unitcheck
+from flagdata.ingest.anemometer.angles import compass_unit, degrees, is_vane, may_be_points
 from flagdata.ingest.anemometer.axes import along_axes
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
@@ -121,9 +122,9 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        points = compass_unit(layout, index) if _may_be_points(heading) else None
+        points = compass_unit(layout, index) if may_be_points(heading) else None
         if points is not None:
-            found.values[index] = _degrees(layout, index, points)
+            found.values[index] = degrees(layout, index, points)
             quantity = heading.quantity.replace("speed", "direction")
             found.headings[index] = replace(
                 heading, unit=points, quantity=quantity, channel="" if heading.spread else quantity
@@ -141,23 +142,11 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
-            if _is_vane(heading, parsed.value):
+            if is_vane(heading, parsed.value):
                 found.headings[index] = replace(heading, channel="wind_direction", quantity="wind_direction")
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     return found
-
-
-def compass_unit(layout: Layout, index: int) -> str | None:
-    """The unit of a column of points of the compass, by the language of its letters; `None` where it holds none."""
-    filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
-    headings = " ".join(layout.names)
-    return compass.table_of(filled, heading=f"{layout.names[index]} {headings}", share=1 - _UNREADABLE)
-
-
-def _degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:
-    points = compass.BY_UNIT[unit_name]
-    return np.array([points.get(cell.upper(), np.nan) for cell in layout.column(index)])
 
 
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
@@ -191,18 +180,6 @@ def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
 def beaufort(layout: Layout) -> tuple[str, ...]:
     """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
     return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
-
-
-def _is_vane(heading: Heading, value: NDArray[np.float64]) -> bool:
-    """Whether WV is a wind vane, not a velocity: its numbers go beyond every wind, and not beyond a turn."""
-    known = value[np.isfinite(value)]
-    vane = heading.quantity == "wind_speed" and heading.unit is None and words_of(heading.name)[:1] == ["wv"]
-    return vane and len(known) > 0 and float(known.min()) >= 0 and 100 < float(known.max()) <= 360
-
-
-def _may_be_points(heading: Heading) -> bool:
-    """Whether words below a heading may be points of the compass: of a direction, or of a wind in words."""
-    return heading.quantity.endswith(("wind_direction", "wind_speed"))
 
 
 def _day_of_month(layout: Layout, index: int) -> bool:

@@ -15,8 +15,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.angles import compass_unit
 from flagdata.ingest.anemometer.headings import interest, understand, words_of
-from flagdata.ingest.anemometer.instruments import SPEEDS, compass_unit, find_winds
+from flagdata.ingest.anemometer.instruments import SPEEDS, find_winds
 from flagdata.ingest.anemometer.layout import Layout, cell_kind, cut, lay_out
 from flagdata.ingest.anemometer.restated import table
 from flagdata.ingest.anemometer.sites import sites

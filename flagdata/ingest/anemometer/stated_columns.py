@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
-from flagdata.ingest.anemometer.angles import in_tens, may_be_direction, unit_of
+from flagdata.ingest.anemometer.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
 from flagdata.ingest.anemometer.headings import fits, understand
-from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind, compass_unit
+from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.recipe import COLUMNS_LIMIT
 from flagdata.ingest.anemometer.stamps import EPOCH
