@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flagdata import compass
 from flagdata.errors import UnknownNameError
 
 
@@ -32,25 +33,6 @@ class Unit:
         return (np.asarray(value, dtype=np.float64) - self.offset) / self.scale
 
 
-_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
-_SIDES = {"N": "NORTH", "E": "EAST", "S": "SOUTH", "W": "WEST"}
-POINTS: dict[str, float] = {name: number * 22.5 for number, name in enumerate(_ROSE)}
-"""Points of the compass → degrees from north; a column of them has the unit "points"."""
-POINTS |= {
-    sign.join(_SIDES[letter] for letter in point): POINTS[point] for point in _ROSE for sign in ("", " ", "-")
-}  # fmt: skip
-POINTS |= {
-    f"{_SIDES[point[0]]}{sign}{_SIDES[point[1]]}{_SIDES[point[2]]}": POINTS[point]
-    for point in _ROSE if len(point) == 3 for sign in (" ", "-")
-}  # fmt: skip
-_KANJI = {"N": "北", "E": "東", "S": "南", "W": "西"}
-# Japanese joins the letters as English does (北東, 東北東); Chinese puts east and west first (东北, 东东北).
-_FAR_EAST = {
-    "".join(_KANJI[letter] for letter in spelled): POINTS[point]
-    for point in _ROSE for spelled in {point, point[:-2] + point[-2:][::-1]}
-}  # fmt: skip
-POINTS |= _FAR_EAST | {name.replace("東", "东"): degrees for name, degrees in _FAR_EAST.items()}
-
 UNITS: dict[str, Unit] = {
     "m/s": Unit(si="m/s", scale=1.0),
     "km/h": Unit(si="m/s", scale=1 / 3.6),
@@ -62,7 +44,8 @@ UNITS: dict[str, Unit] = {
     "ft/min": Unit(si="m/s", scale=0.3048 / 60),
     "rad": Unit(si="rad", scale=1.0),
     "deg": Unit(si="rad", scale=math.pi / 180),
-    "points": Unit(si="rad", scale=math.pi / 180),
+    "sixteenths": Unit(si="rad", scale=math.pi / 8),
+    **{name: Unit(si="rad", scale=math.pi / 180) for name in compass.BY_UNIT},
     "gon": Unit(si="rad", scale=math.pi / 200),
     "10 deg": Unit(si="rad", scale=math.pi / 18),
     "K": Unit(si="K", scale=1.0),

@@ -5,9 +5,10 @@
     Wind Direction: 231
     ----------------------
 
-A reading begins with the name that follows blank lines, rules and titles, or with the first one of the file; and where
-a name comes again. What the names mean, and what is missing, is told as of any table; lines may
-stand after a computer's stamp, of which that of a reading's first line counts.
+A reading begins with the name that follows blank lines, rules and titles, or with the first one of the file; where a
+name comes again; and at a line that is a stamp and nothing else, unless such lines end the readings. What the names
+mean, and what is missing, is told as of any table; lines may stand after a computer's stamp, of which that of a
+reading's first line counts.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ _MOST = 60
 def matches(lines: Sequence[str]) -> bool:
     """Most lines are a name and its value, the names come again, and one of them is a speed of the wind."""
     filled = [line for line in lines if re.search(r"[^\W_]", line)]
-    found = [match for line in filled if (match := _LINE.fullmatch(line)) is not None]
+    found = [match for line in filled if (match := _readings(line)) is not None]
     whole = 2 <= len(found) == len(filled) and len(lines) < LOOKED_AT  # a short file of nothing else
     if not whole and (len(found) < 2 * _LEAST or len(found) < _SHARE * len(filled)):
         return False
@@ -67,7 +68,20 @@ def as_table(source: TextFile) -> TableText | None:
 
 def _words(lines: Iterable[str]) -> int:
     """Lines with words that are neither a name and its value nor a rule: what they say is not read."""
-    return sum(bool(re.search(r"[^\W_]", line)) and _LINE.fullmatch(line) is None for line in lines)
+    return sum(
+        bool(re.search(r"[^\W_]", line)) and _LINE.fullmatch(line) is None and not _stamp_alone(line) for line in lines
+    )
+
+
+def _stamp_alone(line: str) -> str:
+    """The stamp that a line is, out of brackets and rules; "" where it is none."""
+    text = line.strip(" \t[]()<>*=#-_|")
+    return text if ":" in text and len(text) < 40 and cell_kind(text) == "stamp" else ""
+
+
+def _readings(line: str) -> re.Match[str] | None:
+    """A name and its value; a stamp is none, though it has a colon in it."""
+    return None if _stamp_alone(line) else _LINE.fullmatch(line)
 
 
 def _first(lines: Sequence[str]) -> str:
@@ -76,7 +90,7 @@ def _first(lines: Sequence[str]) -> str:
     names: Counter[str] = Counter()
     apart = False
     for line in lines:
-        match = _LINE.fullmatch(line)
+        match = _readings(line)
         if match is not None:
             name = _name(match)
             names[name] += 1
@@ -97,16 +111,28 @@ def _rows(lines: Iterable[str], first: str) -> Iterator[dict[str, str]]:
         first: the name that a reading begins with.
     """
     row: dict[str, str] = {}
+    ahead: bool | None = None  # whether the lines that are stamps stand before their readings
     for line in lines:
+        alone = _stamp_alone(line)
+        if alone:
+            ahead = not row if ahead is None else ahead
+            if ahead and len(row) > 1:
+                yield row
+                row = {}
+            row[""] = alone
+            if not ahead:
+                yield row
+                row = {}
+            continue
         match = _LINE.fullmatch(line)
         if match is None:
             continue
         name = _name(match)
-        if name in row or (name == first and row):
+        if name in row or (name == first and row.keys() - {""}):
             yield row
             row = {}
         if not row and match["stamp"]:
             row[""] = match["stamp"].replace(",", ".")
         row[name] = match["value"]
-    if row:
+    if row.keys() - {""}:
         yield row

@@ -42,7 +42,11 @@ def is_elapsed(form: str) -> bool:
 
 def is_time_of_day(form: str) -> bool:
     """Whether a format has directives of the time of day alone."""
-    return "%" in form and not any(f"%{letter}" in form for letter in "Yymdjb") and ("%H" in form or "%I" in form)
+    return (
+        "%" in form
+        and not any(f"%{letter}" in form for letter in "YymdjbJ")
+        and any(f"%{letter}" in form for letter in "HIQ")
+    )
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:

@@ -43,7 +43,7 @@ class Davis:
 
     name = "davis"
     about = "Davis WeatherLink export (text of the program, CSV of weatherlink.com)"
-    uses = frozenset({"zone", "date_order"})
+    uses = frozenset({"zone", "date_order", "unit"})
 
     def recognise(self, head: Head) -> Guess | None:
         """Two heading lines with Date, Time and Wind Speed, or a heading with "Date & Time" and "… - unit"."""
@@ -75,11 +75,11 @@ class Davis:
         first = 3 if len(lines) > 2 and set(lines[2].strip()) <= {"-", "\t", " "} and lines[2].strip() else 2
         rows = [cut(line, delimiter) for line in lines[first:] if line.strip()]
         speed = next(column.number for column in columns if column.name.lower() == "wind speed")
-        spelled = _unit_of(row[speed - 1] for row in rows if len(row) >= speed)
+        spelled = options.unit or _unit_of(row[speed - 1] for row in rows if len(row) >= speed)
         if spelled is None:
             raise InputError(
                 "the export carries no units, and its speeds do not show them", where=f"{where}, line {first + 1}",
-                fix=_FIX,
+                fix=f"give the unit set in the program: --unit m/s (or km/h, mph, kn); or {_FIX}",
             )  # fmt: skip
         known = [
             Column(
@@ -93,7 +93,8 @@ class Davis:
         stamps = [" ".join(row[:2]) for row in rows if len(row) > 1]
         form, found = stamp_format(stamps, options, f"{where}, line {first + 1}")
         decimal = "," if any(re.fullmatch(r"\d+,\d", row[speed - 1]) for row in rows if len(row) >= speed) else "."
-        text = f"the export carries no units: wind is in {spelled}, since its values are whole miles per hour converted"
+        why = "as you said" if options.unit else "since its values are whole miles per hour converted"
+        text = f"the export carries no units: wind is in {spelled}, {why}"
         finding = Finding(kind="unit-from-resolution", severity=Severity.WARNING, what=text, fix=_FIX)
         export = Export(
             name=self.name,

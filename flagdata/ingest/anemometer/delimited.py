@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform
@@ -79,11 +81,16 @@ class Delimited:
                 f"the file holds {len(proposal.winds)} anemometers: {names}", where=where,
                 fix=f"name the one to read: --wind {_argument(proposal.winds[0])}; ingest takes each by itself",
             )  # fmt: skip
+        recipe = recipes.parse(proposal.toml, where=f"the draft for {where}")
         try:
-            reading = _read(source, recipes.parse(proposal.toml, where=f"the draft for {where}"), options, where)
+            turned = replace(options, azimuth=_WEST) if proposal.of_earth and options.azimuth is None else options
+            reading = _read(source, recipe, turned, where)
         except TimeError as error:
             rest = [n.fix for n in proposal.needs if n.without(options) and f"--{n.option}" not in error.fix]
-            raise type(error)(error.what, where=error.where, fix="; ".join([error.fix, *rest])) from None
+            told = next(
+                (n.fix for n in proposal.needs if f"--{n.option}" in error.fix and "(line " in n.fix), error.fix
+            )
+            raise type(error)(error.what, where=error.where, fix="; ".join([told, *rest])) from None
         found = [
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in proposal.warnings
@@ -93,6 +100,10 @@ class Delimited:
             found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, what=text))
         findings = (*reading.findings, *found)
         return replace(reading, findings=findings, drafted=proposal.toml, understood=proposal.understood)
+
+
+_WEST = 1.5 * np.pi
+"""The azimuth of components towards east (x) and north (y): wind along +x comes from the west."""
 
 
 def guess(proposal: Draft) -> Guess:

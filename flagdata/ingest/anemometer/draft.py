@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, stated_columns, unitcheck, zones
+from flagdata.ingest.anemometer import counted, stated_columns, stated_rate, unitcheck, unread, zones
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
@@ -28,11 +28,11 @@ from flagdata.ingest.anemometer.instruments import (
     named_wind,
 )
 from flagdata.ingest.anemometer.layout import Layout, lay_out
-from flagdata.ingest.anemometer.long_table import winds_by_name
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.sites import site_of_all, sites
-from flagdata.ingest.anemometer.timecolumns import TimeChoice, find_time
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.ingest.anemometer.unitcheck import FASTEST
 from flagdata.units import spelled
 from flagdata.units import unit as unit_of
@@ -43,6 +43,8 @@ _STATED = re.compile(
     r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
 )
 """How lines above a heading state a unit."""
+_BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
+"""Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
 
 
@@ -82,6 +84,7 @@ class Draft:
         winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
         site: index of the column that tells sites apart, `None` where there is one site.
         delimiter: of the cells.
+        of_earth: whether the components of the wind are towards east (x) and north (y).
     """
 
     toml: str
@@ -94,6 +97,7 @@ class Draft:
     winds: tuple[str, ...] = ()
     site: int | None = None
     delimiter: str = ","
+    of_earth: bool = False
 
 
 @lru_cache(maxsize=4)
@@ -123,22 +127,20 @@ def draft(
         return None
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
-        time, winds, remarks, warnings, named = known.time, (known.wind,), (), (), ()
+        time, winds, remarks, warnings = known.time, (known.wind,), (), ()
         of_time = time.columns if time is not None else ()
         mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
     else:
         time = find_time(layout, order=order)
         of_time = time.columns if time is not None else ()
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
-        named = () if winds else winds_by_name(layout, time=of_time, told=unit)
-        winds = winds or named
-        if wind is not None and not named and wind not in {one.label for one in winds}:
+        if wind is not None and wind not in {one.label for one in winds}:
             said, odd = named_wind(layout, wind, time=of_time, told=unit)
             winds, warnings = (*winds, *said), (*warnings, *odd)
         if time is None and not winds:
             return None
         mixed = None
-        if time is not None and not named:
+        if time is not None:
             mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
     if mixed is not None:
         winds = tuple(
@@ -148,6 +150,7 @@ def draft(
     labels = tuple(one.label for one in winds)
     chosen = next((one for one in winds if one.label == wind), None)
     doubts = list(_doubts(lines, layout, time, winds, chosen))
+    doubts += _below_zero(layout, time, winds) if columns is None and wind is None else []
     if wind is not None and chosen is None and mixed is not None and winds:
         # A site that the first rows do not hold.
         label, _, rest = wind.partition(":")
@@ -163,12 +166,17 @@ def draft(
     if time is not None and time.unnamed:
         shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
+    if columns is None and chosen is not None:
+        remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
+        remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), needs=_needs(lines, time), unsure=tuple(one.label for one in winds if not one.sure),
+        doubts=tuple(doubts), needs=_needs(lines, layout, time),
+        unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+        of_earth=chosen is not None and chosen.of_earth,
     )  # fmt: skip
 
 
@@ -176,12 +184,14 @@ def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
     return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
 
 
-def _needs(lines: Sequence[str], time: TimeChoice | None) -> tuple[Need, ...]:
+def _needs(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tuple[Need, ...]:
     """What the stamps of a time leave open: its start, its day, its zone."""
     if time is None or time.counts:
         return ()
     if time.form is not None and counted.is_elapsed(time.form):
         fix = "give the instant of the first: --start TIME"
+        above = stated_rate.advice(lines[: layout.preamble + max(1, layout.header)] if layout.header else ())
+        fix += f" ({above})" if above else ""
         return (Need(what="its rows count from a start", fix=fix, option="start"),)
     found: list[Need] = []
     if time.form is not None and counted.is_time_of_day(time.form):
@@ -203,6 +213,8 @@ def _doubts(
     if time is None:
         offered = stated_columns.offer(layout, time, winds)
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
+        above = stated_rate.advice(lines[: layout.preamble])
+        fix += f" ({above})" if above else ""
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
         offered = f"; {stated_columns.offer(layout, time, winds)}" if time.counts else ""
@@ -235,6 +247,26 @@ def _doubts(
         fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
+        found.append(Doubt(what=what, fix=fix))
+    return found
+
+
+def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[Doubt]:
+    """A doubt for each speed that is below zero too often and too far to be one: it is a component."""
+    found: list[Doubt] = []
+    for wind in winds:
+        column = wind.columns.get("wind_speed")
+        if column is None:
+            continue
+        value = numbers(layout.column(column.index), decimal=layout.decimal).value
+        known = value[np.isfinite(value) & ~np.isin(value, CODES)]
+        if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
+            continue
+        what = f"column {wind.label!r} goes below zero, to {known.min():g}: a component of the wind, not its speed"
+        line = stated_columns.offer(layout, time, ())
+        fix = (
+            f"if two columns are its components, say so with wind_x and wind_y (x to the east, y to the north): {line}"
+        )
         found.append(Doubt(what=what, fix=fix))
     return found
 

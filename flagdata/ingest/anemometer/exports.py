@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.compass import POINTS
 from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.columns import Columns
@@ -29,7 +30,7 @@ from flagdata.ingest.anemometer.table import read_table
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import NANOSECONDS
-from flagdata.units import POINTS, spelled, unit
+from flagdata.units import spelled, unit
 
 Names = Sequence[tuple[str, str]]
 """Patterns of a column's whole name, case ignored → channel; the first pattern that fits decides."""

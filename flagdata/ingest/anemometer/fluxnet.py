@@ -36,6 +36,12 @@ _NAMES = (
 _UNITS = {"WS": "m/s", "WD": "deg", "TA": "degC", "PA": "kPa", "RH": "%"}
 
 
+def _seconds(lines: Sequence[str]) -> bool:
+    """Whether the stamps of rows have seconds."""
+    stamps = (match[0] for line in lines if (match := re.match(r"\d{12}(?:\d\d)?(?=,|$)", line)) is not None)
+    return len(next(stamps, "")) != 12
+
+
 class Fluxnet:
     """Format "fluxnet"."""
 
@@ -72,7 +78,7 @@ class Fluxnet:
         export = Export(
             name=self.name,
             file=FileLayout(preamble=at, missing=("-9999", "-6999")),
-            time=TimeLayout(columns=(1,), format="%Y%m%d%H%M%S")
+            time=TimeLayout(columns=(1,), format="%Y%m%d%H%M%S" if _seconds(lines[at + 1 :]) else "%Y%m%d%H%M")
             if raw
             else TimeLayout(columns=(2,), format="%Y%m%d%H%M"),
             sensor=Sensor(name="flux tower"),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.languages import in_english
 from flagdata.schema import CHANNELS
 from flagdata.timebase import zone
@@ -31,15 +32,15 @@ _WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed"
 _SPEED = frozenset(
     {
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
-        "windgeschwindigkeit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
+        "windgeschwindigkeit", "vit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
-        "wdsp", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
+        "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
     }
 )  # fmt: skip
 _DIRECTION = frozenset(
     {
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
-        "dd", "vane", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
+        "dd", "vane", "angle", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
         "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire", "deg", "winddeg", "azimuth",
         "bearing",
     }
@@ -81,7 +82,7 @@ _PLAIN = frozenset(
         "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
     }
 )  # fmt: skip
-_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd"})
+_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd", "app", "apparente"})
 _THEORETICAL = frozenset({"tws", "twa", "theoretical"})
 _ABBREVIATED = {
     "aws": "apparent_wind_speed", "awa": "apparent_wind_direction", "awd": "apparent_wind_direction",
@@ -114,6 +115,10 @@ _INSIDE = {
     "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
 }  # fmt: skip
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
+_NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
+"""What stands in brackets behind a direction for the north it is from."""
+_TURNED = re.compile(r"\bccw\b|counter.?clock|anti.?clock|from east|mathemat|\bmath\b", re.IGNORECASE)
+"""What a heading says of an angle that is not clockwise from north."""
 _SENSORS = frozenset(
     {"csat", "csat3", "sonic", "sat", "metek", "gill", "young", "wind", "comp", "component", "hs", "wm"}
 )
@@ -135,7 +140,8 @@ class Heading:
         label: words that tell instruments apart, lower-case.
         magnetic: of a direction, whether it is from magnetic north.
         towards: of a direction, whether the wind blows to it.
-        strange: what stands in brackets where a unit does, but spells none that is known; "" where nothing does.
+        strange: what stands in brackets where a unit does, but spells none that is known, or how an angle is turned
+            that is not clockwise from north; "" where nothing does.
     """
 
     name: str
@@ -157,6 +163,8 @@ def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english(name[:120].strip().strip('"').strip())
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
+    north = _NORTH_BEHIND.search(text) if re.search(r"dir|bearing|wd", text, re.IGNORECASE) else None
+    text = text if north is None else text[: north.start()]
     rest, unit = _unit(text, stated)
     height = _height(rest)
     bare = _HEIGHT.sub(" ", rest) if height is not None else rest
@@ -183,8 +191,9 @@ def understand(name: str, stated: str = "") -> Heading:
     return Heading(
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
-        magnetic=bool(known & {"mag", "magnetic"}), towards=bool(_TOWARDS.search(text.replace("_", " "))),
-        strange=_strange(text) if unit is None else "",
+        magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
+        towards=bool(_TOWARDS.search(text.replace("_", " "))),
+        strange=turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
 
 
@@ -222,7 +231,9 @@ def zone_of(name: str) -> str | None:
     if found is None and re.search(r"utc|gmt", name, re.IGNORECASE):
         return "UTC"
     if found is None:
-        return None
+        short = re.search(r"(?<![A-Za-z])([A-Z]{3,4})\W*$", name.replace("_", " "))
+        hours = ABBREVIATED.get(short[1]) if short is not None else None
+        return None if hours is None else f"{hours:+03d}:00"
     if not found[1]:
         return "UTC"
     sign, digits = found[1][0], found[1][1:].strip().replace(":", "")
@@ -278,7 +289,7 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
     if len(text) > 1 and below is None and (whole := _known(text)) is not None:
         return text, whole
     for found in _BRACKET.finditer(text):
-        inside = _known(found[1])
+        inside = _known(re.sub(r"^\s*units?\s*[=:]\s*|[\"']", "", found[1]))
         if inside is not None:
             return text[: found.start()] + " " + text[found.end() :], inside
     # HOBO writes the serial numbers of logger and sensor in brackets: they tell no instruments of one file apart.
@@ -327,11 +338,13 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
         return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
     if si in (None, "rad", "1") or windy:
         away = known & _DIRECTION
-        if (away or re.search(r"wind?.?dir|windrichtung|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
+        if (away or re.search(r"wind?.?dir|windricht|wind_?ri\b|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
             sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane"}) or "dir" in compact
-            if known & {"deg", "azimuth", "bearing"} == away and not windy and not known & {"awa", "twa"}:
+            if away and away <= {"deg", "azimuth", "bearing", "angle"} and not windy and not known & {"awa", "twa"}:
                 return "", False, set()
             return _by_platform(known, "direction"), sure, known & (_DIRECTION | _APPARENT | _THEORETICAL)
+        if si == "rad" and windy and not known - _WIND - _MEAN - _PLAIN:
+            return _by_platform(known, "direction"), True, known & _WIND
     if si in (None, "m/s"):
         for word, channel in _ABBREVIATED.items():
             if word in known and (si == "m/s") <= channel.endswith("speed"):
@@ -370,6 +383,8 @@ def _component(words: list[str], si: str | None) -> str | None:
 
 
 def _by_platform(known: set[str], quantity: str) -> str:
+    if quantity == "direction" and "angle" in known and known & {"true", "réel", "reel", "real"}:
+        return "theoretical_wind_direction"  # an angle of the true wind is from the bow
     if known & _APPARENT:
         return f"apparent_wind_{quantity}"
     if known & _THEORETICAL:

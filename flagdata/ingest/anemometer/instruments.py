@@ -8,11 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata import compass
 from flagdata.ingest.anemometer import unitcheck
+from flagdata.ingest.anemometer.angles import compass_unit, degrees, is_vane, may_be_points
+from flagdata.ingest.anemometer.axes import along_axes
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
-from flagdata.units import POINTS, spelled, unit
+from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -22,18 +25,9 @@ _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0)
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
 _POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
-_FROM_NORTH = frozenset({"twd", "gwd"})
-"""Directions that instruments of boats compute, from whichever north their compass is set to."""
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
-_CALM = frozenset(
-    {
-        "calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr",
-        "静穏", "静风", "靜風", "無風",
-    }
-)  # fmt: skip
-"""What stands in a column of compass points where there is no direction."""
 _UNREADABLE = 0.1
 
 
@@ -64,6 +58,7 @@ class Wind:
         columns: by channel.
         sure: whether the heading names the wind; false where only the unit or a lone "speed" speaks for it.
         site: column and text of the rows that are its own, where a table mixes sites.
+        of_earth: whether its components are said to be towards east (x) and north (y).
     """
 
     label: str
@@ -71,6 +66,7 @@ class Wind:
     columns: Mapping[str, Column]
     sure: bool
     site: tuple[int, str] | None = None
+    of_earth: bool = False
 
     def without_unit(self) -> tuple[str, ...]:
         """Channels of the wind's speed whose unit nothing tells."""
@@ -86,6 +82,7 @@ class _Found:
     values: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    of_earth: bool = False
 
     def of(self, *channels: str) -> list[int]:
         return [index for index in self.values if self.headings[index].channel in channels]
@@ -119,38 +116,42 @@ def find_winds(
 def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
     """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
     headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
-    found = _Found(layout=layout, headings=headings)
+    headings, of_earth = along_axes(layout, headings)
+    found = _Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         parsed = numbers(layout.column(index), decimal=layout.decimal)
-        if heading.quantity.endswith("direction") and (degrees := compass_points(layout.column(index))) is not None:
-            found.values[index] = degrees
-            found.headings[index] = replace(heading, unit="points")
+        points = compass_unit(layout, index) if may_be_points(heading) else None
+        if points is not None:
+            found.values[index] = degrees(layout, index, points)
+            quantity = heading.quantity.replace("speed", "direction")
+            found.headings[index] = replace(
+                heading, unit=points, quantity=quantity, channel="" if heading.spread else quantity
+            )
         elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
+            filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
+            if heading.quantity.endswith("direction") and compass.may_be_two(filled, share=1 - _UNREADABLE):
+                fix = (
+                    f"say which: --columns, {heading.name}=wind_direction[points-de] (O is east) or [points-es] (west)"
+                )
+                found.remarks.append(
+                    f"column {heading.name!r} holds points whose O may be east or west: left out; {fix}"
+                )
+                continue
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
+            if is_vane(heading, parsed.value):
+                found.headings[index] = replace(heading, channel="wind_direction", quantity="wind_direction")
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     return found
 
 
-def compass_points(cells: Sequence[str]) -> NDArray[np.float64] | None:
-    """Directions [deg] of a column of points of the compass; `None` where it holds something else."""
-    filled = [cell for cell in cells if cell_kind(cell) != "missing" and cell.lower() not in _CALM]
-    if not filled or sum(cell.upper() in POINTS for cell in filled) < (1 - _UNREADABLE) * len(filled):
-        return None
-    return np.array([POINTS.get(cell.upper(), np.nan) for cell in cells])
-
-
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
     """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
     words = [set(words_of(name)) for name in found.layout.names]
-    for name, said in zip(found.layout.names, words, strict=True):
-        if said & _FROM_NORTH:
-            fix = f"say which by --columns, {name}=wind_direction[deg] or {name}=wind_direction_magnetic[deg]"
-            found.remarks.append(f"column {name!r} may be from true or magnetic north: left out; {fix}")
     windy = any("wind" in word for name in words for word in name) or any(found.of("wind_direction", *COMPONENTS))
     for wind in winds:
         speed = wind.columns.get("wind_speed")
@@ -249,7 +250,12 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
         kept = {channel: _distinct(found, indices) for channel, indices in by_channel.items()}
         for at in range(max(map(len, kept.values()))):
             speeds = {channel: indices[at] for channel, indices in kept.items() if at < len(indices)}
-            columns = {channel: _column(found, index, channel, told) for channel, index in speeds.items()}
+            # The user's unit is that of the speeds without one, where others of the table state theirs.
+            open_ones = [index for index in speeds.values() if not fits("wind_speed", found.headings[index].unit)]
+            columns = {
+                channel: _column(found, index, channel, told if not open_ones or index in open_ones else None)
+                for channel, index in speeds.items()
+            }
             first = next(iter(speeds.values()))
             for channel, index in speeds.items():
                 towards = _direction(found, index, _DIRECTION_OF[channel])
@@ -334,7 +340,14 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
             names = ", ".join(repr(found.name(at)) for at in own)
             fix = "to read it and the speed of its own column, say what the columns are (--columns)"
             found.remarks.append(f"the direction {names} is left out beside the components; {fix}")
-        winds.append(Wind(label=found.name(first), height=found.headings[first].height, columns=columns, sure=True))
+        if found.of_earth:
+            found.warnings.append(
+                "the headings name components of north and east: taken as towards which the wind blows"
+            )
+        winds.append(Wind(
+            label=found.name(first), height=found.headings[first].height, columns=columns,
+            sure=found.headings[first].sure, of_earth=found.of_earth,
+        ))  # fmt: skip
     return winds
 
 
@@ -351,9 +364,14 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             found.headings[i].label != found.headings[speed].label,
         )
     )
-    lone = candidates if len(candidates) == 1 else []
+    own = found.key(candidates[0]) if len(candidates) == 1 else ()
+    of_another = bool(own[:-1]) and own != found.key(speed) and any(found.key(i) == own for i in found.of(*SPEEDS))
+    lone = candidates if len(candidates) == 1 and not of_another else []
+    alike = [index for index in found.of(found.headings[speed].channel) if found.key(index) == found.key(speed)]
+    if len(exact) == len(alike) > 1:
+        exact = [exact[alike.index(speed)]]  # blocks of columns with the same headings, one an instrument
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
-    exact.sort(key=lambda i: (found.headings[i].unit == "points", found.headings[i].unit is None))
+    exact.sort(key=lambda i: (_points(found.headings[i]), found.headings[i].unit is None))
     chosen = exact or near[:1] or lone or plain
     if not chosen:
         if candidates:
@@ -361,8 +379,8 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
             found.remarks.append(f"none of the directions {names} is surely that of {found.name(speed)!r}: left out")
         return None
     index = next((i for i in chosen if not found.headings[i].magnetic), chosen[0])
-    angles = [i for i in candidates if found.headings[i].unit != "points" and not found.headings[i].magnetic]
-    if found.headings[index].unit == "points" and len(angles) == 1:
+    angles = [i for i in candidates if not _points(found.headings[i]) and not found.headings[i].magnetic]
+    if _points(found.headings[index]) and len(angles) == 1:
         index = angles[0]  # the same in degrees
     heading, value = found.headings[index], found.values[index]
     known = value[np.isfinite(value)]
@@ -370,13 +388,13 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         return None
     if heading.strange:
         found.remarks.append(
-            f"column {heading.name!r} is in {heading.strange!r}, which is no unit that is known: left out"
+            f"column {heading.name!r} is in {heading.strange!r}, which is no direction clockwise from north: left out"
         )
         return None
     if heading.unit == "gon":
         return channel, Column(index=index, unit="gon", told="in gon by its heading", towards=heading.towards)
-    coded = np.isin(known, NO_ANGLE)
-    known = known[~coded] if float(coded.mean() if len(known) else 0.0) < 0.5 else known
+    coded = np.isin(known, NO_ANGLE) | (known <= -999)  # no log writes an angle so
+    known = known[~coded] if not bool(coded.all()) else known
     if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
         found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
         return None
@@ -387,23 +405,31 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         and len(np.unique(known)) > 3
     ):
         found.remarks.append(
-            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out"
+            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out; if they "
+            f"are the sixteen from north on, counted from 0: --columns, {heading.name}=wind_direction[sixteenths]"
         )
         return None
     if heading.unit is None and float(known.max()) <= 36 and bool(np.all(known % 1 == 0)) and len(np.unique(known)) > 3:
         found.remarks.append(f"column {heading.name!r} may be in degrees or in tens of degrees: left out")
         return None
     if heading.unit is None and float(np.abs(known).max()) <= 6.3:
-        found.remarks.append(f"column {heading.name!r} may be in degrees or radians: left out")
+        fix = f"{heading.name}={channel}[rad] or {heading.name}={channel}[deg]"
+        found.remarks.append(
+            f"column {heading.name!r} may be in degrees or radians: left out; say which by --columns, {fix}"
+        )
         return None
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"
-    if heading.unit == "points":
+    if _points(heading):
         told = "as points of the compass, 22.5° apart"
-        return channel, Column(index=index, unit="points", told=told, towards=heading.towards)
+        return channel, Column(index=index, unit=heading.unit, told=told, towards=heading.towards)
     told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
     told = f"{told}, to which the wind blows" if heading.towards else told
     return channel, Column(index=index, unit=heading.unit or "deg", told=told, towards=heading.towards)
+
+
+def _points(heading: Heading) -> bool:
+    return heading.unit in compass.BY_UNIT
 
 
 def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
@@ -427,7 +453,9 @@ def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
         elif len(known) > 1 and not many:
             names = ", ".join(repr(found.layout.names[i]) for i, _ in known)
             found.remarks.append(f"which of {names} is {channel} is not told: left out")
-    return Wind(label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site)
+    return Wind(
+        label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site, of_earth=wind.of_earth
+    )
 
 
 def _weather(found: _Found, index: int, channel: str) -> Column | None:

@@ -66,7 +66,7 @@ def matches(lines: Sequence[str]) -> bool:
     if not filled:
         return False
     if filled[0].lstrip("\ufeff \t").startswith("["):
-        return bool(re.match(r"\s*\[\s*\{\s*\"", "".join(filled).lstrip("\ufeff")))
+        return bool(re.match(r"\s*\[\s*(?:\{\s*\"|\[.*,\s*\[)", "".join(filled).lstrip("\ufeff")))
     if filled[0].strip("\ufeff \t\r") == "{":
         return bool(re.match(r"\s*\"[^\"]*\"\s*:", "".join(filled[1:])))
     objects = [match for line in filled if (match := _LINE.fullmatch(line)) is not None and _object(match["object"])]
@@ -181,8 +181,8 @@ def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
 def _rows(source: TextFile, whole: Any) -> Iterator[dict[str, str] | None]:
     """Each object's cells by name; `None` for a line that is none."""
     if whole is not None:
-        for item in whole if isinstance(whole, list) else [whole]:
-            yield _flat(item) if isinstance(item, dict) else None
+        for item in _items(whole):
+            yield _flat(item) if isinstance(item, dict) else _listed(item) if isinstance(item, list) else None
         return
     for _, lines in source.blocks():
         for line in lines:
@@ -194,6 +194,24 @@ def _rows(source: TextFile, whole: Any) -> Iterator[dict[str, str] | None]:
                 yield None
                 continue
             yield {**_before(match["before"] or ""), **_flat(found)}
+
+
+def _items(whole: Any) -> list[Any]:
+    """The rows of a whole file: a list, the one list of objects or of rows that an object holds, or the object."""
+    if isinstance(whole, list):
+        return whole
+    lists = [
+        member for member in whole.values()
+        if isinstance(member, list) and len(member) > 1 and {type(item) for item in member} in ({dict}, {list})
+    ]  # fmt: skip
+    return lists[0] if len(lists) == 1 else [whole]
+
+
+def _listed(row: list[Any]) -> dict[str, str] | None:
+    """Cells of a row without names, by their numbers; `None` where they are no plain values."""
+    if any(isinstance(item, dict | list) for item in row):
+        return None
+    return {f"item {number}": _text(item) for number, item in enumerate(row, start=1)}
 
 
 def _before(text: str) -> dict[str, str]:

@@ -11,16 +11,18 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.layout import lay_out
+from flagdata.ingest.anemometer.name_value import Record, wide
 from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.units import spelled
 
 _STAMP = re.compile(
+    r"(?:\s*[A-Za-z][\w.-]{0,20}:\s+(?=\d{4}-\d\d-))?"
     r"[\s\[(\"]*(?P<stamp>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
     r"(?:\s?[AaPp]\.?[Mm]\b\.?|\s?Z|[+-]\d{2}:?\d{2})?"
     r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp]\.?[Mm]\b\.?)?"
@@ -72,6 +74,11 @@ def as_table(source: TextFile) -> TableText | None:
     if layout is not None and find_time(layout) is not None:
         return None  # a table
 
+    if _usual(lines) is None and len(_kinds(lines)) > 1:
+        left = [0]
+        told = "lines that each name what they tell"
+        return wide(source, ["time"], _told(source, left), what=told, left_out=left)
+
     def row(line: str) -> list[str] | None:
         cut = _cut(line)
         return [cut[1], *cut[2]] if cut is not None and cut[0] == words else None
@@ -81,6 +88,31 @@ def as_table(source: TextFile) -> TableText | None:
         source, ["time", *names], found, kind="labelled-lines", what="lines that name each number",
         left_out=other,
     )  # fmt: skip
+
+
+def _kinds(lines: Sequence[str]) -> set[tuple[str, ...]]:
+    """The words of the stamped lines that name the wind's speed or direction."""
+    cuts = {cut[0] for line in lines if (cut := _cut(line)) is not None and cut[1]}
+    return {words for words in cuts if any("wind" in understand(name).channel for name in _names(words))}
+
+
+def _told(source: TextFile, left: list[int]) -> Iterator[Record]:
+    """What each stamped line tells of the wind and the weather; `left` counts those that tell nothing of it."""
+    known: dict[tuple[str, ...], list[str | None]] = {}
+    for _, lines in source.blocks():
+        for line in lines:
+            cut = _cut(line)
+            if cut is None or not cut[1]:
+                left[0] += bool(line.strip())
+                continue
+            if cut[0] not in known:
+                names = _names(cut[0])
+                known[cut[0]] = [name if understand(name).sure and understand(name).channel else None for name in names]
+            if not any(known[cut[0]]):
+                left[0] += 1
+            for name, value in zip(known[cut[0]], cut[2], strict=True):
+                if name is not None:
+                    yield Record(stamp=(cut[1],), name=name, value=value)
 
 
 def _heading(lines: Sequence[str]) -> tuple[tuple[str, ...], list[str]] | None:
@@ -106,8 +138,8 @@ def _usual(lines: Sequence[str]) -> tuple[str, ...] | None:
     return words if count and count >= _SHARE * len(filled) else None
 
 
-def _named(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[str]] | None:
-    """The words of a line, and the names of its columns with units; `None` where they name no wind."""
+def _names(words: tuple[str, ...]) -> list[str]:
+    """The names of the numbers between the words of a line, each with its unit."""
     names: list[str] = []
     label, unit = words[0], None
     for text in words[1:]:
@@ -115,6 +147,12 @@ def _named(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[str]] | None:
         bare = " ".join(word for word in re.findall(r"[^\W_]+(?:[-/][^\W_]+)*", label) if not _SERIAL.search(word))
         names.append(f"{bare} [{unit}]" if unit else bare)
         label = following
+    return names
+
+
+def _named(words: tuple[str, ...]) -> tuple[tuple[str, ...], list[str]] | None:
+    """The words of a line, and the names of its columns with units; `None` where they name no wind."""
+    names = _names(words)
     if not any(_WORDS.search(name) for name in names):
         return None
     headings = [understand(name) for name in names]

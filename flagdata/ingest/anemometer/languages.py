@@ -7,26 +7,50 @@ from __future__ import annotations
 
 import re
 
-_GUST = r"最大|极大|瞬[間时]|阵风|陣風|突風|최대|순간|돌풍|порыв|макс|\bporyw|\bmaks|\bnáraz"
-_SPEED = (
-    r"风速|風速|풍속|скорость\s*ветра|prędkość\s*wiatru|rychlost\s*větru|r[üu]zgar[\s_]*h[ıi]z[ıi]|kecepatan\s*angin"
+_GUST = (
+    r"最大|极大|瞬[間时]|阵风|陣風|突風|최대|순간|돌풍|порыв|пориви?|макс|\bporyw|\bmaks|\bnáraz|puuska|puhang|vindby|"
+    r"vindkast|széllökés|rafal[ăa]|ριπή|משב|sunek|udar"
 )
-_DIRECTION = r"风向|風向|풍향|направление\s*ветра|kierunek\s*wiatru|směr\s*větru|r[üu]zgar[\s_]*y[öo]n[üu]|arah\s*angin"
-_TIME = r"时间|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|godzina|čas|zaman|waktu|tanggal)\b"
+_SPEED = (
+    r"风速|風速|풍속|скорость\s*ветра|швидкість\s*вітру|скорост\s*на\s*вятъра|prędkość\s*wiatru|rychlost\s*větru|"
+    r"rýchlosť\s*vetra|r[üu]zgar[\s_]*h[ıi]z[ıi]|kecepatan\s*angin|tuulen\s*(?:keski)?nopeus|tuule\s*kiirus|"
+    r"vindhastighe[dt]|vindstyrka|middelvind|medelvind|szélsebesség|vitez[aă]\s*v[aâ]ntului|hitrost\s*vetra|"
+    r"brzina\s*vjetra|ταχύτητα\s*(?:του\s*)?ανέμου|מהירות\s*ה?רוח|سرعة\s*الرياح|tốc\s*độ\s*gió|vēja\s*ātrums|"
+    r"vėjo\s*greitis|velocita\s*vento|velocidad\s*viento"
+)
+_DIRECTION = (
+    r"风向|風向|풍향|направление\s*ветра|напрям(?:ок)?\s*вітру|посока\s*на\s*вятъра|kierunek\s*wiatru|směr\s*větru|"
+    r"smer\s*vetra|r[üu]zgar[\s_]*y[öo]n[üu]|arah\s*angin|tuulen\s*suun\w*|tuule\s*suund|vindretning|vindriktning|"
+    r"szélirány|direc[tț]i[ae]\s*v[aâ]ntului|smjer\s*vjetra|(?:διεύθυνση|κατεύθυνση)\s*(?:του\s*)?ανέμου|"
+    r"כיוון\s*ה?רוח|اتجاه\s*الرياح|hướng\s*gió|vēja\s*virziens|vėjo\s*kryptis"
+)
+_TIME = (
+    r"时间|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|годин[аи]|godzina|čas|zaman|waktu|tanggal|aika|kellonaika|"
+    r"tidspunkt|időpont|ώρα|שעה|الوقت|thời gian|laikas|laiks)\b"
+)
 _WORDS = tuple(
     (re.compile(pattern, re.IGNORECASE), word)
     for pattern, word in (
-        (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"), (r"\bдата\b", "date"),
+        (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
+        (r"\b(?:дата|päivämäärä|dátum|ημερομηνία|תאריך|التاريخ|ngày)\b", "date"),
         (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"), (r"^\s*[日일]\s*$", "day"),
         (r"^\s*[時时시]\s*$", "hour"), (r"^\s*[分분]\s*$", "minute"), (r"^\s*[秒초]\s*$", "second"),
+        (r"м/с|מטר\s*לשנ\w*", "m/s"), (r"μοίρες|מעלות|asteet", "deg"),
         (r"м/с", "m/s"), (r"км/ч", "km/h"), (r"\bград(?:усы)?\b\.?", "deg"), (r"℃", "°C"),
     )
 )  # fmt: skip
 
 
+_ASCII = re.compile(
+    r"angin|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|vjetra|vetra|vantului|viento|vento",
+    re.IGNORECASE,
+)
+"""What there is of these words in letters of ASCII."""
+
+
 def in_english(name: str) -> str:
     """A heading with the words of other languages that are known replaced; one of ASCII letters as it is."""
-    if name.isascii() and not re.search(r"angin|ruzgar|godzina|zaman|waktu|tanggal|maks", name, re.IGNORECASE):
+    if name.isascii() and not _ASCII.search(name):
         return name
     for pattern, word in _WORDS:
         name = pattern.sub(f" {word} ", name)

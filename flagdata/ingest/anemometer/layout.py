@@ -19,7 +19,8 @@ _CANDIDATES = (";", "\t", ",", "|", " ")
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 _STAMP = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,]+\d{1,2}(:\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
-    r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?)?"
+    r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?|(?<=\d) [A-Z]{3,4})?"
+    r"|(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}(?::\d{2})?"
 )
 _DAY_OF_WEEK = r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]{0,6}\.?,?\s+"
 _MONTH_NAME = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]{0,6}\.?,?"
@@ -106,7 +107,14 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     if width < 2 or not typed:
         return None
     fits = [_is_row(cells, width, typed) for _, cells in table]
-    first = next((at for at in range(len(table)) if fits[at] and _mostly(fits[at : at + 20])), None)
+    first = next(
+        (
+            at for at in range(len(table))
+            if fits[at] and _mostly(fits[at : at + 20])
+            and not _names_follow(table[at + 1 : at + 3], fits[at + 1 : at + 3], interest)
+        ),
+        None,
+    )  # fmt: skip
     if first is None:
         return None
     start = table[first][0]
@@ -131,6 +139,15 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         header=0 if at is None else start - at, names=names, units=units, by_name=by_name, rows=rows,
         lines=tuple(number + 1 for number, _ in kept), suffixes=suffixes, unit_columns=beside, strange=strange,
         short=short,
+    )  # fmt: skip
+
+
+def _names_follow(rows: Sequence[tuple[int, list[str]]], fits: Sequence[bool], interest: Callable[[str], int]) -> bool:
+    """Whether a line of names comes behind a line of numbers, which then numbers the columns."""
+    return any(
+        not fit and sum(interest(cell) > 0 for cell in cells) > 1
+        and sum(cell_kind(cell) in ("number", "stamp") for cell in cells) == 0
+        for (_, cells), fit in zip(rows, fits, strict=True)
     )  # fmt: skip
 
 
@@ -299,6 +316,9 @@ def _decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
     return any(re.match(r"[-+]?\d+,\d+(?![\d,])", cell) and cell_kind(cell) == "number" for cell in cells)
 
 
+_SAYS_UNITS = re.compile(r"\W*(?:units?|einheiten|unidades|unit[eé]s)\s*[:=]", re.IGNORECASE)
+
+
 def _heading(
     lines: Sequence[str], start: int, delimiter: str, widths: tuple[int, int], interest: Callable[[str], int]
 ) -> tuple[tuple[str, ...], tuple[str, ...], int | None, bool, tuple[str, ...]]:
@@ -334,7 +354,9 @@ def _heading(
         return nothing, units, at, False, tuple(strange)
     if not worded:
         return nothing, nothing, None, False, tuple(strange)
-    _, at, names, plain = max(worded, key=lambda item: (item[0], item[3], -item[1]))
+    # A line that says what units there are ("Units: wind (m/s), dir (deg)") is none of names, however well it fits.
+    named = [item for item in worded if not _SAYS_UNITS.match(lines[item[1]])] or worded
+    _, at, names, plain = max(named, key=lambda item: (item[0], item[3], -item[1]))
     units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), list(nothing))
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
     by_name = plain and len(lines[at]) > 0
@@ -351,7 +373,7 @@ def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] 
     bare = _MARK.sub("", line.strip())
     ways = [cut(bare, delimiter), re.split(r"\t+|\s{2,}", bare), *(cut(bare, other) for other in (",", ";", "\t", " "))]
     # A heading that is divided as the rows are is not divided by anything else, such as the blanks in its names.
-    alike = delimiter != " " and len(cut(bare, delimiter)) > 2
+    alike = delimiter != " " and len(cut(bare, delimiter)) > (2 if delimiter == "," else 1)
     for way in ways[:1] if alike else ways:
         cells = _trimmed(way, width)
         if len(cells) == width:

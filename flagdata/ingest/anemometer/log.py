@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import platform, possible, quality, untimed, zero, zones
+from flagdata.ingest.anemometer import platform, possible, quality, spelled_stamps, untimed, zero, zones
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
@@ -50,6 +50,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
             what = "the lines of an instrument stand after times of day without a date"
             raise TimeError(what, where=str(path), fix="give the day of the first: --date 2026-05-01, and its --zone")
         source, options = untimed.dated(source, options.date), replace(options, date=None)
+    elif recipe is None and options.columns is None and spelled_stamps.spelled(source.head()):
+        source, options = spelled_stamps.restamped(source, options.date_order), replace(options, date_order=None)
     source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()

@@ -74,18 +74,29 @@ class TimeLine:
         self.clock.setdefault("TAG", []).append(instant)
 
     def place(
-        self, lines: NDArray[np.int64], *, date: dt.date | None, where: str, choice: ClockChoice | None = None
+        self,
+        lines: NDArray[np.int64],
+        *,
+        date: dt.date | None,
+        where: str,
+        choice: ClockChoice | None = None,
+        once: bool = False,
     ) -> Placed:
         """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
 
         Args:
             date: day (UTC) of the first mark, for a stream that states none.
             choice: whose marks are right where the stream's clock was set back and stays so; `None` where nobody said.
+            once: whether the lines are one reading, which may have one instant.
 
         Raises:
             TimeError: fewer than two marks, or no date.
             UsageError: a date given that the stream contradicts, or does not need.
         """
+        instants = set(self.clock.get("TAG", ()))
+        if once and len(instants) == 1:
+            time = np.full(len(lines), instants.pop(), dtype=np.int64)
+            return Placed(time=time, spacing=1.0, marks=1, kind="TAG", findings=())
         kind = self._kind(where)
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
@@ -123,7 +134,8 @@ class TimeLine:
             raise TimeError(
                 "the stream's clock stands still",
                 where=f"{where}, line {at[0]}",
-                fix="check that the receiver has a fix",
+                fix="check that the receiver has a fix; if the wind came at a steady rate that is known, leave out "
+                "what tells the time and give --start TIME --rate HZ",
             )
         spacing = float(np.median(np.diff(marks))) / NANOSECONDS
         return Placed(

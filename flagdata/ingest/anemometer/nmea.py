@@ -122,7 +122,8 @@ class Nmea:
                 raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
             raise InputError(what, where=where, fix=fix)
         line = np.array(stream.line, dtype=np.int64)
-        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock)
+        once = len({frozenset(row) for row in stream.values}) == len(stream.values)
+        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, once=once)
         channels = {
             name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
         }

@@ -20,9 +20,16 @@ KINDS = (
     "flagdata.ingest.anemometer.expedition",
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.global_hourly",
+    "flagdata.ingest.anemometer.broken_headings",
+    "flagdata.ingest.anemometer.line_breaks",
+    "flagdata.ingest.anemometer.quoted_commas",
+    "flagdata.ingest.anemometer.wrapped",
+    "flagdata.ingest.anemometer.two_in_a_cell",
+    "flagdata.ingest.anemometer.name_value",
     "flagdata.ingest.anemometer.labelled",
     "flagdata.ingest.anemometer.blocks",
     "flagdata.ingest.anemometer.bracketed",
+    "flagdata.ingest.anemometer.before_cells",
 )
 LOOKED_AT = 60
 """Lines by which a kind is told."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from flagdata.ingest.anemometer.headings import understand, words_of
-from flagdata.ingest.anemometer.layout import Layout
+from flagdata.ingest.anemometer.layout import Layout, cell_kind
 
 _SITES = frozenset(
     {
@@ -13,6 +13,8 @@ _SITES = frozenset(
         "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
     }
 )  # fmt: skip
+_STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})
+"""Words of a heading whose cells, where they are words, are places, though each has one row."""
 _NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
 """Words beside which a heading is still that of a site."""
 
@@ -31,6 +33,8 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
         kinds = sorted({cell for cell in cells if cell})
         if not 2 <= len(kinds) <= 50:
             continue
+        if words & _STATIONS and words <= _STATIONS | _NUMBERED and all(cell_kind(kind) == "text" for kind in kinds):
+            return index, tuple(kinds)
         if words <= _SITES | _NUMBERED and len(cells) >= 3 * len(kinds):
             return index, tuple(kinds)
         apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.ingest.anemometer import excel
+from flagdata.ingest.anemometer import excel, spelled_stamps, untimed
 from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.layout import cell_kind
@@ -14,7 +15,6 @@ from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
-from flagdata.ingest.anemometer.untimed import ADVICE
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
@@ -44,7 +44,12 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         reason = f"the name ends in {path.suffix}"
         return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
     try:
-        source = restate(open_text(path, limits=Limits()))
+        opened = open_text(path, limits=Limits())
+        if untimed.clocked(opened):
+            return recognise(untimed.dated(opened, dt.date(2000, 1, 1)))
+        if spelled_stamps.spelled(opened.head()):
+            return recognise(spelled_stamps.provisional(opened))
+        source = restate(opened)
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
     if source.head(1) == ["FORMAT-1"]:
@@ -68,7 +73,7 @@ def unknown(source: TextFile) -> Guess:
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
         what, offered, recipe = table
-        fix = f"{offered}; {ADVICE}"
+        fix = f"{offered}; {untimed.ADVICE}"
         reason = f"{what}; which of them are the time and the wind, nothing tells"
         return Guess(format="unknown", score=0.0, reasons=(reason,), kind="other", fix=fix, draft=recipe)
     filled = [line for line in source.head(HEAD_LINES) if line.strip()]

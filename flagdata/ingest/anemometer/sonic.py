@@ -38,7 +38,7 @@ def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> R
     fix = None
     if azimuth is None:
         text += "; no direction, since the sensor's azimuth is not known"
-        fix = "give the sensor's azimuth for a direction: --azimuth DEG"
+        fix = "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to the north)"
     else:
         added["wind_direction"] = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
         text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"

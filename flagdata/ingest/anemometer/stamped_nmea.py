@@ -66,8 +66,9 @@ class StampedNmea:
         )
         at = dict(zip(lines.tolist(), time.tolist(), strict=True))
         tagged = _Tagged(
-            path=source.path, encoding=source.encoding, lines=source.lines, findings=source.findings, instants=at
-        )
+            path=source.path, encoding=source.encoding, lines=source.lines, findings=source.findings, instants=at,
+            source=source,
+        )  # fmt: skip
         reading = Nmea().read(tagged, options)
         keep = np.array([number in at for number in reading.line.tolist()], dtype=bool)
         reading = reading.take(keep)
@@ -91,13 +92,15 @@ class _Tagged(TextFile):
 
     Attributes:
         instants: line → its stamp [UTC ns].
+        source: whose lines they are, which may be other than the file's.
     """
 
     instants: Mapping[int, int]
+    source: TextFile
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
         """See `TextFile.blocks`."""
-        for first, lines in super().blocks(size):
+        for first, lines in self.source.blocks(size):
             yield first, [self._tagged(number, text) for number, text in enumerate(lines, start=first)]
 
     def _tagged(self, number: int, text: str) -> str:

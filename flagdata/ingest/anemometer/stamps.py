@@ -1,9 +1,11 @@
 """From stamps as text to nanoseconds, in bulk: ISO 8601, Unix time and strptime directives.
 
-Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which here stands for an optional fraction with its mark ("" or
+Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02"), %p for "AM", "p.m." or a bare "a" or "p", %a for a day of
-the week, which is not read. A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
+for "AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read. %Q is the hour with its fraction,
+%J the day of the year with its own (1.5 is noon of 1 January). 24:00 is the midnight that ends a day (ISO 8601:2004,
+4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -22,15 +24,18 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
+from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.timebase import NANOSECONDS
 
 DAY = 86_400 * NANOSECONDS
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
+    "Q": r"(?P<Q>\d{1,2}(?:\.\d{1,9})?)", "J": r"(?P<J>\d{1,3}(?:\.\d{1,9})?)",
     "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
     "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
-    "z": r"\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?",
+    "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]\d{{2}}(?::?\d{{2}})?)?",
+    "Z": r"\s*(?:[A-Z]{3,4})?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _CLOCK_RUN = re.compile(r"%H%M(?:%S)?")
@@ -39,9 +44,12 @@ _CLOCK_RUNS = {
     "%H%M%S": r"(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})",
 }
 """Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
+_NUMERIC = re.compile(r"%[YymdjHIMS]")
+"""Directives of numbers; those with nothing between them have all their digits."""
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
-    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?\s*(?P<z>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?$"
+    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?"
+    rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]\d{{2}}(?::?\d{{2}})?)?$"
 )
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""
@@ -104,7 +112,9 @@ def pattern(form: str) -> str:
                 position = run.end()
                 continue
             used.append(directive)
-            out.append(_GROUPS[directive])
+            beside = _NUMERIC.match(form, position + 2) or (position > 1 and _NUMERIC.match(form, position - 2))
+            fixed = bool(beside) and directive in "mdHMSI"
+            out.append(f"(?P<{directive}>\\d{{2}})" if fixed else _GROUPS[directive])
             position += 2
             continue
         out.append(r"[T\s]+" if letter == " " else re.escape(letter))
@@ -113,16 +123,16 @@ def pattern(form: str) -> str:
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
     dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
     dated = dated or {"y", "b", "d"} <= set(used)
-    if not (dated or {"Y", "j"} <= set(used)):
+    if not (dated or {"Y", "j"} <= set(used) or {"Y", "J"} <= set(used)):
         raise UsageError("no whole date in it", where=f"time format {form!r}", fix="name year, month and day")
-    if not {"H", "I"} & set(used) and {"M", "S", "f", "p"} & set(used):
+    if not {"H", "I", "Q"} & set(used) and {"M", "S", "f", "p"} & set(used):
         raise UsageError("no hour in it", where=f"time format {form!r}", fix="name the hour, or the date alone")
     return "^" + "".join(out) + "$"
 
 
 def is_date_alone(form: str) -> bool:
     """Whether a format has directives of a date, but none of the time of day."""
-    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSf")
+    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSfQJ")
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
@@ -146,17 +156,47 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     minute, second = part("M"), part("S")
     zero = np.zeros(len(text), dtype=np.int64)
     minute, second = zero if minute is None else minute, zero if second is None else second
-    valid &= (hour < 24) & (minute < 60) & (second < 60)
+    valid &= ((hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))) & (minute < 60) & (second < 60)
     year = zero if year is None else year
     distant = written & ((year < YEARS[0]) | (year > YEARS[1]))
     days, ok = _days(found, part, year)
     valid &= ok
     fraction, digits = _fraction(found)
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
+    decimal_step = 0
+    for name, length, first, last in (("Q", 3600 * NANOSECONDS, 0.0, 24.0), ("J", DAY, 1.0, 366.0)):
+        decimal = _decimal(found, name, length)
+        if decimal is None:
+            continue
+        count, rounded, decimal_step = decimal
+        ns = ns + rounded - round(first) * length
+        valid &= (count >= first) & (count <= last + (name == "J"))
     offset, utc = _offset(found, len(text))
     step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else 60 * NANOSECONDS
     step = 10 ** (9 - digits) if digits else step
+    step = decimal_step or step
     return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
+
+
+def _decimal(
+    found: pa.StructArray, name: str, length: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], int] | None:
+    """Hours or days with their fraction, in nanoseconds, and the resolution of the last digit; `None` where absent.
+
+    What is within half a digit of a whole minute or second is that: 10.1667 h is 10:10.
+    """
+    column = _field(found, name)
+    if column is None:
+        return None
+    text = pc.coalesce(column, "0")
+    count = pc.cast(text, pa.float64()).to_numpy(zero_copy_only=False)
+    digits = int(pc.max(pc.binary_length(pc.replace_substring_regex(text, r"^[^.]*\.?", ""))).as_py() or 0)
+    step = max(1_000, round(length / 10**digits))
+    ns = np.round(count * length).astype(np.int64)
+    for whole in (NANOSECONDS, 60 * NANOSECONDS):
+        near = np.round(ns / whole).astype(np.int64) * whole
+        ns = np.where(2 * np.abs(ns - near) <= step, near, ns)
+    return count, ns, step
 
 
 def _plain(text: pa.StringArray) -> Stamps | None:
@@ -232,6 +272,8 @@ def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[
 def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Days since 1970 and whether the date exists (Hinnant, "chrono-compatible low-level date algorithms")."""
     of_year = part("j")
+    if _field(found, "J") is not None:
+        of_year = np.ones_like(year)  # the days are counted with their fraction
     if of_year is not None:
         first = _civil(year, np.ones_like(year), np.ones_like(year))
         leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
@@ -282,8 +324,11 @@ def _offset(found: pa.StructArray, n: int) -> tuple[NDArray[np.int64], NDArray[n
     for value in pc.unique(text).to_pylist():
         if value in ("", "Z", "UTC", "GMT"):
             continue
+        rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
+        if value in ABBREVIATED:
+            offset[rows] = ABBREVIATED[value] * 3600 * NANOSECONDS
+            continue
         sign = -1 if value[0] == "-" else 1
         minutes = int(value[1:3]) * 60 + int(value[3:].lstrip(":") or 0)
-        rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
         offset[rows] = sign * minutes * 60 * NANOSECONDS
     return offset, stated

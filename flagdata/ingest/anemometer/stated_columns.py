@@ -12,19 +12,23 @@ An entry is the name of a channel with its unit in brackets, `wind_direction_to`
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
 from flagdata.ingest.anemometer.headings import fits, understand
-from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind, compass_points
+from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.recipe import COLUMNS_LIMIT
 from flagdata.ingest.anemometer.stamps import EPOCH
-from flagdata.ingest.anemometer.timecolumns import CLOCKS, TimeChoice, date_forms, find_time, time_as
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+from flagdata.ingest.anemometer.timecolumns import find_time, time_as
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
@@ -197,6 +201,8 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
         return choice
     choice = find_time(_only(layout, entries), order=order)
     choice = choice if choice is not None and set(choice.columns) == set(columns) else None
+    if choice is not None and choice.form is None and any(entry.detail for _, entry in entries):
+        choice = None  # what the columns alone leave open, the formats in brackets tell
     if choice is None and known and forms.count(None) == 1:
         index, entry = entries[forms.index(None)]
         missing = CLOCKS if entry.name == "time" else date_forms(layout, index, order)
@@ -248,12 +254,12 @@ def _column(layout: Layout, index: int, channel: str, detail: str, unit: str | N
         how = f"in {name} by its heading" if name else ""
         if CHANNELS[channel].unit == "m/s" and unit is not None:
             name, how = unit, f"in {unit}, as you said"
-    if name in (None, "deg") and CHANNELS[channel].unit == "rad" and compass_points(cells) is not None:
-        name, how = "points", "as points of the compass, 22.5° apart"
+    if name in (None, "deg") and CHANNELS[channel].unit == "rad" and (points := compass_unit(layout, index)):
+        name, how = points, "as points of the compass, 22.5° apart"
     if name is None and CHANNELS[channel].unit != "m/s":
         fix = f"write it in brackets: {channel}[{_unit_like(channel)}]"
         raise UsageError(f"no unit for {channel}, {named(layout, index)}", where=_WHERE, fix=fix)
-    if name != "points":
+    if name not in compass.BY_UNIT:
         parsed = numbers(cells, decimal=layout.decimal)
         words = [cell for cell, state in zip(cells, parsed.state, strict=True) if state == Cell.UNREADABLE]
         if 2 * len(words) > len(cells):
@@ -296,14 +302,20 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     return f'say what the columns are: --columns "{line}" {example} (the first row is {shown(layout)})'
 
 
-def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
-    """Entries of columns by their index."""
+def read_also(layout: Layout, time: TimeChoice, wind: Wind, direction: int) -> str:
+    """The line that says what was understood of a table, and that a further column is the wind's direction."""
+    entries = _understood(time, (wind,)) | {direction: f"wind_direction[{unit_of(layout, direction)}]"}
+    return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
+
+
+def _understood(time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of the columns of the time and of the first wind, by their index."""
     found: dict[int, str] = {}
     if time is not None:
         forms = (time.form or "").split(" ")
         parts = {form: name for name, form in _PARTS.items()}
-        if len(time.columns) == len(forms) and all(form in parts for form in forms):
-            found |= {at: parts[form] for at, form in zip(time.columns, forms, strict=True)}
+        if 1 < len(time.columns) == len(forms):
+            found |= {at: _part(form, parts) for at, form in zip(time.columns, forms, strict=True)}
         elif len(time.columns) == 1:
             elapsed = time.form is not None and counted.is_elapsed(time.form)
             found[time.columns[0]] = f"time[{time.form}]" if elapsed else "time[?]" if time.counts else "time"
@@ -313,25 +325,50 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         for channel, column in wind.columns.items():
             name = _TOWARDS if column.towards else channel
             found.setdefault(column.index, f"{name}[{column.unit or '?'}]")
+    return found
+
+
+def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of columns by their index."""
+    found = _understood(time, winds)
     timed = time is not None
     for at, name in enumerate(layout.names):
         if at in found:
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = understand(name, layout.units[at])
-        if not timed and kinds and kinds[0] == "stamp":
-            found[at] = "time"
+        if not timed and kinds and kinds[0] == "stamp" and not any(e.startswith("time") for e in found.values()):
+            found[at] = "time[?]"
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
-            if compass_points(layout.column(at)) is not None:
+            if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
                 continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
+            if guessed is None and CHANNELS[heading.channel].unit == "rad" and in_tens(layout, at):
+                guessed = "?"
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
             continue
-        elif (not winds and "number" in kinds) or (not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])):
+        elif may_be_direction(layout, at) and not any("wind_direction" in entry for entry in found.values()):
+            found[at] = "wind_direction" if compass_unit(layout, at) else "wind_direction[deg]"
+        elif (not winds and {"number", "stamp"} & set(kinds)) or (
+            not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
+        ):
             found[at] = "?"
     return found
+
+
+def _part(form: str, parts: Mapping[str, str]) -> str:
+    """The entry of a column that is a part of a time, written as `form`; `parts` are names by directives."""
+    if form in parts:
+        return parts[form]
+    if form == "%b":
+        return "month"
+    if form == "%H%M":
+        return "time[%H%M]"
+    if form in ("%Q", "%J"):
+        return f"{'hour' if form == '%Q' else 'day_of_year'}[{form}]"
+    return "time" if counted.is_time_of_day(form) else "date" if set("dmyYb") & set(form) else f"time[{form}]"
 
 
 def _guessed(channel: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import counted, possible, unitcheck, zones
@@ -25,7 +26,7 @@ from flagdata.ingest.anemometer.wall import to_utc, zone_advice
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
-from flagdata.units import POINTS, unit
+from flagdata.units import unit
 
 DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 """Channels whose unit is held against their values."""
@@ -75,7 +76,7 @@ class _Column:
 
     index: int
     suffix: str = ""
-    points: bool = False
+    points: Mapping[str, float] | None = None
     values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
@@ -216,7 +217,7 @@ class _Gathered:
         self.lines.add(line[keep])
         for column in self.columns():
             cells = _cells(block, column.index)
-            cells = _in_degrees(cells, recipe.file.decimal) if column.points else cells
+            cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
             parsed = numbers(
                 cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix
             )  # fmt: skip
@@ -234,10 +235,10 @@ def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
     return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]
 
 
-def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str) -> list[str]:
+def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
     """Points of the compass as degrees; calm air and what else is no point have no direction."""
     texts: list[str] = [str(text) for text in cells]
-    degrees = (POINTS.get(text.strip().upper()) for text in texts)
+    degrees = (points.get(text.strip().upper()) for text in texts)
     return ["" if value is None else f"{value:g}".replace(".", decimal) for value in degrees]
 
 
@@ -284,7 +285,9 @@ def read_table(
         clock=_Clock(form=recipe.time.format, columns=own) if own or host is None else host,
         host=host if own else None,
         channels={
-            name: _Column(index=i, suffix=recipe.channels[name].suffix, points=recipe.channels[name].unit == "points")
+            name: _Column(
+                index=i, suffix=recipe.channels[name].suffix, points=compass.BY_UNIT.get(recipe.channels[name].unit)
+            )
             for name, i in _channel_columns(recipe, rows, where).items()
         },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},

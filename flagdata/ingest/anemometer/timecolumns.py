@@ -5,89 +5,46 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer import counted, dateparts
+from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.stamps import Stamps
+from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice
 
-_SHARE = 0.9
-"""Share of rows that must fit for a column to be what it seems."""
-CLOCKS = (
-    "%H:%M:%S%f",
-    "%H:%M",
-    "%I:%M:%S %p",
-    "%I:%M %p",
-    "%I:%M:%S%p",
-    "%I:%M%p",
-    "%I:%M:%S%f %p",
-    "%I:%M:%S%f%p",
-    "%H%M%S",
-    "%H%M",
-    "%H.%M.%S",
-    "%H",
-)
-"""How a time of day may be written."""
-_MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
 )
 _CLOCK = re.compile(
-    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
+    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"
+    r"|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
 )
 _HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
 """Before or after noon, in a column of its own."""
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
-    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_-]|\d\s+\d{1,2}:"
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
+_OF_EXTREME = re.compile(
+    r"hora.*(?:max|min(?!u)|racha)|time(?:of|at)(?:max|min|gust|peak)|time(?:max|gust|peak)|(?:max|gust|peak).*time"
+)
+"""Headings of the times at which extremes of other quantities came."""
+_BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
+"""A date whose numbers are divided by blanks, and a clock."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
-_YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
-_TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
-_SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
 _DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
-_PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|da|dd|day|dom|tag", 1, 31),
-    ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 23),
-    ("%M", r"mi|min|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
-)  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class TimeChoice:
-    """The time of a table.
-
-    Attributes:
-        columns: their indices; they are joined with a blank.
-        form: as in a recipe's [time] format; `None` where two are possible.
-        zone: that the heading states; `None` where it states none.
-        zoned: whether the stamps state their zone themselves.
-        doubt: what the rows do not tell; `None` where nothing is in doubt.
-        fix: what the user can say.
-        score: how well it fits, for the choice among several.
-        counts: whether it counts from a start, by a unit that may not be known.
-        unnamed: whether it is told by its numbers alone, since no line names the columns.
-    """
-
-    columns: tuple[int, ...]
-    form: str | None
-    zone: str | None
-    zoned: bool
-    score: float
-    doubt: str | None = None
-    fix: str | None = None
-    counts: bool = False
-    unnamed: bool = False
 
 
 def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | None:
@@ -113,7 +70,7 @@ def time_as(layout: Layout, columns: tuple[int, ...], form: str) -> TimeChoice |
     texts = [" ".join(cells) for cells in zip(*(layout.column(index) for index in columns), strict=True)]
     texts = [text for text in texts if text.strip()]
     found = counted.parse(texts, form) if counted.is_time_of_day(form) else _parsed(texts, form)
-    return _choice(layout, columns, form, found, 2.0) if _fits(found) else None
+    return time_choice(layout, columns, form, found, 2.0) if fits(found) else None
 
 
 def _without_false_epochs(layout: Layout, choices: Sequence[TimeChoice]) -> list[TimeChoice]:
@@ -150,15 +107,17 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
         columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
     dates, clocks = [], []
     halves = {at for at, cells in enumerate(columns) if (texts := [cell for cell in cells if cell])
-              and _share(_HALF, texts)}  # fmt: skip
+              and share(_HALF, texts)}  # fmt: skip
     for index, cells in enumerate(columns):
         texts = [cell for cell in cells if cell]
         if not texts:
             continue
-        if _share(_DATE, texts):
+        if share(_DATE, texts):
             dates.append(index)
-        elif _share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
-                                       and _share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
+        elif dateparts.hour_alone(layout, columns, index) or _OF_EXTREME.search("".join(words_of(layout.names[index]))):
+            continue
+        elif share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
+                                       and share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
             clocks.append(index)
         if index + 1 in halves:
             texts = _joined(columns, (index, index + 1))
@@ -167,7 +126,7 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
             yield found
     for date in dates:
         for clock in clocks:
-            if clock == date:
+            if clock == date or _of_other_zones(layout, date, clock, (*dates, *clocks)):
                 continue
             both = _with_half((date, clock), halves)
             texts = _joined(columns, both)
@@ -176,19 +135,23 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
                 yield found
     days = [] if clocks else list(_days(layout, columns, dates, order))
     yield from days
-    parts = _parts(layout, columns) or _unnamed_parts(layout, columns)
-    if parts is not None:
-        yield parts
+    yield from dateparts.choices(layout, columns, dates=dates, order=order)
     for index in clocks:
         clock = _with_half((index,), halves)
         texts = _joined(columns, clock)
         for form in CLOCKS[:4]:
-            if _fits(counted.parse(texts, form)):
-                yield _choice(layout, clock, form, counted.parse(texts, form), 1.0)
+            if fits(counted.parse(texts, form)):
+                yield time_choice(layout, clock, form, counted.parse(texts, form), 1.0)
                 break
     for index, cells in enumerate(columns):
         if not any(index in choice.columns for choice in days):
             yield from _counts(layout, index, [cell for cell in cells if cell])
+
+
+def _of_other_zones(layout: Layout, date: int, clock: int, others: Sequence[int]) -> bool:
+    """Whether one of a date and a clock is said to be in a zone, as the other is not though a further column is."""
+    said = {index: zone_of(layout.names[index]) for index in others}
+    return said[date] != said[clock] and sum(zone is not None for zone in said.values()) > 1
 
 
 def _with_half(columns: tuple[int, ...], halves: Collection[int]) -> tuple[int, ...]:
@@ -201,53 +164,36 @@ def _joined(columns: Sequence[Sequence[str]], chosen: tuple[int, ...]) -> list[s
     return [" ".join(cells) for cells in rows if all(cells)]
 
 
-def _share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:
-    return sum(1 for text in texts if shape.match(text)) >= _SHARE * len(texts)
-
-
-def _fits(found: Stamps) -> bool:
-    return bool(len(found.valid)) and float(found.valid.mean()) >= _SHARE
-
-
-def _choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, score: float) -> TimeChoice:
-    names = [layout.names[index] for index in columns]
-    zones = [zone for name in (*names, *(layout.units[index] for index in columns)) if (zone := zone_of(name))]
-    zoned = bool(found.utc[found.valid].all())
-    ns = found.ns[found.valid]
-    varied = len(np.unique(ns)) / len(ns) if len(ns) > 1 else 1.0
-    words = {word for name in names for word in words_of(name)}
-    score += (0.6 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
-    score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & {"gust", "max", "min", "created", "updated", "start"})
-    return TimeChoice(
-        columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score
-    )
-
-
 def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None) -> TimeChoice | None:
     """Date and time in `texts`."""
+    if texts and share(_BLANKS, texts):
+        return _blank_divided(layout, columns, texts, order)
     if not any(_STAMPLIKE.search(text) for text in texts[:5]):
         return None
     # 2023070100 is an hour of July 2023 before it is the Unix time of a day in 2034.
-    hours = ("%Y%m%d%H",) if _share(_DATE_AND_HOUR, texts) else ()
+    hours = ("%Y%m%d%H",) if share(_DATE_AND_HOUR, texts) else ()
     for form in (*hours, "iso", "epoch-s", "epoch-ms"):
         found, _ = parse_with_bare_dates(texts, form)
-        if _fits(found):
-            return _choice(layout, columns, form, found, 2.0)
+        if fits(found):
+            return time_choice(layout, columns, form, found, 2.0)
     for form in ("epoch-us", "epoch-ns"):
         found = counted.parse(texts, form)
-        if _fits(found):
-            return _choice(layout, columns, form, found, 2.0)
+        if fits(found):
+            return time_choice(layout, columns, form, found, 2.0)
     shape = next(re.sub(r"\d", "0", text.strip()) for text in texts if text.strip())
-    zoned = "%z" if re.search(r"(Z|UTC|GMT|[+-]00(:?00)?)$", shape) and len(shape) > 12 else ""
+    zoned = "%z" if re.search(rf"(Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]00(:?00)?)$", shape) and len(shape) > 12 else ""
+    if not zoned and len(shape) > 12 and re.search(r"\d ?[A-Z]{3,4}$", shape) and not re.search(r"[AP]M$", shape):
+        zoned = "%Z"  # letters that mean several zones, as CST, IST and BST do
+    shape = re.sub(rf" ?(?:{'|'.join(ABBREVIATED)})$", "", shape) if zoned else shape
     for form in _compact(shape):
         found, _ = parse_with_bare_dates(texts, form + zoned)
-        if _fits(found):
-            return _choice(layout, columns, form + zoned, found, 2.0)
-    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT)$", "", shape)):
+        if fits(found):
+            return time_choice(layout, columns, form + zoned, found, 2.0)
+    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT|[A-Z]{3,4})$", "", shape) if zoned else shape):
         if cell_kind(texts[0]) != "stamp":
             return None
         return _with_month_names(layout, columns, texts, zoned)
-    order = order or _order_of(" ".join(layout.names[index] for index in columns))
+    order = order or order_of(" ".join(layout.names[index] for index in columns))
     try:
         date = decide(texts, told=order, where="")
     except TimeError as error:
@@ -262,7 +208,7 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
             return None
         form, stamps = found
         swapped = form.replace("%d", "%x").replace("%m", "%d").replace("%x", "%m")
-        chosen = _choice(layout, columns, form, stamps, 2.0)
+        chosen = time_choice(layout, columns, form, stamps, 2.0)
         return TimeChoice(
             columns=columns, form=None, zone=chosen.zone, zoned=chosen.zoned, score=chosen.score,
             doubt=f"dates may be {form!r} or {swapped!r}, and nothing in the first rows tells which",
@@ -270,9 +216,22 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         )  # fmt: skip
     for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in CLOCKS):
         found, _ = parse_with_bare_dates(texts, form)
-        if _fits(found):
-            return _choice(layout, columns, form, found, 2.0)
+        if fits(found):
+            return time_choice(layout, columns, form, found, 2.0)
     return None
+
+
+def _blank_divided(
+    layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None
+) -> TimeChoice | None:
+    """Dates whose numbers are divided by blanks, as "01 12 2026 00:10"."""
+    hyphened = [re.sub(r"^(\d{1,4}) (\d{1,2}) (\d{1,4})(?= )", r"\1-\2-\3", text.strip()) for text in texts]
+    found = _whole(layout, columns, hyphened, order)
+    if found is None or found.form is None:
+        return found
+    forms = [found.form.replace("-", " ")] if found.form != "iso" else [f"%Y %m %d {clock}" for clock in CLOCKS[:2]]
+    form = next((form for form in forms if fits(parse_with_bare_dates(texts, form)[0])), None)
+    return None if form is None else replace(found, form=form)
 
 
 def _days(
@@ -293,31 +252,6 @@ def _days(
         yield from (replace(choice, score=0.9) for choice in itertools.islice(found, 1))
 
 
-def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ...]:
-    """The formats in which the dates of a column may be written.
-
-    Raises:
-        TimeError: their numbers may be day and month, or month and day.
-    """
-    named = ("%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in _MONTHS))
-    try:
-        numbered = decide(layout.column(index), told=order or _order_of(layout.names[index]), where="").directives()
-    except TimeError as error:
-        if "may be" in error.what:
-            raise
-        return named
-    return (*named, numbered)
-
-
-def _order_of(heading: str) -> Order | None:
-    """The order of a date that its heading spells, as "DATE (MM/DD/YYYY)"."""
-    found = re.search(r"\b(?P<first>dd?|mm?|yyyy)[-/. ](?P<second>mm?|dd?)[-/. ](?:y|dd?\b)", heading.lower())
-    if found is None:
-        return None
-    known: dict[str, Order] = {"dm": "dmy", "md": "mdy", "ym": "ymd"}
-    return known.get(found["first"][0] + found["second"][0])
-
-
 def _gaps(shape: str) -> tuple[str, ...]:
     """What may stand between date and time."""
     found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;-])0", shape)
@@ -332,7 +266,7 @@ def _dated(texts: Sequence[str], first: str, second: str, zoned: str) -> Iterato
     for clock in CLOCKS:
         form = f"{first}{parts[1]}{second}{parts[1]}{year} {clock}{zoned}"
         found, _ = parse_with_bare_dates(texts, form)
-        yield (form, found) if _fits(found) else None
+        yield (form, found) if fits(found) else None
 
 
 def _compact(shape: str) -> tuple[str, ...]:
@@ -343,121 +277,30 @@ def _compact(shape: str) -> tuple[str, ...]:
         "00000000 000000": "%Y%m%d %H%M%S", "00000000 0000": "%Y%m%d %H%M", "00000000 00:00:00": "%Y%m%d %H:%M:%S%f",
         "00000000T0000": "%Y%m%d %H%M", "00000000_000000": "%Y%m%d_%H%M%S", "00000000 00:00": "%Y%m%d %H:%M",
         "00000000-000000": "%Y%m%d-%H%M%S", "00000000 00": "%Y%m%d %H", "00000000 0": "%Y%m%d %H",
+        "00000000:0000": "%Y%m%d:%H%M",
+        "00000000:000000": "%Y%m%d:%H%M%S", "00000000_0000": "%Y%m%d_%H%M",
     }  # fmt: skip
     known = forms.get(bare.split(".")[0])
     return (known,) if known else ()
 
 
 def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
-    dates = [form.format(s=sign) for sign in "- /" for form in _MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
+    dates = [form.format(s=sign) for sign in "- /" for form in MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
     forms = [f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in CLOCKS[:6]]
     if _DAY_OF_WEEK.match(texts[0]):
         forms = [f"%a {form}" for form in ("%b %d %H:%M:%S%f %Y", *forms)]
     for form in forms:
         found, _ = parse_with_bare_dates(texts[:20], form)
-        if _fits(found):
-            return _choice(layout, columns, form, found, 2.0)
+        if fits(found):
+            return time_choice(layout, columns, form, found, 2.0)
     return None
-
-
-def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
-    """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
-    names = [" ".join(words_of(name)) for name in layout.names]
-    for index, name in enumerate(names):
-        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not _whole_numbers(
-            columns[index], 1990, 2100
-        ):
-            continue
-        chosen, form = [index], "%Y"
-        at = index + 1
-        if at < len(names) and re.fullmatch(r"doy|jday|julian|jd|day of year|j day|julian day|yday", names[at]):
-            if _part_at(names, columns, at + 1, _PARTS[0]) and _part_at(names, columns, at + 2, _PARTS[1]):
-                at += 1
-            else:
-                chosen, form, at = [index, at], "%Y %j", at + 1
-        for part in _PARTS if form == "%Y" else _PARTS[2:]:
-            if not _part_at(names, columns, at, part):
-                break
-            chosen, form, at = [*chosen, at], f"{form} {part[0]}", at + 1
-        clock = [cell for cell in columns[at] if cell] if at < len(names) else []
-        beside = names[at] if at < len(names) else ""
-        if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and _share(_DIGITS, clock):
-            chosen, form = [*chosen, at], f"{form} %H%M"
-        elif form == "%Y %m %d" and clock and _share(_CLOCK, clock):
-            known = next((found for found in CLOCKS if _fits(counted.parse(clock, found))), None)
-            chosen, form = [*chosen, at], f"{form} {known}" if known else form
-        if "%H" not in form and "%I" not in form:
-            continue
-        texts = [" ".join(cells) for cells in zip(*(columns[i] for i in chosen), strict=True)]
-        found, _ = parse_with_bare_dates(texts, form)
-        if _fits(found):
-            return _choice(layout, tuple(chosen), form, found, 2.2)
-    return None
-
-
-def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
-    """Year, month, day, hour, minute and second side by side where no line names the columns.
-
-    Whole numbers that are a year, a month, a day, an hour and a minute and rise from row to row are nothing else; what
-    follows is a second only where it is written or moves as one, since a speed looks much the same.
-    """
-    if any(layout.names):
-        return None
-    for index, cells in enumerate(columns):
-        if not _share(_YEAR, cells):
-            continue
-        chosen, form = [index], "%Y"
-        for (directive, _, low, high), at in zip(_PARTS[:4], range(index + 1, len(columns)), strict=False):
-            if not _share(_TWO_DIGITS, columns[at]) or not _whole_numbers(columns[at], low, high):
-                break
-            chosen, form = [*chosen, at], f"{form} {directive}"
-        if "%M" not in form:
-            continue
-        after = chosen[-1] + 1
-        if after < len(columns) - 1 and _seconds(columns[after], [columns[at] for at in chosen]):
-            chosen, form = [*chosen, after], f"{form} %S%f"
-        texts = [" ".join(row) for row in zip(*(columns[i] for i in chosen), strict=True)]
-        found, _ = parse_with_bare_dates(texts, form)
-        if _fits(found) and bool(np.all(np.diff(found.ns[found.valid]) >= 0)):
-            return replace(_choice(layout, tuple(chosen), form, found, 2.2), unnamed=True)
-    return None
-
-
-def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
-    """Whether a column behind that of the minutes, which nothing names, is of the seconds."""
-    if not _share(_SECONDS_OF_MINUTE, cells) or not _whole_numbers([cell.split(".")[0] for cell in cells], 0, 59):
-        return False
-    padded = any(len(cell) > 1 and cell[0] == "0" for column in before for cell in column)
-    if padded and any(len(cell.split(".")[0]) < 2 for cell in cells):
-        return False  # all of the date is written in two digits, this is not
-    if any(re.match(r"0\d", cell) for cell in cells):
-        return True
-    stamps = list(zip(*before, strict=True))
-    same = np.array([one == other for one, other in itertools.pairwise(stamps)], dtype=bool)
-    steps = np.diff(numbers(cells).value)
-    if same.any():
-        return bool(np.all(steps[same] > 0))
-    # Rows minutes apart: the second of a steady clock stays or drifts, a speed does not.
-    return padded and len(steps) > 2 and bool(np.all(np.abs(steps) <= 2))
-
-
-def _part_at(names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]) -> bool:
-    if at >= len(names):
-        return False
-    return bool(re.fullmatch(rf"({part[1]})( utc)?", names[at])) and _whole_numbers(columns[at], part[2], part[3])
-
-
-def _whole_numbers(cells: Sequence[str], low: int, high: int) -> bool:
-    value = numbers(cells).value
-    known = value[np.isfinite(value)]
-    return len(known) >= _SHARE * len(cells) > 0 and bool(np.all((known >= low) & (known <= high)))
 
 
 def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice]:
     """Serial days, and counts since a start."""
     name = layout.names[index]
     parsed = numbers(texts)
-    if not texts or float((parsed.state == Cell.NUMBER).mean()) < _SHARE:
+    if not texts or float((parsed.state == Cell.NUMBER).mean()) < SHARE:
         return
     value = parsed.value[parsed.state == Cell.NUMBER]
     steps = np.diff(value)
@@ -473,7 +316,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         daily = float(np.median(steps[steps > 0])) > 0.5  # seconds of the day rise by one, days by fractions of one
         for form, low, high in () if daily else (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
-                yield _choice(layout, (index,), form, counted.parse(texts, form), 1.5)
+                yield time_choice(layout, (index,), form, counted.parse(texts, form), 1.5)
                 return
     told = (*words, *words_of(layout.units[index]))
     form = next((form for form, known in _COUNTERS if set(told) & known), None)
@@ -482,7 +325,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if value[0] < 0 or value[-1] * _SECONDS[form or "elapsed-ms"] > 3.2e8:
         return
     found = counted.parse(texts, form or "elapsed-s")
-    choice = _choice(layout, (index,), form or "elapsed-s", found, 0.2)
+    choice = time_choice(layout, (index,), form or "elapsed-s", found, 0.2)
     if form is None:
         usual = float(np.median(steps[steps > 0]))
         unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"

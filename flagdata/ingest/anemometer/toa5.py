@@ -17,16 +17,19 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import stated_columns
 from flagdata.ingest.anemometer.exports import Assigned, column_findings, known_unit, stamp_format
-from flagdata.ingest.anemometer.headings import fits, understand
+from flagdata.ingest.anemometer.headings import fits, interest, understand
+from flagdata.ingest.anemometer.layout import lay_out
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
 from flagdata.ingest.anemometer.rows import RowReader
-from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.table import read_table
+from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.ingest.anemometer.windographer import NAMES as MAST_NAMES
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants, Sensor
@@ -151,7 +154,7 @@ class Toa5:
         if not {"wind_speed", "wind_x"} & set(channels):
             raise InputError(
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
-                fix=f"describe the file by a recipe; its columns are {', '.join(names)}",
+                fix=f"{_offer(source)}; or describe the file by a recipe; its columns are {', '.join(names)}",
             )  # fmt: skip
         rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
         form, found = _FORM, ()
@@ -238,3 +241,9 @@ def _faults(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     word = np.where(known, values, 0).astype(np.int64)
     counting = len(word) > 2 and float((np.diff(word) % 64 == 1).mean()) > 0.5
     return ((word & _WARNINGS) != 0) if counting else (word != 0)
+
+
+def _offer(source: TextFile) -> str:
+    """The option that says what the columns are, as far as they are known."""
+    layout = lay_out(source.head(HEAD_LINES), interest=interest)
+    return "" if layout is None else stated_columns.offer(layout, find_time(layout), ())

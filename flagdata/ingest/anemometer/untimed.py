@@ -62,13 +62,13 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         text, short = _table(source, rate, start, where, told=True)
         return _counted(source, text, rate, start, short=short)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
-        _refuse_times(any(_TIMED.search(line) for line in lines), where)
-        text = list(_sentences(source, rate, start))
+        _refuse_times(sum(bool(_TIMED.search(line)) for line in lines) > 1, where)
+        text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
     else:
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
         stamped = list(_stamped(source, rate, start))
-        known = labelled.alike(stamped[:HEAD_LINES]) or _of_an_instrument(stamped[:HEAD_LINES])
+        known = labelled.alike(stamped[:HEAD_LINES]) or of_an_instrument(stamped[:HEAD_LINES])
         if not known:
             source = restate(source)
             text, short = _table(source, rate, start, where)
@@ -77,7 +77,7 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
     return _counted(source, text, rate, start)
 
 
-def _of_an_instrument(lines: Sequence[str]) -> bool:
+def of_an_instrument(lines: Sequence[str]) -> bool:
     """Whether stamped lines are those of an instrument whose format is known."""
     from flagdata.ingest.anemometer.formats import FORMATS, Format  # the formats import modules that import this one
 
@@ -96,7 +96,7 @@ def clocked(source: TextFile) -> bool:
     timed = [match for line in lines if (match := _CLOCK_BEFORE.match(line)) is not None]
     if not timed or 2 * len(timed) < len(lines) or any(_TIMED.search(match["rest"]) for match in timed):
         return False
-    return _of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
+    return of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
 
 
 def dated(source: TextFile, date: dt.date) -> TextFile:

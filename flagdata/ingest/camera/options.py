@@ -118,8 +118,8 @@ class CameraOptions:
         if self.rate != "native":
             rates["rate"] = self.rate
         for name, value in rates.items():
-            if value is not None and not (math.isfinite(value) and 0.01 <= value <= 1e6):
-                raise UsageError(f"{name} = {value} Hz is not a frame rate", fix="give a rate of 0.01 to 1e6 Hz")
+            if value is not None and not (math.isfinite(value) and 1e-6 <= value <= 1e6):
+                raise UsageError(f"{name} = {value} Hz is not a frame rate", fix="give a rate of 1e-6 to 1e6 Hz")
         for name, value in {"exposure": self.exposure, "tolerance": self.tolerance}.items():
             if value is not None and not (math.isfinite(value) and 0 <= value <= 10):
                 raise UsageError(f"{name} = {value} s is out of range", fix="give seconds, 0 to 10")

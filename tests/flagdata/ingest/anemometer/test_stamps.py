@@ -71,13 +71,22 @@ def test_the_resolution_of_stamps_is_the_last_digit_ever_used(texts: list[str], 
 
 @pytest.mark.parametrize(
     "text",
-    ["2026-02-29 12:00:00", "2026-04-31 12:00:00", "2026-00-01 12:00:00", "2026-05-01 24:00:00", "", "x", "12:00"],
+    [
+        "2026-02-29 12:00:00",
+        "2026-04-31 12:00:00",
+        "2026-00-01 12:00:00",
+        "2026-05-01 24:00:01",
+        "2026-05-01 24:01:00",
+        "",
+        "x",
+        "12:00",
+    ],
 )
 def test_what_is_no_date_is_not_valid(text: str) -> None:
     assert parse([text], "iso").valid.tolist() == [False]
 
 
-@pytest.mark.parametrize("form", ["%Y-%m", "%Y-%m-%d %M", "%H:%M", "%Q", "%Y-%m-%d %H:%M %Y", "%"])
+@pytest.mark.parametrize("form", ["%Y-%m", "%Y-%m-%d %M", "%H:%M", "%K", "%Y-%m-%d %H:%M %Y", "%"])
 def test_a_format_without_a_whole_instant_is_refused(form: str) -> None:
     with pytest.raises(UsageError):
         parse(["2026-05-01"], form)

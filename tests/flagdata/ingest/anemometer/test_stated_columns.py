@@ -134,7 +134,7 @@ def test_the_unit_is_the_headings_or_the_options_where_the_line_states_none(read
         ("time,wind_speed[m/s],wind_direction[deg]", "holds words: 'ok'"),
         ("time[%d.%m.%Y],wind_speed[m/s]", "cannot be read as %d.%m.%Y"),
         ("time[epoch],wind_speed[m/s]", "epoch-s"),
-        ("time[%Y-%m-%d %Q],wind_speed[m/s]", "%Q"),
+        ("time[%Y-%m-%d %K],wind_speed[m/s]", "%K"),
         (",wind_speed[m/s],time", "cannot be read"),
     ],
 )
@@ -155,7 +155,7 @@ def test_a_recipe_and_a_line_of_columns_exclude_each_other(log_file: Write) -> N
         (_BARE, ["wind_speed[kn]", "wind_direction[deg]", "air_temperature[degC]"], {"zone": "UTC"}),
         ("".join(f"{at} 3.{at} 7 21{at}\n" for at in range(8)), ["time[elapsed-s]", "wind_speed[m/s]", "",
                                                                "wind_direction[deg]"], {"start": _START}),
-        ("".join(f"2026-05-01_12h0{at},x,3.{at}\n" for at in range(8)), ["time[%Y-%m-%d_%Hh%M]", "wind_speed[m/s]"],
+        ("".join(f"2026-05-01_12u0{at},x,3.{at}\n" for at in range(8)), ["time[%Y-%m-%d_%Hu%M]", "wind_speed[m/s]"],
          {"zone": "UTC"}),
         ("Stop;Datum;A\n" + "".join(f"x;2026-05-01 12:0{at};3.{at}\n" for at in range(8)), ["wind_speed[m/s]"],
          {"zone": "UTC"}),

@@ -13,6 +13,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log, sniff
+from flagdata.ingest.anemometer.stamps import parse
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -80,10 +81,32 @@ def test_statistics_of_a_wind_are_no_anemometer_of_their_own(log_file: Write, ot
     assert read_log(path).series.channels["wind_speed"][1] == pytest.approx(4.1)
 
 
-def test_a_component_along_an_axis_of_the_earth_is_no_speed(log_file: Write) -> None:
-    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,-4.{at},0.{at}\n" for at in range(9))
-    path = log_file(f"time,windspeed_north (m/s),windspeed_east (m/s)\n{rows}")
-    assert "no column is surely a wind" in refusal(path).what
+def test_a_component_along_one_axis_of_the_earth_is_no_speed(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,-4.{at}\n" for at in range(9))
+    assert "no column is surely a wind" in refusal(log_file(f"time,windspeed_north (m/s)\n{rows}")).what
+
+
+@pytest.mark.parametrize(
+    "names", ["windspeed_north (m/s),windspeed_east (m/s)", "northward wind m/s,eastward wind m/s"]
+)
+def test_components_towards_north_and_east_give_speed_and_direction(log_file: Write, names: str) -> None:
+    # Towards the south-east (north -3, east +3): the wind comes from the north-west.
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,-3.0,3.0\n" for at in range(9))
+    channels = read_log(log_file(f"time,{names}\n{rows}")).series.channels
+    np.testing.assert_allclose(channels["wind_speed"], 3 * np.sqrt(2))
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 315)
+
+
+def test_speeds_at_the_sides_of_a_mast_are_no_components(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,3.0,3.1,3.2\n" for at in range(9))
+    assert "no column is surely" in refusal(log_file(f"time,speed north,speed east,speed south\n{rows}")).what
+
+
+def test_a_lone_u_may_be_the_speed_and_is_asked_about(log_file: Write) -> None:
+    rows = "".join(f"2023-07-01T00:00:{at:02d}Z,4.{at}\n" for at in range(9))
+    path = log_file(f"time,U (m/s)\n{rows}")
+    assert "--wind 'U (m/s)'" in refusal(path).fix
+    assert "wind_speed" in read_log(path, WindOptions(wind="U (m/s)")).series.channels
 
 
 def test_a_fast_count_may_be_of_microseconds(log_file: Write) -> None:
@@ -431,3 +454,33 @@ def test_degrees_called_otherwise_go_before_points_of_the_compass(read: Read) ->
         timed("winddirectiondegrees,winddirection,wind speed (m/s)", [f"{190 + at},S,4.{at}" for at in range(9)])
     )
     assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(190.0)
+
+
+def test_the_angle_of_the_true_wind_is_no_direction_from_north(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,5.1,10.0,40,{200 + at}\n" for at in range(12))
+    log = read_log(
+        log_file(f"Time,BoatSpeed,TrueWindSpeed,TrueWindAngle,TrueWindDirection\n{rows}"), WindOptions(unit="kn")
+    )
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"][:2]), [200, 201])
+
+
+def test_numbers_of_columns_above_their_names_are_no_row(log_file: Write) -> None:
+    rows = "".join(f"01.05.2026;12:{at:02d};11,2;3,{at};2{at:02d}\n" for at in range(12))
+    path = log_file(f";;1;34;35\n;;Temperatur;Windgeschwindigkeit;Windrichtung\n{rows}")
+    channels = read_log(path, WindOptions(zone="UTC", unit="m/s")).series.channels
+    assert channels["wind_speed"][1] == pytest.approx(3.1)
+    assert np.rad2deg(channels["wind_direction"][1]) == pytest.approx(201)
+
+
+@pytest.mark.parametrize(("text", "form"), [("202603141000", "%Y%m%d%H%M%S"), ("2026314", "%Y%m%d")])
+def test_digits_with_nothing_between_are_not_cut_elsewhere(text: str, form: str) -> None:
+    assert not parse([text], form).valid[0]
+
+
+def test_sixteenths_are_an_eighth_of_pi_each(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{at}\n" for at in range(16))
+    path = log_file(f"time,Wind speed (m/s),Wind direction\n{rows}")
+    assert any("sixteenths" in finding.what for finding in read_log(path).findings)
+    line = "time,wind_speed[m/s],wind_direction[sixteenths]"
+    channels = read_log(path, WindOptions(columns=line)).series.channels
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 22.5 * np.arange(16))

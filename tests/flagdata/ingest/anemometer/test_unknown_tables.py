@@ -142,7 +142,7 @@ def test_years_of_two_digits_that_may_come_first_are_asked_about(log_file: Write
 
 
 def test_a_table_of_which_nothing_is_known_gets_a_recipe_to_complete(log_file: Write) -> None:
-    guess = sniff(log_file("107,2026,73,1405,4.5,197\n107,2026,73,1406,3.2,224\n107,2026,73,1407,3.9,210\n"))[0]
+    guess = sniff(log_file("107,26,73,1405,4.5,197\n107,26,73,1406,3.2,224\n107,26,73,1407,3.9,210\n"))[0]
     assert guess.score == 0
     assert guess.draft is not None
     assert 'columns = ["?"]' in guess.draft

@@ -69,7 +69,10 @@ def test_sentences_of_the_most_frequent_wind_tick_and_the_others_come_with_them(
     [
         "time,wind speed [m/s]\n2026-05-01 12:00:00,3\n2026-05-01 12:00:01,4\n2026-05-01 12:00:02,3\n",
         "millis,wind speed [m/s]\n0,3\n100,4\n200,3\n300,4\n",
-        sentence("GPRMC,120000,A,5200.0,N,00500.0,E,5.0,90.0,010526,,,A") + sentence("WIMWV,1.0,R,4.0,N,A"),
+        "".join(
+            sentence(f"GPRMC,12000{at},A,5200.0,N,00500.0,E,5.0,90.0,010526,,,A") + sentence("WIMWV,1.0,R,4.0,N,A")
+            for at in range(2)
+        ),
         "12:00:01 Wind Speed: 3.21 m/s\n12:00:02 Wind Speed: 3.31 m/s\n12:00:03 Wind Speed: 3.21 m/s\n",
     ],
 )
@@ -127,3 +130,21 @@ def test_objects_between_lines_of_text_are_counted_from_the_start_at_the_rate(re
     assert since_start(log) == pytest.approx([60.0 * at for at in range(6)])
     assert log.series.channels["wind_speed"].tolist() == pytest.approx([(3.6 + at) / 3.6 for at in range(6)])
     assert {"rate-given", "malformed-lines"} <= {finding.kind for finding in log.findings}
+
+
+def test_the_rate_and_the_start_above_a_table_are_proposed_but_not_taken(read: Read, log_file: Write) -> None:
+    head = "Sampling rate: 20 Hz\nStart: 2026-05-01 12:00:00\n"
+    rows = "".join(f"{3 + at},0.2\n" for at in range(8))
+    path = log_file(f"{head}u (m/s),v (m/s)\n{rows}")
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path)
+    assert "--rate 20" in (caught.value.fix or "")
+    assert "--start 2026-05-01T12:00:00" in (caught.value.fix or "")
+
+
+def test_the_instant_that_a_heading_counts_from_is_proposed(log_file: Write) -> None:
+    rows = "".join(f"{60 * at},{3 + at}.5\n" for at in range(8))
+    path = log_file(f"seconds since 2026-05-01 12:00:00 UTC,wind speed (m/s)\n{rows}")
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path)
+    assert "--start 2026-05-01T12:00:00" in (caught.value.fix or "")

@@ -1,0 +1,54 @@
+"""Lines that begin with a stamp, set off by a blank from cells that are divided by another sign.
+
+    2026-05-01T12:00:01Z 02.3;240;+23.5;15;;*31
+
+The blank behind the stamp becomes that sign, so that the line is a row of a table, of which nothing is known yet.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flagdata.ingest.anemometer.source import TableText, TextFile
+
+_LINE = re.compile(
+    r"\s*(?P<stamp>\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}:\d{2}(?:[.,]\d{1,9})?(?:Z|[+-]\d{2}:?\d{2})?)"
+    r"[\s>:|-]+(?P<rest>[^\s$!].*)"
+)
+_SIGNS = ",;\t"
+_SHARE = 0.8
+_LEAST = 3
+
+
+def matches(lines: Sequence[str]) -> bool:
+    """Most lines begin so, and are cut into equally many cells by a sign that is no blank."""
+    return _sign(lines) is not None
+
+
+def as_table(source: TextFile) -> TableText | None:
+    """The lines with the sign behind their stamps; `None` where another format knows them."""
+    from flagdata.ingest.anemometer.sniff import recognise  # it imports the module that asks for this one
+    from flagdata.ingest.anemometer.sniffing import SURE
+
+    sign = _sign(source.head())
+    if sign is None or any(guess.score >= SURE for guess in recognise(source)):
+        return None
+    return TableText.of(source, [_cut(line, sign) for _, lines in source.blocks() for line in lines])
+
+
+def _cut(line: str, sign: str) -> str:
+    match = _LINE.match(line)
+    return line if match is None else f"{match['stamp'].replace(',', '.')}{sign}{match['rest']}"
+
+
+def _sign(lines: Sequence[str]) -> str | None:
+    filled = [line for line in lines if line.strip()]
+    found = [match["rest"] for line in filled if (match := _LINE.match(line)) is not None]
+    if len(found) < max(_LEAST, _SHARE * len(filled)):
+        return None
+    for sign in _SIGNS:
+        counts = [rest.count(sign) for rest in found]
+        if min(counts) >= 1 and sum(count == counts[0] for count in counts) >= _SHARE * len(counts):
+            return sign
+    return None

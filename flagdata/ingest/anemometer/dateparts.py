@@ -1,0 +1,380 @@
+"""Times in several columns: year, month, day, hour and so on each in one of its own, or a date beside an hour."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flagdata.errors import TimeError
+from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer.cells import numbers
+from flagdata.ingest.anemometer.dates import Order, decide
+from flagdata.ingest.anemometer.headings import words_of
+from flagdata.ingest.anemometer.layout import Layout
+from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.timechoice import TimeChoice, fits, share, time_choice, whole_numbers
+
+MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
+"""Dates with the name of the month; {s} is the sign between their parts."""
+_PARTS: tuple[tuple[str, str, int, int], ...] = (
+    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|da|dd|dy|day|dom|tag", 1, 31),
+    ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 24),
+    ("%M", r"mi|min|mn|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
+)  # fmt: skip
+_WORDS = {
+    "year": r"year|yyyy|yr|yy|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год",
+    "month": r"month|mon|mo|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц",
+    "day": r"day|dy|dom|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
+    "doy": r"doy|jday|julian|day of year|julian day|yday|jd|dayofyear",
+    "hour": r"hour|hours|hr|hrs|hh|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day",
+    "minute": r"minute|minutes|min|mins|minuto|минута|mm",
+    "second": r"seconds?|sec|secs|ss|sekunde|seconde|segundo",
+}
+"""Headings of the parts of a time in columns of their own, wherever these stand."""
+_OR_LEAST = frozenset({"min", "mins", "mm"})
+"""Headings of minutes that may as well be of minima or millimetres."""
+_YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
+_TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
+_SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
+_DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
+_SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
+_MONTH_NAME = re.compile(r"^\s*(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?\s*$", re.IGNORECASE)
+_DECIMAL = re.compile(r"^\s*\d{1,3}\.\d+\s*$")
+_CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$")
+CLOCKS = (
+    "%H:%M:%S%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%I:%M:%S%p", "%I:%M%p", "%I:%M:%S%f %p", "%I:%M:%S%f%p",
+    "%H%M%S", "%H%M", "%H.%M.%S", "%Hh%M", "%H h %M", "%H.%M", "%H",
+)  # fmt: skip
+"""How a time of day may be written."""
+
+
+def choices(
+    layout: Layout, columns: Sequence[Sequence[str]], *, dates: Sequence[int], order: Order | None
+) -> Iterator[TimeChoice]:
+    """Times in several columns.
+
+    Args:
+        columns: the cells of each, with decimal points.
+        dates: columns that hold whole dates.
+        order: of dates written with numbers only, as the user says.
+    """
+    found = _parts(layout, columns) or _unnamed_parts(layout, columns) or _unnamed_ordinal(layout, columns)
+    if found is not None:
+        yield found
+    named = _named(layout, columns)
+    yield from _of_parts(layout, columns, named)
+    yield from _by_heading(layout, columns)
+    yield from _month_by_name(layout, columns)
+    yield from _beside_dates(layout, columns, named, dates, order)
+
+
+_SPELLED = {"y": "%y", "yyyy": "%Y", "yy": "%y", "mm": "%m", "dd": "%d", "hh": "%H", "ss": "%S"}
+
+
+def _by_heading(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[TimeChoice]:
+    """Dates in digits whose heading spells their order, as YYMMDD, with the clock HHMMSS or HHMM in another column."""
+    compact = ["".join(words_of(name)) for name in layout.names]
+    clocks = [at for at, name in enumerate(compact) if re.fullmatch(r"hhmm(ss)?|time|hms", name)]
+    for index, name in enumerate(compact):
+        found = re.fullmatch(r"(?:date)?(yyyy|yy|mm|dd)(yyyy|yy|mm|dd)(yyyy|yy|mm|dd)", name)
+        cells = [cell for cell in columns[index] if cell]
+        if found is None or len({part[0] for part in found.groups()}) < 3 or not cells or not share(_SIX, cells):
+            continue
+        date = "".join(_SPELLED[part] for part in found.groups())
+        for clock in clocks:
+            yield from _read(layout, columns, [index, clock], [f"{date} {form}" for form in CLOCKS], score=2.3)
+
+
+def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[TimeChoice]:
+    """A month's name with day, year and clock in the columns around it, as ctime and date write them."""
+    for index, cells in enumerate(columns):
+        filled = [cell for cell in cells if cell]
+        if not filled or not share(_MONTH_NAME, filled):
+            continue
+        for first, parts in ((index, ("%b", "%d", "clock", "%Y")), (index, ("%b", "%d", "%Y", "clock")),
+                             (index - 1, ("%d", "%b", "%Y", "clock"))):  # fmt: skip
+            taken = list(range(first, first + 4))
+            if first < 0 or taken[-1] >= len(columns) or not share(_YEAR, columns[first + parts.index("%Y")]):
+                continue
+            forms = [" ".join(form if part == "clock" else part for part in parts) for form in CLOCKS[:4]]
+            yield from _read(layout, columns, taken, forms, score=2.2)
+
+
+def hour_alone(layout: Layout, columns: Sequence[Sequence[str]], index: int) -> bool:
+    """Whether a column is the hour of a day and nothing more: its numbers are no minutes, nor hours and minutes."""
+    name = " ".join(words_of(layout.names[index]))
+    if not re.fullmatch(rf"(?:{_WORDS['hour']})( utc| gmt| local| lst)?", name):
+        return False
+    cells = [cell for cell in columns[index] if cell]
+    return share(_TWO_DIGITS, cells) and whole_numbers(cells, 0, 24) and not any(re.match(r"0\d\d", c) for c in cells)
+
+
+def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int]:
+    """The first column of each part of a time by its heading, where its numbers are such."""
+    limits = {
+        "year": (0, 2100), "month": (1, 12), "day": (1, 31), "doy": (1, 367), "hour": (0, 24), "minute": (0, 59),
+        "second": (0, 60),
+    }  # fmt: skip
+    found: dict[str, int] = {}
+    for index, heading in enumerate(layout.names):
+        name = " ".join(words_of(heading))
+        for part, words in _WORDS.items():
+            if name in _OR_LEAST and not _behind_hours(layout, index):
+                continue
+            fitting = part not in found and re.fullmatch(rf"(?:{words})( utc| gmt| local| lst)?", name)
+            if fitting and part == "month" and share(_MONTH_NAME, [cell for cell in columns[index] if cell]):
+                found[part] = index
+                break
+            if fitting and whole_numbers([cell for cell in columns[index] if cell], *limits[part]):
+                found[part] = index
+                break
+    return found
+
+
+def _behind_hours(layout: Layout, index: int) -> bool:
+    """Whether a column called "min" is of minutes: it follows the hours, and no column is of maxima."""
+    names = [" ".join(words_of(name)) for name in layout.names]
+    return index > 0 and bool(re.fullmatch(_WORDS["hour"], names[index - 1])) and "max" not in names
+
+
+def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:
+    """A year with its month and day or day of the year, in any order, and the time of day beside; or that alone."""
+    year = "%Y" if "year" in named and any(len(cell) == 4 for cell in columns[named["year"]]) else "%y"
+    if {"year", "month", "day"} <= set(named):
+        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        date, of_date = f"{year} {month} %d", [named[part] for part in ("year", "month", "day")]
+    elif {"year", "doy"} <= set(named) and year == "%Y":
+        whole = not share(_DECIMAL, columns[named["doy"]])
+        date, of_date = f"%Y {'%j' if whole else '%J'}", [named["year"], named["doy"]]
+        if not whole:
+            yield from _read(layout, columns, of_date, [date], score=2.1)
+            return
+    elif {"hour", "minute"} <= set(named) and not {"year", "month", "doy"} & set(named):
+        clock, of_clock = _clock(columns, named)
+        yield from _read(layout, columns, of_clock, [clock], score=1.0)
+        return
+    else:
+        return
+    clock, of_clock = _clock(columns, named)
+    if clock:
+        yield from _read(layout, columns, [*of_date, *of_clock], [f"{date} {clock}"], score=2.1)
+        return
+    for index, cells in enumerate(columns):
+        filled = [cell for cell in cells if cell]
+        if filled and index not in of_date and share(_CLOCK, filled):
+            forms = [f"{date} {form}" for form in CLOCKS]
+            yield from _read(layout, columns, [*of_date, index], forms, score=2.1)
+    yield from _read(layout, columns, of_date, [date], score=0.9)
+
+
+def _beside_dates(
+    layout: Layout,
+    columns: Sequence[Sequence[str]],
+    named: Mapping[str, int],
+    dates: Sequence[int],
+    order: Order | None,
+) -> Iterator[TimeChoice]:
+    """A whole date in one column, and the hour, with minute and second or with its fraction, in others."""
+    clock, of_clock = _clock(columns, named)
+    if not of_clock:
+        return
+    for index in dates:
+        if not clock:
+            cell = next(filter(None, columns[of_clock[0]]))
+            yield TimeChoice(
+                columns=(index, *of_clock), form=None, zone=None, zoned=False, score=2.2,
+                doubt=f"hours as {cell!r} may be hours and minutes, or hours with a fraction",
+                fix='say which by --columns: "date,hour[%H.%M],wind_speed[m/s]" for minutes, hour[%Q] for a fraction',
+            )  # fmt: skip
+            continue
+        try:
+            forms = date_forms(layout, index, order)
+        except TimeError as error:
+            yield TimeChoice(
+                columns=(index, *of_clock), form=None, zone=None, zoned=False, score=2.5, doubt=error.what,
+                fix=error.fix,
+            )  # fmt: skip
+            continue
+        yield from _read(layout, columns, [index, *of_clock], [f"{form} {clock}" for form in forms], score=2.2)
+
+
+def _clock(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> tuple[str, list[int]]:
+    """The format of the time of day in columns of its parts, and these; "" where there is no hour."""
+    if "hour" not in named:
+        return "", []
+    hours = columns[named["hour"]]
+    if share(_DECIMAL, [cell for cell in hours if cell]):
+        return _pointed(hours), [named["hour"]]
+    if not share(_TWO_DIGITS, [cell for cell in hours if cell]):
+        return "", []
+    form, taken = "%H", [named["hour"]]
+    for part, directive in (("minute", "%M"), ("second", "%S%f")):
+        if part not in named:
+            break
+        form, taken = f"{form} {directive}", [*taken, named[part]]
+    return form, taken
+
+
+def _pointed(cells: Sequence[str]) -> str:
+    """Whether hours with a point are hours and minutes (9.30 is half past nine) or with a fraction (9.50 is).
+
+    Where all could be minutes, it is what makes the rows more even; "" where that does not tell either.
+    """
+    parts = [cell.split(".") for cell in cells if cell]
+    if any(len(part) != 2 or len(part[1]) != 2 or int(part[1]) > 59 for part in parts):
+        return "%Q"
+    minutes = {int(hour) * 60 + int(rest) for hour, rest in parts}
+    decimals = {round(float(f"{hour}.{rest}") * 60) for hour, rest in parts}
+    uneven = [len(set(np.diff(sorted(kind)).tolist())) for kind in (minutes, decimals)]
+    return "" if uneven[0] == uneven[1] else "%H.%M" if uneven[0] < uneven[1] else "%Q"
+
+
+def _read(
+    layout: Layout, columns: Sequence[Sequence[str]], taken: Sequence[int], forms: Sequence[str], *, score: float
+) -> Iterator[TimeChoice]:
+    """The time in these columns by the first of the formats that reads it."""
+    texts = [" ".join(cells) for cells in zip(*(columns[index] for index in taken), strict=True) if all(cells)]
+    for form in forms:
+        alone = counted.is_time_of_day(form)
+        found = counted.parse(texts, form) if alone else parse_with_bare_dates(texts, form)[0]
+        if fits(found):
+            yield time_choice(layout, tuple(taken), form, found, score)
+            return
+
+
+def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ...]:
+    """The formats in which the dates of a column may be written.
+
+    Raises:
+        TimeError: their numbers may be day and month, or month and day.
+    """
+    named = ("%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
+    try:
+        numbered = decide(layout.column(index), told=order or order_of(layout.names[index]), where="").directives()
+    except TimeError as error:
+        if "may be" in error.what:
+            raise
+        return named
+    return (*named, numbered)
+
+
+def order_of(heading: str) -> Order | None:
+    """The order of a date that its heading spells, as "DATE (MM/DD/YYYY)"."""
+    found = re.search(r"\b(?P<first>dd?|mm?|yyyy)[-/. ](?P<second>mm?|dd?)[-/. ](?:y|dd?\b)", heading.lower())
+    if found is None:
+        return None
+    known: dict[str, Order] = {"dm": "dmy", "md": "mdy", "ym": "ymd"}
+    return known.get(found["first"][0] + found["second"][0])
+
+
+def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
+    names = [" ".join(words_of(name)) for name in layout.names]
+    for index, name in enumerate(names):
+        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not whole_numbers(
+            columns[index], 1990, 2100
+        ):
+            continue
+        taken, form = [index], "%Y"
+        at = index + 1
+        if at < len(names) and re.fullmatch(r"doy|jday|julian|jd|day of year|j day|julian day|yday", names[at]):
+            if _part_at(names, columns, at + 1, _PARTS[0]) and _part_at(names, columns, at + 2, _PARTS[1]):
+                at += 1
+            else:
+                taken, form, at = [index, at], "%Y %j", at + 1
+        for part in _PARTS if form == "%Y" else _PARTS[2:]:
+            if not _part_at(names, columns, at, part):
+                break
+            taken, form, at = [*taken, at], f"{form} {part[0]}", at + 1
+        clock = [cell for cell in columns[at] if cell] if at < len(names) else []
+        beside = names[at] if at < len(names) else ""
+        if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and share(_DIGITS, clock):
+            taken, form = [*taken, at], f"{form} %H%M"
+        elif form == "%Y %m %d" and clock and share(_CLOCK, clock):
+            known = next((found for found in CLOCKS if fits(counted.parse(clock, found))), None)
+            taken, form = [*taken, at], f"{form} {known}" if known else form
+        if ("%H" not in form and "%I" not in form) or ("%d" not in form and "%j" not in form):
+            continue
+        texts = [" ".join(cells) for cells in zip(*(columns[i] for i in taken), strict=True)]
+        found, _ = parse_with_bare_dates(texts, form)
+        if fits(found):
+            return time_choice(layout, tuple(taken), form, found, 2.2)
+    return None
+
+
+def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, month, day, hour, minute and second side by side where no line names the columns.
+
+    Whole numbers that are a year, a month, a day, an hour and a minute and rise from row to row are nothing else; what
+    follows is a second only where it is written or moves as one, since a speed looks much the same.
+    """
+    if any(layout.names):
+        return None
+    for index, cells in enumerate(columns):
+        if not share(_YEAR, cells):
+            continue
+        taken, form = [index], "%Y"
+        for (directive, _, low, high), at in zip(_PARTS[:4], range(index + 1, len(columns)), strict=False):
+            if not share(_TWO_DIGITS, columns[at]) or not whole_numbers(columns[at], low, high):
+                break
+            taken, form = [*taken, at], f"{form} {directive}"
+        if "%M" not in form:
+            continue
+        after = taken[-1] + 1
+        if after < len(columns) - 1 and _seconds(columns[after], [columns[at] for at in taken]):
+            taken, form = [*taken, after], f"{form} %S%f"
+        texts = [" ".join(row) for row in zip(*(columns[i] for i in taken), strict=True)]
+        found, _ = parse_with_bare_dates(texts, form)
+        if fits(found) and bool(np.all(np.diff(found.ns[found.valid]) >= 0)):
+            return replace(time_choice(layout, tuple(taken), form, found, 2.2), unnamed=True)
+    return None
+
+
+def _unnamed_ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, day of the year and a clock of one number side by side, as arrays of Campbell's older loggers have them.
+
+    They are told by their numbers alone: the clock has no minutes above 59, and the rows rise.
+    """
+    if any(layout.names):
+        return None
+    for index in range(len(columns) - 2):
+        year, day, clock = columns[index : index + 3]
+        if not share(_YEAR, year) or not share(_DIGITS, clock) or not whole_numbers(day, 1, 366):
+            continue
+        if not whole_numbers(clock, 0, 2400) or any(int(cell) % 100 > 59 for cell in clock if cell.isdigit()):
+            continue
+        texts = [" ".join(row) for row in zip(year, day, clock, strict=True)]
+        found, _ = parse_with_bare_dates(texts, "%Y %j %H%M")
+        rising = np.diff(found.ns[found.valid])
+        if fits(found) and len(rising) and bool(np.all(rising >= 0)) and bool(np.any(rising > 0)):
+            choice = time_choice(layout, (index, index + 1, index + 2), "%Y %j %H%M", found, 2.2)
+            return replace(choice, unnamed=True)
+    return None
+
+
+def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
+    """Whether a column behind that of the minutes, which nothing names, is of the seconds."""
+    if not share(_SECONDS_OF_MINUTE, cells) or not whole_numbers([cell.split(".")[0] for cell in cells], 0, 59):
+        return False
+    padded = any(len(cell) > 1 and cell[0] == "0" for column in before for cell in column)
+    if padded and any(len(cell.split(".")[0]) < 2 for cell in cells):
+        return False  # all of the date is written in two digits, this is not
+    if any(re.match(r"0\d", cell) for cell in cells):
+        return True
+    stamps = list(zip(*before, strict=True))
+    same = np.array([one == other for one, other in itertools.pairwise(stamps)], dtype=bool)
+    steps = np.diff(numbers(cells).value)
+    if same.any():
+        return bool(np.all(steps[same] > 0))
+    # Rows minutes apart: the second of a steady clock stays or drifts, a speed does not.
+    return padded and len(steps) > 2 and bool(np.all(np.abs(steps) <= 2))
+
+
+def _part_at(names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]) -> bool:
+    if at >= len(names):
+        return False
+    return bool(re.fullmatch(rf"({part[1]})( utc)?", names[at])) and whole_numbers(columns[at], part[2], part[3])

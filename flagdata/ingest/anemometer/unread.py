@@ -1,0 +1,55 @@
+"""Columns that may be the direction of a wind which was read without one: told, with the line that reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flagdata.ingest.anemometer import stated_columns
+from flagdata.ingest.anemometer.angles import may_be_direction
+from flagdata.ingest.anemometer.headings import words_of
+from flagdata.ingest.anemometer.instruments import COMPONENTS, Wind
+from flagdata.ingest.anemometer.layout import Layout
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+
+_FROM_NORTH = frozenset({"twd", "gwd"})
+"""Directions that instruments of boats compute, from whichever north their compass is set to."""
+
+
+def from_either_north(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> tuple[str, ...]:
+    """A remark for each direction that may be from true or from magnetic north."""
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        if not set(words_of(name)) & _FROM_NORTH:
+            continue
+        what = f"column {name!r} may be from true or magnetic north: left out"
+        if time is not None and winds:
+            line = stated_columns.read_also(layout, time, winds[0], index)
+            what += f'; if from true north: --columns "{line}", else with wind_direction_magnetic for wind_direction'
+        found.append(what)
+    return tuple(found)
+
+
+def directions(
+    layout: Layout, time: TimeChoice | None, wind: Wind, winds: Sequence[Wind], remarks: Sequence[str]
+) -> tuple[str, ...]:
+    """A remark for each column that may be the direction of a wind which has none.
+
+    Args:
+        wind: the one that is read.
+        winds: all of the table.
+        remarks: what was said of columns already.
+    """
+    if time is None or not wind.sure:
+        return ()
+    told = [name for name in wind.columns if not name.startswith("apparent")]
+    if any(name.endswith(("direction", "magnetic")) or name in COMPONENTS for name in told):
+        return ()
+    taken = {*time.columns, *(column.index for one in (wind, *winds) for column in one.columns.values())}
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        if index in taken or any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
+            continue
+        line = stated_columns.read_also(layout, time, wind, index)
+        called = repr(name) if name else f"number {index + 1}"
+        found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
+    return tuple(found)

@@ -1,0 +1,79 @@
+"""Points of the compass in the letters and words of several languages: read right, or asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata import compass
+from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.signals import WindLog
+
+Write = Callable[[str], Path]
+
+
+def _log(log_file: Write, heading: str, points: list[str], **options: str) -> WindLog:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z;3.{at % 10};{points[at % len(points)]}\n" for at in range(30))
+    return read_log(log_file(f"Time;Wind Speed (m/s);{heading}\n{rows}"), WindOptions(**options))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("heading", "points", "degrees"),
+    [
+        ("Wind Direction", ["N", "ENE", "SW"], [0, 67.5, 225]),
+        ("Wind direction", ["South", "North-East", "west southwest"], [180, 45, 247.5]),
+        ("Dirección del viento", ["O", "SO", "NNO"], [270, 225, 337.5]),
+        ("Windrichtung", ["O", "SO", "NNO"], [90, 135, 22.5]),
+        ("Wind", ["Ost", "Südwest", "Nord"], [90, 225, 0]),
+        ("Wind", ["OSO", "WSW", "NO"], [112.5, 247.5, 45]),
+        ("Wind", ["OSO", "E", "NE"], [247.5, 90, 45]),
+        ("Wind direction", ["Noroeste", "Sur", "Estenoreste"], [315, 180, 67.5]),
+        ("Direction du vent", ["Nord-Ouest", "Est", "Sud-Sud-Est"], [315, 90, 157.5]),
+        ("Windrichting", ["ZW", "NO", "ZZO"], [225, 45, 157.5]),
+        ("Wind direction", ["SV", "NØ", "VSV"], [225, 45, 247.5]),
+        ("Wind direction", ["KKB", "D", "GB"], [337.5, 90, 225]),
+        ("Wind direction", ["СЗ", "В", "ЮЮВ"], [315, 90, 157.5]),
+        ("風向", ["南西", "北", "東北東"], [225, 0, 67.5]),
+    ],
+)  # fmt: skip
+def test_points_of_the_compass_are_read_in_the_language_that_they_are_in(
+    log_file: Write, heading: str, points: list[str], degrees: list[float]
+) -> None:
+    log = _log(log_file, heading, points)
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"][:3]), degrees)
+
+
+def test_an_o_that_may_be_east_or_west_is_left_out_and_asked_for(log_file: Write) -> None:
+    log = _log(log_file, "Direction", ["O", "SO", "N"])
+    assert "wind_direction" not in log.series.channels
+    said = " ".join(finding.what for finding in log.findings)
+    assert "east or west" in said
+    line = "Time=time,Wind Speed (m/s)=wind_speed[m/s],Direction=wind_direction[points-de]"
+    assert np.rad2deg(_log(log_file, "Direction", ["O"], columns=line).series.channels["wind_direction"][0]) == 90
+
+
+@pytest.mark.parametrize("word", ["calm", "VRB", "cv", "Windstille"])
+def test_calm_and_variable_wind_have_no_direction(log_file: Write, word: str) -> None:
+    direction = _log(log_file, "Wind Direction", ["N", word, "SW"]).series.channels["wind_direction"]
+    assert np.isnan(direction[1])
+    assert direction[0] == 0.0
+
+
+def test_an_angle_that_is_not_clockwise_from_north_is_no_direction_of_the_wind(log_file: Write) -> None:
+    log = _log(log_file, "wind angle (deg ccw from east)", ["12", "48", "300"])
+    assert "wind_direction" not in log.series.channels
+    assert any("ccw" in finding.what for finding in log.findings)
+
+
+@pytest.mark.parametrize("heading", ["wind_deg", "WindAngle", "Wind Angle", "wind angle (deg)"])
+def test_degrees_of_the_wind_are_its_direction(log_file: Write, heading: str) -> None:
+    log = _log(log_file, heading, ["12", "48", "300"])
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"][:3]), [12, 48, 300])
+
+
+@pytest.mark.parametrize("unit", list(compass.BY_UNIT))
+def test_every_table_of_points_has_sixteen_directions(unit: str) -> None:
+    assert sorted(set(compass.BY_UNIT[unit].values())) == [22.5 * at for at in range(16)]

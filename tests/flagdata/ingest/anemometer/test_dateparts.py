@@ -1,0 +1,134 @@
+"""Times in several columns: what their headings and numbers say is what is read."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, TimeError
+from flagdata.ingest.anemometer import WindOptions, read_log
+
+Write = Callable[[str], Path]
+_HOUR = np.timedelta64(1, "h")
+
+
+def _times(path: object, **options: object) -> np.ndarray:
+    return read_log(path, WindOptions(**options)).series.time.astype("datetime64[ns]")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["hour", "Hour", "HH", "Hora", "Stunde", "hour (UTC)"])
+def test_an_hour_beside_a_date_is_an_hour_and_no_minute(log_file: Write, name: str) -> None:
+    rows = "".join(f"2026-05-01,{at},{3 + at % 2}.5\n" for at in range(12))
+    time = _times(log_file(f"date,{name},wind speed (m/s)\n{rows}"), **({} if "UTC" in name else {"zone": "UTC"}))
+    assert time[0] == np.datetime64("2026-05-01T00:00")
+    assert np.all(np.diff(time) == _HOUR)
+
+
+def test_the_hour_24_is_the_midnight_that_ends_the_day(log_file: Write) -> None:
+    rows = "".join(f"202605{1 + at // 24:02d},{at % 24 + 1},{3 + at % 2}.5\n" for at in range(48))
+    time = _times(log_file(f"YYYYMMDD,HH,wind speed (m/s)\n{rows}"), zone="UTC")
+    assert len(time) == 48
+    assert time[23] == np.datetime64("2026-05-02T00:00")
+    assert np.all(np.diff(time) == _HOUR)
+
+
+@pytest.mark.parametrize(
+    "heading", ["day month year hour minute", "Vuosi Kuukausi Päivä Tunti min", "minute hour day month year"]
+)
+def test_parts_of_a_date_are_read_in_whatever_order_their_headings_say(log_file: Write, heading: str) -> None:
+    own = {"day": 1, "Päivä": 1, "month": 5, "Kuukausi": 5, "year": 2026, "Vuosi": 2026, "hour": 7, "Tunti": 7}
+    words = heading.split()
+    rows = "".join(" ".join(str(own.get(word, at)) for word in words) + f" {3 + at % 2}.5\n" for at in range(30))
+    time = _times(log_file(f"{heading} windspeed\n{rows}"), zone="UTC", unit="m/s")
+    assert time[0] == np.datetime64("2026-05-01T07:00")
+    assert time[-1] == np.datetime64("2026-05-01T07:29")
+
+
+def test_an_hour_with_its_fraction_is_that_hour_to_the_digits_written(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01,{at / 6:.4f},{3 + at % 2}.5\n" for at in range(30))
+    time = _times(log_file(f"Date,Hour,wind speed (m/s)\n{rows}"), zone="UTC")
+    assert np.all(np.diff(time) == np.timedelta64(10, "m"))
+
+
+def test_a_day_of_the_year_with_its_fraction_begins_with_one_at_new_year(log_file: Write) -> None:
+    rows = "".join(f"2026 {1 + at / 144:.5f} {3 + at % 2}.5\n" for at in range(30))
+    time = _times(log_file(f"Year DOY wspd\n{rows}"), zone="UTC", unit="m/s")
+    assert time[0] == np.datetime64("2026-01-01T00:00")
+    assert np.all(np.diff(time) == np.timedelta64(10, "m"))
+
+
+def test_parts_of_a_time_of_day_alone_ask_for_the_day(log_file: Write) -> None:
+    rows = "".join(f"7,{at},0,{3 + at % 2}.5\n" for at in range(30))
+    path = log_file(f"hh,mm,ss,wind speed (m/s)\n{rows}")
+    with pytest.raises(TimeError, match="without a date"):
+        _times(path, zone="UTC")
+    assert _times(path, zone="UTC", date=dt.date(2026, 5, 1))[1] == np.datetime64("2026-05-01T07:01")
+
+
+@pytest.mark.parametrize("clock", ["{:d}h{:02d}", "{:d} h {:02d}", "{:d}:{:02d}"])
+def test_a_clock_with_an_h_between_is_a_clock(log_file: Write, clock: str) -> None:
+    rows = "".join(f"14/05/2026;{clock.format(9, at)};3,{at}\n" for at in range(9))
+    time = _times(log_file(f"Date;Heure;Vitesse du vent (km/h)\n{rows}"), zone="UTC")
+    assert time[0] == np.datetime64("2026-05-14T09:00")
+
+
+def test_a_minimum_behind_the_hour_is_no_minute(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01,{at},{2 + at % 3},{9 + at % 3},{5 + at % 3}.5\n" for at in range(12))
+    time = _times(log_file(f"date,hour,Min,Max,wind speed (m/s)\n{rows}"), zone="UTC")
+    assert np.all(np.diff(time) == _HOUR)
+
+
+@pytest.mark.parametrize(
+    ("clocks", "minutes"), [(["9.00", "9.30", "10.00", "10.30"], 30), (["9.00", "9.50", "10.00", "10.50"], 30),
+                            (["9.00", "9.25", "9.50", "9.75"], 15)],
+)  # fmt: skip
+def test_hours_with_a_point_are_minutes_or_fractions_as_makes_them_even(
+    log_file: Write, clocks: list[str], minutes: int
+) -> None:
+    rows = "".join(f"2026-05-01;{clock};3.5\n" for clock in clocks)
+    time = _times(log_file(f"date;hour;wind speed (m/s)\n{rows}"), zone="UTC")
+    assert np.all(np.diff(time) == np.timedelta64(minutes, "m"))
+
+
+def test_hours_with_a_point_that_may_be_either_are_asked_about(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01;9.{at}0;3.5\n" for at in range(1, 5))
+    path = log_file(f"date;hour;wind speed (m/s)\n{rows}")
+    with pytest.raises(InputError, match="fraction"):
+        _times(path, zone="UTC")
+    for form, minutes in (("%H.%M", 10), ("%Q", 6)):
+        time = _times(path, zone="UTC", columns=f"date,hour[{form}],wind_speed[m/s]")
+        assert np.all(np.diff(time) == np.timedelta64(minutes, "m"))
+
+
+@pytest.mark.parametrize(
+    ("heading", "row"),
+    [
+        ("YEAR MO DY HR MN wspd", "2026 05 14 7 {at:02d} 3.5"),
+        ("Day Mon Year Time wspd", "14 May 2026 07:{at:02d} 3.5"),
+        ("# dow mon day clock year wspd", "Thu May 14 07:{at:02d}:00 2026 3.5"),
+    ],
+)  # fmt: skip
+def test_months_by_number_or_name_are_parts_of_the_date(log_file: Write, heading: str, row: str) -> None:
+    rows = "".join(row.format(at=at) + "\n" for at in range(12))
+    time = _times(log_file(f"{heading}\n{rows}"), zone="UTC", unit="m/s")
+    assert time[1] == np.datetime64("2026-05-14T07:01")
+
+
+def test_the_abbreviation_in_a_heading_is_the_zone_of_its_stamps(log_file: Write) -> None:
+    rows = "".join(f"20260514:07{at:02d},3.5\n" for at in range(12))
+    time = _times(log_file(f"Date(NZST),Speed(m/s)\n{rows}"))
+    assert time[0] == np.datetime64("2026-05-13T19:00")
+
+
+def test_a_year_a_day_of_it_and_a_clock_that_nothing_names_are_offered_as_such(log_file: Write) -> None:
+    rows = "".join(f"110,2026,121,{7 * 100 + at},3.{at % 10},240.1\n" for at in range(12))
+    path = log_file(rows)
+    with pytest.raises(InputError) as caught:
+        _times(path)
+    assert ",year,day_of_year,time[%H%M]," in (caught.value.fix or "")
+    time = _times(path, zone="UTC", columns=",year,day_of_year,time[%H%M],wind_speed[m/s],wind_direction[deg]")
+    assert time[0] == np.datetime64("2026-05-01T07:00")
