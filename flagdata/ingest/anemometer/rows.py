@@ -39,7 +39,7 @@ class RowReader:
         self._malformed: list[int] = []
         self._read = 0
         self._last_malformed = False
-        head = source.head(layout.preamble + layout.header)
+        head = source.head(layout.preamble + layout.header + 1)
         if len(head) < layout.preamble + layout.header:
             raise InputError(
                 f"the file ends in line {len(head)}, before its header does", where=str(source.path),
@@ -51,7 +51,9 @@ class RowReader:
         if layout.header:
             names = head[layout.preamble].lstrip("\ufeff")
             self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
-            while len(self.header) > 1 and not self.header[-1]:
+            row = _cut(head[layout.preamble + layout.header :], layout.delimiter)
+            used = max((at for at, cell in enumerate(row[0], start=1) if cell.strip()), default=0) if row else 0
+            while len(self.header) > max(1, used) and not self.header[-1]:
                 self.header.pop()
 
     def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:

@@ -124,6 +124,9 @@ TABLES: dict[str, Table] = {
     ),
     "trailing-tabs": Table(text="Time\tWindspeed [m/s]\t\t\n" + rows(T + "\t{v}\t\t")),
     "trailing-tabs-of-rows": Table(text="Time\tWindspeed [m/s]\n" + rows(T + "\t{v}\t\t")),
+    "unnamed-columns-at-the-end": Table(
+        text="Time,Windspeed [m/s],Temp [°C],Battery [V],Power [W],,,\n" + rows(T + ",{v},20,12.6,1,,,{v}")
+    ),
     "pandas-index": Table(text=",time,wind_mps\n" + rows("{i}," + T + ",{v}")),
     "r-row-names": Table(text='"time" "ws_ms" "wd"\n' + rows('"{n}" "{t:%Y-%m-%dT%H:%M:%S}" {v} {d}')),
     "r-mangled": Table(text="Date.Time,Wind.Speed..m.s.,Temp...C.\n" + rows(T + ",{v},20")),

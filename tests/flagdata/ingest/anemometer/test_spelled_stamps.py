@@ -84,6 +84,13 @@ def test_a_date_divided_by_blanks_is_a_date(log_file: Write, date: str, first: s
     assert _first(log_file(f"Date/Time,Wind speed (m/s)\n{rows}"), zone="UTC") == np.datetime64(f"{first}T10:00")
 
 
+def test_commas_divide_rows_without_names_whose_dates_and_hours_hold_blanks(log_file: Write) -> None:
+    path = log_file("".join(f"2026 03 14 {at:02d},{3 + at % 5}.5,\n" for at in range(12)))
+    log = read_log(path, WindOptions(columns="time[%Y %m %d %H],wind_speed[m/s]", zone="UTC"))
+    assert log.series.time.astype("datetime64[ns]")[-1] == np.datetime64("2026-03-14T11:00")
+    assert log.series.channels["wind_speed"][1] == 4.5
+
+
 def test_cells_behind_a_stamp_and_a_blank_are_offered_as_columns(log_file: Write) -> None:
     path = log_file("".join(f"2026-03-14T10:00:{at:02d}Z {3 + at % 5}.5;{200 + at};+21\n" for at in range(12)))
     log = read_log(path, WindOptions(columns="time,wind_speed[m/s],wind_direction[deg],"))
