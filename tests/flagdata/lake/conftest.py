@@ -62,6 +62,7 @@ class Worker:
             time.sleep(0.005)
 
     def kill(self) -> None:
+        assert "failed" not in self.lines()  # its traceback is among what was captured
         os.kill(int(self.lines()[0]), signal.SIGKILL)
         with self.said.open("a") as file:
             file.write("\nkilled\n")

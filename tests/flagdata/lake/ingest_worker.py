@@ -11,6 +11,7 @@ COUNT are its own. Records and folders take turns.
 import os
 import signal
 import sys
+import traceback
 from hashlib import sha256
 from pathlib import Path
 
@@ -60,6 +61,8 @@ def serve(lake: Lake) -> None:
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
                 ingest(lake, prefix, int(count), int(shared), said)
                 status = 0
+            except BaseException:  # noqa: BLE001 — the worker ends here whatever happened
+                traceback.print_exc()  # os._exit says nothing of what ended the worker
             finally:
                 os.write(said, b"done\n" if status == 0 else b"failed\n")
                 os._exit(status)
