@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +18,8 @@ from flagdata.provenance import file_hash
 
 STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 _READ_ONLY = 0o444
+_ATTEMPTS = 5
+"""How often an object is moved to its place while other writers publish the same one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +124,8 @@ class Objects:
         """Move `staged`, whose name was computed by `name_of`, to its place; durable when it returns.
 
         An object of that name that is there and whole is kept and `staged` removed; one that does not hash to its
-        name is replaced, so that ingesting again heals a damaged lake.
+        name is replaced, so that ingesting again heals a damaged lake. So it is with one that another writer publishes
+        in the same moment.
         """
         os.utime(staged)  # age counts from here
         for entry in files_of(staged):
@@ -131,15 +136,21 @@ class Objects:
                 flush_folder(folder)
         target = self.path(name)
         target.parent.mkdir(exist_ok=True)
-        if target.exists():
-            if self.is_whole(name):
-                os.utime(target)
-                self.remove(staged)
-                return
-            if target.is_dir():
-                damaged = staged.with_name(f"damaged-{target.name}")
-                target.rename(damaged)
-        staged.rename(target)
+        for attempt in range(_ATTEMPTS):
+            if target.exists():
+                if self.is_whole(name):
+                    os.utime(target)
+                    self.remove(staged)
+                    return
+                if target.is_dir():
+                    with suppress(FileNotFoundError):  # another writer has moved it away
+                        target.rename(staged.with_name(f"damaged-{attempt}-{target.name}"))
+            try:
+                staged.rename(target)
+                break
+            except OSError as error:  # another writer was faster: look at what it has left there
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or attempt == _ATTEMPTS - 1:
+                    raise
         flush_folder(target.parent)
 
     def is_whole(self, name: str) -> bool:

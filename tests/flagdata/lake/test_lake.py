@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from pathlib import Path
 
 import pytest
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.health import doctor, object_names, verify
 from flagdata.schema import Kind, catalog_schema
 
 Put = Callable[..., Artifact]
@@ -156,3 +160,27 @@ def test_threads_that_share_a_lake_lose_no_row_and_repeat_none(lake: Lake, put_t
         ids = {artifact.id for artifact in pool.map(lambda text: put_text(lake, text), texts)}
     assert len(ids) == 12
     assert sorted(lake.rows()["artifact"].to_pylist()) == sorted(ids)
+
+
+def test_a_folder_that_another_writer_publishes_in_the_same_moment_is_kept_once(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rename = Path.rename
+    raced: list[Path] = []
+
+    def after_the_other(path: Path, target: Path) -> Path:
+        if target.parent.name == "zarr" and not raced:
+            raced.append(target)
+            shutil.copytree(path, target)
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", after_the_other)
+    with lake.transaction("ingest a folder") as tx:
+        staged = tx.staging(".zarr")
+        (staged / "time").mkdir(parents=True)
+        (staged / "time" / "0").write_bytes(b"one")
+        name = tx.put(staged)
+        tx.add(Artifact(kind=Kind.WIND, name="a folder", object=name, source_hash="0" * 64))
+    assert raced == [lake.object_path(name)]
+    assert verify(lake, object_names(lake)) == ()
+    assert doctor(lake, grace=timedelta(0)) == ()
