@@ -109,6 +109,13 @@ class PairTable:
         taken["parameters"] = taken["parameters"][:, known]
         return replace(self, **taken, objects=self.objects[used], names=self.names[known])
 
+    def parameter_columns(
+        self, rows: NDArray[np.int64] | Sequence[int] | slice = slice(None)
+    ) -> dict[str, NDArray[np.float64]]:
+        """Name → (n,) values of some pairs, by default of all; NaN where a clip has no such parameter."""
+        chosen = self.parameters[rows]
+        return {str(name): chosen[:, k] for k, name in enumerate(self.names)}
+
     def parameters_of(self, index: int) -> dict[str, float]:
         """The parameters that pair `index` has."""
         values = self.parameters[index]

@@ -106,7 +106,7 @@ def errors(model: Estimator, pairs: Pairs, *, seed: int = 0, advance: Callable[[
         if advance is not None:
             advance(1)
     draws = np.array(logits)  # (film, 2, draw, target)
-    parameters = {str(name): table.parameters[chosen, k] for k, name in enumerate(table.names)}
+    parameters = table.parameter_columns(chosen)
     known = scaling.learned(torch.from_numpy(truth(parameters, scaling.names))).double().numpy()
     centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
     found = errors_of((draws - centre) / spread, (known - centre) / spread, scaling.quantities)

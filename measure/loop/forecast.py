@@ -305,6 +305,11 @@ class Forecaster:
         """(vertex, marker): markers onto vertices."""
         return self._real(onto(self.markers, self.specimen.mesh.rest))
 
+    @cached_property
+    def double(self) -> Forecaster:
+        """The same in double precision."""
+        return replace(self, dtype=torch.float64)
+
     def _real(self, values: Floats) -> Tensor:
         return torch.tensor(values, dtype=self.dtype, device=self.device)
 
@@ -404,10 +409,11 @@ class Forecaster:
         steps = [place for place, one in enumerate(wanted) if not isinstance(one, WrittenColumn)]
         exact = [place for place in steps if self.dtype != torch.float64 and _name(wanted[place]) in DOUBLE]
         plain = [place for place in steps if place not in exact]
-        double = replace(self, dtype=torch.float64)
         found = dict(zip(plain, self._stepped([wanted[p] for p in plain], segments, calibrations, base), strict=True))
         if exact:
-            found |= zip(exact, double._stepped([wanted[p] for p in exact], segments, calibrations, None), strict=True)
+            found |= zip(
+                exact, self.double._stepped([wanted[p] for p in exact], segments, calibrations, None), strict=True
+            )
         return [
             self._written(one, segments) if isinstance(one, WrittenColumn) else found[place].to(base)
             for place, one in enumerate(wanted)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError
@@ -171,7 +170,7 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
 
 def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
     if any(column.name in DOUBLE for column, _ in model.effects):
-        forecaster = replace(forecaster, dtype=torch.float64)
+        forecaster = forecaster.double
     sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
     steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)

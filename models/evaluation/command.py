@@ -205,10 +205,11 @@ class _Desk:
     def _triplets(self, chosen: Sequence[Estimator], frames: Sequence[int], side: str) -> list[FramesPoint]:
         """Triplet accuracies of the networks on maps, by label, for clips of so many frames."""
         from models.evaluation.embeddings import takes_any_length, triplet_accuracies
-        from models.training.inputs import prepare_films
+        from models.training.inputs import film_rows, prepare_films
 
         def films(front_end: FrontEnd, cropping: Cropping) -> Prepared:
-            with progress(len(self._side(side)), f"prepare {front_end.frames} frames of {side}", "film") as advance:
+            count = len(film_rows(self._side(side), sequences=None, seed=0))
+            with progress(count, f"prepare {front_end.frames} frames of {side}", "film") as advance:
                 return prepare_films(
                     self._side(side), front_end, cropping, variants=1, folder=self._cache, workers=self._workers,
                     advance=advance,
@@ -227,9 +228,7 @@ class _Desk:
     def _reads(self, told: Sequence[Predictions], side: str, data: str) -> list[Read]:
         from models.evaluation.embeddings import readouts
 
-        table = self._side(side).table
-        parameters = {str(name): table.parameters[:, column] for column, name in enumerate(table.names)}
-        return readouts(told, parameters, data=data, seed=self._seed)
+        return readouts(told, self._side(side).table.parameter_columns(), data=data, seed=self._seed)
 
     @property
     def _stated(self) -> str:

@@ -234,11 +234,10 @@ def _prepared(
             f"preparing the inputs failed: {error.strerror or error}", where=str(folder),
             fix="free some space or name another folder by --cache; what was done is kept",
         ) from error  # fmt: skip
-    known = pairs.table.parameters[rows]
     alone = -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
     return Prepared(
         maps=Files(paths=paths, shape=(len(rows), variants, *front_end.shape)),
-        parameters={str(n): known[:, k] for k, n in enumerate(pairs.table.names)},
+        parameters=pairs.table.parameter_columns(rows),
         sequence=np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone),
         fingerprint=digest("\n".join([pairs.fingerprint, *named])), front_end=front_end,
     )  # fmt: skip

@@ -85,8 +85,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _of(pairs: Pairs, quantity: str) -> Array:
-    table = pairs.table
-    known = {str(name): table.parameters[:, k] for k, name in enumerate(table.names)}
+    known = pairs.table.parameter_columns()
     if quantity in known:
         return known[quantity]
     return np.log10(np.stack([known[f"bending.{index}"] for index in range(15)])).mean(axis=0)

@@ -42,7 +42,7 @@ def run(*, seed: int, out: object) -> dict[str, Any]:
     pairs = flagdata.open(path).pairs(at=data["at"], split="test", split_by=split)
     chosen = np.unique(pairs.table.seed, return_index=True)[1][:FILMS].tolist()
     names = tuple(model.learners[0].scaling.names)
-    columns = {str(name): pairs.table.parameters[chosen, k] for k, name in enumerate(pairs.table.names)}
+    columns = pairs.table.parameter_columns(chosen)
     known = truth(columns, names)
     draws: dict[str, list[NDArray[np.float64]]] = {"one window": [], "two windows": []}
     count = model.front_end.frames

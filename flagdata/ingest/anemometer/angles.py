@@ -62,9 +62,17 @@ def in_tens(layout: Layout, index: int) -> bool:
 
 def compass_unit(layout: Layout, index: int) -> str | None:
     """The unit of a column of points of the compass, by the language of its letters; `None` where it holds none."""
-    filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
     headings = " ".join(layout.names)
-    return compass.table_of(filled, heading=f"{layout.names[index]} {headings}", share=1 - _UNREADABLE)
+    return compass.table_of(_filled(layout, index), heading=f"{layout.names[index]} {headings}", share=1 - _UNREADABLE)
+
+
+def may_be_two(layout: Layout, index: int) -> bool:
+    """Whether a column holds points of the compass whose letters mean one direction here and another there."""
+    return compass.may_be_two(_filled(layout, index), share=1 - _UNREADABLE)
+
+
+def _filled(layout: Layout, index: int) -> list[str]:
+    return [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
 
 
 def degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:

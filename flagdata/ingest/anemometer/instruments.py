@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer import unitcheck
-from flagdata.ingest.anemometer.angles import compass_unit, degrees, is_vane, may_be_points
+from flagdata.ingest.anemometer.angles import compass_unit, degrees, is_vane, may_be_points, may_be_two
 from flagdata.ingest.anemometer.axes import along_axes
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
-from flagdata.ingest.anemometer.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.layout import Layout
 from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
@@ -130,8 +130,7 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
                 heading, unit=points, quantity=quantity, channel="" if heading.spread else quantity
             )
         elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
-            filled = [cell for cell in layout.column(index) if cell_kind(cell) != "missing"]
-            if heading.quantity.endswith("direction") and compass.may_be_two(filled, share=1 - _UNREADABLE):
+            if heading.quantity.endswith("direction") and may_be_two(layout, index):
                 fix = (
                     f"say which: --columns, {heading.name}=wind_direction[points-de] (O is east) or [points-es] (west)"
                 )

@@ -43,7 +43,6 @@ _OF_EXTREME = re.compile(
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
 """A date whose numbers are divided by blanks, and a clock."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
-_DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
 
 
