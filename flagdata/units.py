@@ -7,6 +7,7 @@ nowhere else. Factors are exact by definition (BIPM SI Brochure, 9th ed.; intern
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,39 +34,56 @@ class Unit:
         return (np.asarray(value, dtype=np.float64) - self.offset) / self.scale
 
 
-UNITS: dict[str, Unit] = {
-    "m/s": Unit(si="m/s", scale=1.0),
-    "km/h": Unit(si="m/s", scale=1 / 3.6),
-    "kn": Unit(si="m/s", scale=1852 / 3600),
-    "mph": Unit(si="m/s", scale=0.44704),
-    "dm/s": Unit(si="m/s", scale=0.1),
-    "cm/s": Unit(si="m/s", scale=0.01),
-    "ft/s": Unit(si="m/s", scale=0.3048),
-    "ft/min": Unit(si="m/s", scale=0.3048 / 60),
-    "rad": Unit(si="rad", scale=1.0),
-    "deg": Unit(si="rad", scale=math.pi / 180),
-    "sixteenths": Unit(si="rad", scale=math.pi / 8),
-    **{name: Unit(si="rad", scale=math.pi / 180) for name in compass.BY_UNIT},
-    "gon": Unit(si="rad", scale=math.pi / 200),
-    "10 deg": Unit(si="rad", scale=math.pi / 18),
-    "K": Unit(si="K", scale=1.0),
-    "degC": Unit(si="K", scale=1.0, offset=273.15),
-    "degF": Unit(si="K", scale=5 / 9, offset=273.15 - 32 * 5 / 9),
-    "Pa": Unit(si="Pa", scale=1.0),
-    "hPa": Unit(si="Pa", scale=100.0),
-    "kPa": Unit(si="Pa", scale=1000.0),
-    "inHg": Unit(si="Pa", scale=3386.389),
-    "1": Unit(si="1", scale=1.0),
-    "%": Unit(si="1", scale=0.01),
-    "m": Unit(si="m", scale=1.0),
-    "mm": Unit(si="m", scale=1e-3),
-    "cm": Unit(si="m", scale=1e-2),
-    "ft": Unit(si="m", scale=0.3048),
-    "s": Unit(si="s", scale=1.0),
-    "ms": Unit(si="s", scale=1e-3),
-    "Hz": Unit(si="Hz", scale=1.0),
-    "px": Unit(si="px", scale=1.0),
-}
+class _Table(dict[str, Unit]):
+    """Units by name; those of a factor, as "0.1 kn", are made of the unit behind it."""
+
+    def __missing__(self, name: str) -> Unit:
+        factor, _, rest = name.partition(" ")
+        if _FACTOR.fullmatch(name) is None or rest not in self:
+            raise KeyError(name)
+        return Unit(si=self[rest].si, scale=float(factor) * self[rest].scale)
+
+
+_FACTOR = re.compile(r"(?P<factor>(?:0|[1-9]\d*)?\.?\d+(?:e-?\d+)?)\s*[*x]?\s*(?P<unit>[^\d\s*].*)", re.IGNORECASE)
+_TENTHS = ("0.1", "0.01", "0.001")
+"""Factors with which files spell units."""
+
+UNITS: dict[str, Unit] = _Table(
+    {
+        "m/s": Unit(si="m/s", scale=1.0),
+        "km/h": Unit(si="m/s", scale=1 / 3.6),
+        "kn": Unit(si="m/s", scale=1852 / 3600),
+        "mph": Unit(si="m/s", scale=0.44704),
+        "dm/s": Unit(si="m/s", scale=0.1),
+        "cm/s": Unit(si="m/s", scale=0.01),
+        "ft/s": Unit(si="m/s", scale=0.3048),
+        "ft/min": Unit(si="m/s", scale=0.3048 / 60),
+        "rad": Unit(si="rad", scale=1.0),
+        "deg": Unit(si="rad", scale=math.pi / 180),
+        "sixteenths": Unit(si="rad", scale=math.pi / 8),
+        **{name: Unit(si="rad", scale=math.pi / 180) for name in compass.BY_UNIT},
+        "gon": Unit(si="rad", scale=math.pi / 200),
+        "mil": Unit(si="rad", scale=math.pi / 3200),
+        "10 deg": Unit(si="rad", scale=math.pi / 18),
+        "K": Unit(si="K", scale=1.0),
+        "degC": Unit(si="K", scale=1.0, offset=273.15),
+        "degF": Unit(si="K", scale=5 / 9, offset=273.15 - 32 * 5 / 9),
+        "Pa": Unit(si="Pa", scale=1.0),
+        "hPa": Unit(si="Pa", scale=100.0),
+        "kPa": Unit(si="Pa", scale=1000.0),
+        "inHg": Unit(si="Pa", scale=3386.389),
+        "1": Unit(si="1", scale=1.0),
+        "%": Unit(si="1", scale=0.01),
+        "m": Unit(si="m", scale=1.0),
+        "mm": Unit(si="m", scale=1e-3),
+        "cm": Unit(si="m", scale=1e-2),
+        "ft": Unit(si="m", scale=0.3048),
+        "s": Unit(si="s", scale=1.0),
+        "ms": Unit(si="s", scale=1e-3),
+        "Hz": Unit(si="Hz", scale=1.0),
+        "px": Unit(si="px", scale=1.0),
+    }
+)
 
 # Spellings seen in instrument exports, as `_key` reduces them, → the table's name. Beaufort is left out on purpose: it
 # is an interval scale of classes, not a unit.
@@ -82,6 +100,16 @@ SPELLINGS: dict[str, str] = {
     "°": "deg", "ø": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg",
     "degtrue": "deg", "deg_from_north": "deg", "degreesfromnorth": "deg",
     "degreestrue": "deg", "°true": "deg", "degn": "deg", "degreesn": "deg", "°n": "deg", "arcdegrees": "deg",
+    "mils": "mil", "graden": "deg", "grader": "deg", "gradi": "deg", "graus": "deg", "degrés": "deg",
+    "degrees_true": "deg",
+    "knoten": "kn", "knopen": "kn", "nudos": "kn", "nudo": "kn", "nœuds": "kn", "noeuds": "kn", "nœud": "kn",
+    "nodi": "kn",
+    "nós": "kn", "knop": "kn", "knob": "kn", "knuter": "kn", "węzły": "kn", "узлы": "kn", "solmua": "kn",
+    "meter/sekunde": "m/s", "meter/seconde": "m/s", "mètres/seconde": "m/s", "mètre/seconde": "m/s", "m/seg": "m/s",
+    "metros/segundo": "m/s", "metri/secondo": "m/s", "metro/secondo": "m/s", "m/sek": "m/s", "m/sn": "m/s",
+    "м/с": "m/s", "kilometer/stunde": "km/h", "km/std": "km/h", "km/stunde": "km/h", "km/u": "km/h", "km/uur": "km/h",
+    "km/t": "km/h", "km/heure": "km/h", "km/hora": "km/h", "kilomètres/heure": "km/h", "kilómetros/hora": "km/h",
+    "kilometros/hora": "km/h", "chilometri/ora": "km/h", "quilômetros/hora": "km/h", "км/ч": "km/h", "км/час": "km/h",
     "compassdegrees": "deg", "angulardegrees": "deg", "grad": "deg", "grados": "deg", "radian": "rad", "radians": "rad",
     "gons": "gon", "gradian": "gon", "gradians": "gon", "10sdeg": "10 deg", "10deg": "10 deg",
     "10'sdeg": "10 deg", "10°": "10 deg", "tensofdegrees": "10 deg", "tensofdeg": "10 deg",
@@ -111,7 +139,7 @@ def canonical(text: str, *, where: str | None = None) -> str:
     Raises:
         UnknownNameError: with the nearest known spelling.
     """
-    name = spelled(text)
+    name = spelled(text) or _factored(text)
     if name is None:
         raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
     return name
@@ -123,12 +151,27 @@ def spelled(text: str) -> str | None:
     if stripped in UNITS:
         return stripped
     key = _key(stripped)
-    return key if key in UNITS else SPELLINGS.get(key)
+    known = key if key in UNITS else SPELLINGS.get(key)
+    if known is not None:
+        return known
+    name = _factored(stripped)
+    return name if name is not None and name.partition(" ")[0] in _TENTHS else None
+
+
+def _factored(text: str) -> str | None:
+    """The name of a unit with a factor before it, as "0.765 m/s" of what one turn of a cup is; `None` for no such."""
+    match = _FACTOR.fullmatch(text.strip().replace(",", "."))
+    name = None if match is None else spelled(match["unit"])
+    if match is None or name is None or UNITS[name].offset or " " in name or float(match["factor"]) == 0:
+        return None
+    return f"{float(match['factor']):g} {name}"
 
 
 def _key(text: str) -> str:
     """A spelling in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
     key = text.lower().replace("º", "°").replace("⁻", "-").replace("−", "-").replace("¹", "1")
-    key = key.replace("^", "").replace("·", ".").replace("-per-", "/").replace(" per ", "/").replace("(-1)", "-1")
+    key = key.replace("^", "").replace("·", ".").replace("-per-", "/").replace("(-1)", "-1")
+    for per in (" per ", " pro ", " por ", " par ", " al "):
+        key = key.replace(per, "/")
     key = "".join(key.split())
     return "°" + key[1:] if key[:1] == "*" and len(key) > 1 else key

@@ -16,18 +16,18 @@ import numpy as np
 
 from flagdata.ingest.anemometer import counted, stated_columns, stated_rate, unitcheck, unread, zones
 from flagdata.ingest.anemometer.cells import numbers
+from flagdata.ingest.anemometer.codes import NO_ANGLE, below_zero
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
     COMPONENTS,
-    NO_ANGLE,
     Column,
     Wind,
-    beaufort,
     find_winds,
     mixed_units,
     named_wind,
 )
 from flagdata.ingest.anemometer.layout import Layout, lay_out
+from flagdata.ingest.anemometer.no_speeds import beaufort, counts
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.sites import site_of_all, sites
@@ -43,6 +43,12 @@ _STATED = re.compile(
     r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
 )
 """How lines above a heading state a unit."""
+_UNIT_WORD = re.compile(
+    r"(?<![\w/])(?:km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
+    r"(?:kilomet|met)(?:er|re)s? per (?:hour|second)|miles per hour)(?![\w/])",
+    re.IGNORECASE,
+)
+"""Units of speed as a title names them."""
 _BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
 """Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
@@ -168,7 +174,7 @@ def draft(
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
     if columns is None and chosen is not None:
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
-        remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks))
+        remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
@@ -223,6 +229,10 @@ def _doubts(
     if not winds and classes:
         what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
         found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
+    elif not winds and (counted_by := counts(layout)):
+        what = f"column {layout.names[counted_by[0]]!r} is what an anemometer counts or gives, not yet a speed"
+        fix = "say what one of it is in m/s, from the anemometer's data sheet: "
+        found.append(Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, counted_by[0])))
     elif not winds and (directions := _directions(layout)):
         what = f"column {directions[0]!r} is a direction of the wind, but no column is its speed"
         fix = "log the speed beside it; if a column is the speed all the same, or the direction alone is wanted, "
@@ -240,7 +250,7 @@ def _doubts(
     for wind in (chosen,) if chosen is not None else winds:
         missing = wind.without_unit()
         if missing:
-            found.append(_unit_doubt(lines, layout, wind, missing))
+            found.append(_unit_doubt(lines, layout, time, wind, missing))
             break
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
@@ -260,6 +270,7 @@ def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
             continue
         value = numbers(layout.column(column.index), decimal=layout.decimal).value
         known = value[np.isfinite(value) & ~np.isin(value, CODES)]
+        known = known[~below_zero(known)]
         if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
             continue
         what = f"column {wind.label!r} goes below zero, to {known.min():g}: a component of the wind, not its speed"
@@ -283,10 +294,18 @@ def _stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
             name = spelled(match[1])
             if name is not None and unit_of(name).si == "m/s":
                 found.setdefault(name, (name, number, match[0]))
+    if not found:
+        for number, line in enumerate(lines, start=1):
+            for match in _UNIT_WORD.finditer(line):
+                name = spelled(match[0])
+                if name is not None and unit_of(name).si == "m/s":
+                    found.setdefault(name, (name, number, match[0]))
     return next(iter(found.values())) if len(found) == 1 else None
 
 
-def _unit_doubt(lines: Sequence[str], layout: Layout, wind: Wind, missing: Sequence[str]) -> Doubt:
+def _unit_doubt(
+    lines: Sequence[str], layout: Layout, time: TimeChoice | None, wind: Wind, missing: Sequence[str]
+) -> Doubt:
     above = _stated_unit(lines[: layout.preamble])
     if above is not None:
         name, number, words = above
@@ -294,6 +313,10 @@ def _unit_doubt(lines: Sequence[str], layout: Layout, wind: Wind, missing: Seque
         what = f"the unit of column {heading!r} is not stated in its heading; line {number} says {words!r}"
         return Doubt(what=what, fix=f"if that is the unit of the wind, give it: --unit {name}")
     column = wind.columns[missing[0]].index
+    if column in counts(layout):
+        what = f"column {layout.names[column]!r} is what an anemometer counts or gives, not yet a speed"
+        fix = "say what one of it is in m/s, from the anemometer's data sheet: "
+        return Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, column))
     value = numbers(layout.column(column), decimal=layout.decimal).value
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]

@@ -18,7 +18,7 @@ from flagdata.timebase import zone
 from flagdata.units import UNITS, spelled
 
 _WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
-_CAMEL = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöü])|[A-ZÄÖÜ]?[a-zäöüßéèíóá]+|[^\W\d_]+")
+_CAMEL = re.compile(r"[A-ZÀ-ÖØ-Þ]+(?![^\W\d_A-ZÀ-ÖØ-Þ])|[A-ZÀ-ÖØ-Þ]?[^\W\d_A-ZÀ-ÖØ-Þ]+|[^\W\d_]+")
 _BRACKET = re.compile(r"[\[(<{]([^\])>}]*)[\])>}]")
 _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
@@ -48,7 +48,8 @@ _DIRECTION = frozenset(
 _OTHER = frozenset(
     {
         "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "rotor",
-        "rpm", "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
+        "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
+        "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
         "load", "density", "elevation", "vertical", "gyro", "acc", "accel", "course", "heading", "track", "duration",
@@ -82,7 +83,7 @@ _PLAIN = frozenset(
         "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
     }
 )  # fmt: skip
-_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd", "app", "apparente"})
+_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd", "app", "apparente", "bow"})
 _THEORETICAL = frozenset({"tws", "twa", "theoretical"})
 _ABBREVIATED = {
     "aws": "apparent_wind_speed", "awa": "apparent_wind_direction", "awd": "apparent_wind_direction",
@@ -117,6 +118,9 @@ _INSIDE = {
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
 _NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
 """What stands in brackets behind a direction for the north it is from."""
+_TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
+_TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
+"""What a heading says of numbers that are ten or a hundred times the quantity, or a tenth: it is to be asked."""
 _TURNED = re.compile(r"\bccw\b|counter.?clock|anti.?clock|from east|mathemat|\bmath\b", re.IGNORECASE)
 """What a heading says of an angle that is not clockwise from north."""
 _SENSORS = frozenset(
@@ -162,6 +166,9 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english(name[:120].strip().strip('"').strip())
+    text = _TENTHS.sub("0.1 ", text)
+    tenfold = _TENFOLD.search(text)
+    text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
     north = _NORTH_BEHIND.search(text) if re.search(r"dir|bearing|wd", text, re.IGNORECASE) else None
     text = text if north is None else text[: north.start()]
@@ -170,7 +177,9 @@ def understand(name: str, stated: str = "") -> Heading:
     bare = _HEIGHT.sub(" ", rest) if height is not None else rest
     bare, averaged = _INTERVAL.subn(" ", bare.replace("_", " "))
     words = _words(bare)
-    if unit is None:
+    if tenfold is not None:
+        unit = None
+    elif unit is None:
         unit = next((_INSIDE[word] for word in words[1:] or words if word in _INSIDE and word != "deg"), None)
         unit = "deg" if unit is None and "deg" in words[1:] else unit
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
@@ -193,7 +202,8 @@ def understand(name: str, stated: str = "") -> Heading:
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
         magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
         towards=bool(_TOWARDS.search(text.replace("_", " "))),
-        strange=turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
+        strange=tenfold[0].strip() if tenfold is not None
+        else turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
 
 

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata import compass
-from flagdata.ingest.anemometer import unitcheck
+from flagdata.ingest.anemometer import codes, unitcheck
 from flagdata.ingest.anemometer.angles import compass_unit, degrees, is_vane, may_be_points, may_be_two
 from flagdata.ingest.anemometer.axes import along_axes
-from flagdata.ingest.anemometer.cells import Cell, numbers
+from flagdata.ingest.anemometer.cells import Cell, Numbers, numbers
+from flagdata.ingest.anemometer.directions import judge
 from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout
+from flagdata.ingest.anemometer.no_speeds import beaufort
 from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
@@ -24,10 +26,7 @@ _WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pr
 _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
 _POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
-_CLASSES = frozenset({"bft", "beaufort", "bf"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
-NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
-"""Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
 _UNREADABLE = 0.1
 
 
@@ -129,7 +128,7 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
             found.headings[index] = replace(
                 heading, unit=points, quantity=quantity, channel="" if heading.spread else quantity
             )
-        elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE:
+        elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE and not _few_words(found, index, parsed):
             if heading.quantity.endswith("direction") and may_be_two(layout, index):
                 fix = (
                     f"say which: --columns, {heading.name}=wind_direction[points-de] (O is east) or [points-es] (west)"
@@ -146,6 +145,18 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
     return found
+
+
+def _few_words(found: _Found, index: int, parsed: Numbers) -> bool:
+    """Whether a column holds numbers, and a few words that say why there is none; of a wind, that is said."""
+    cells = found.layout.column(index)
+    listed = codes.words(cells, parsed)
+    if listed and "wind" in found.headings[index].quantity:
+        found.warnings.append(
+            f"column {found.headings[index].name!r} holds {', '.join(map(repr, listed))} in some of the first "
+            f"{len(cells)} rows, where others hold numbers: taken for no value"
+        )
+    return bool(listed)
 
 
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
@@ -174,11 +185,6 @@ def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
     cells = sorted({cell for cell in layout.column(index + 1) if cell})
     names = {spelled(cell) for cell in cells[:50]}
     return tuple(cells) if len(names) > 1 and None not in names else ()
-
-
-def beaufort(layout: Layout) -> tuple[str, ...]:
-    """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
-    return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
 
 
 def _day_of_month(layout: Layout, index: int) -> bool:
@@ -382,49 +388,18 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     if _points(found.headings[index]) and len(angles) == 1:
         index = angles[0]  # the same in degrees
     heading, value = found.headings[index], found.values[index]
-    known = value[np.isfinite(value)]
-    if heading.unit is not None and not fits(channel, heading.unit):
+    judged = judge(heading, value, channel)
+    if judged.left_out:
+        found.remarks.append(f"column {heading.name!r} {judged.left_out}")
         return None
-    if heading.strange:
-        found.remarks.append(
-            f"column {heading.name!r} is in {heading.strange!r}, which is no direction clockwise from north: left out"
-        )
+    if judged.unit is None:
         return None
-    if heading.unit == "gon":
-        return channel, Column(index=index, unit="gon", told="in gon by its heading", towards=heading.towards)
-    coded = np.isin(known, NO_ANGLE) | (known <= -999)  # no log writes an angle so
-    known = known[~coded] if not bool(coded.all()) else known
-    if not len(known) or float(known.max()) > 361 or float(known.min()) < -181:
-        found.remarks.append(f"column {heading.name!r} holds no angle: {known.min():g} to {known.max():g}; left out")
-        return None
-    if (
-        heading.unit in (None, "deg")
-        and float(known.max()) <= 16
-        and bool(np.all(known % 1 == 0))
-        and len(np.unique(known)) > 3
-    ):
-        found.remarks.append(
-            f"column {heading.name!r} holds sectors of the compass (0 to {known.max():g}), no angle; left out; if they "
-            f"are the sixteen from north on, counted from 0: --columns, {heading.name}=wind_direction[sixteenths]"
-        )
-        return None
-    if heading.unit is None and float(known.max()) <= 36 and bool(np.all(known % 1 == 0)) and len(np.unique(known)) > 3:
-        found.remarks.append(f"column {heading.name!r} may be in degrees or in tens of degrees: left out")
-        return None
-    if heading.unit is None and float(np.abs(known).max()) <= 6.3:
-        fix = f"{heading.name}={channel}[rad] or {heading.name}={channel}[deg]"
-        found.remarks.append(
-            f"column {heading.name!r} may be in degrees or radians: left out; say which by --columns, {fix}"
-        )
-        return None
+    if judged.doubt:
+        found.warnings.append(f"column {heading.name!r} {judged.doubt}")
     if heading.magnetic and channel == "wind_direction":
         channel = "wind_direction_magnetic"
-    if _points(heading):
-        told = "as points of the compass, 22.5° apart"
-        return channel, Column(index=index, unit=heading.unit, told=told, towards=heading.towards)
-    told = f"in {heading.unit} by its heading" if heading.unit else f"in degrees by its values, up to {known.max():g}"
-    told = f"{told}, to which the wind blows" if heading.towards else told
-    return channel, Column(index=index, unit=heading.unit or "deg", told=told, towards=heading.towards)
+    told = f"{judged.told}, to which the wind blows" if heading.towards else judged.told
+    return channel, Column(index=index, unit=judged.unit, told=told, towards=heading.towards)
 
 
 def _points(heading: Heading) -> bool:

@@ -302,10 +302,29 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     return f'say what the columns are: --columns "{line}" {example} (the first row is {shown(layout)})'
 
 
-def read_also(layout: Layout, time: TimeChoice, wind: Wind, direction: int) -> str:
-    """The line that says what was understood of a table, and that a further column is the wind's direction."""
-    entries = _understood(time, (wind,)) | {direction: f"wind_direction[{unit_of(layout, direction)}]"}
+def read_also(
+    layout: Layout, time: TimeChoice, wind: Wind, direction: int, *, unit_name: str | None = None,
+    channel: str = "wind_direction",
+) -> str:  # fmt: skip
+    """The line that says what was understood of a table, and that a further column is the wind's direction.
+
+    Args:
+        unit_name: of the direction; `None` takes the one its values are likely in.
+        channel: that the direction is.
+    """
+    entries = _understood(time, (wind,)) | {direction: f"{channel}[{unit_name or unit_of(layout, direction)}]"}
     return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
+
+
+def calibrated(layout: Layout, time: TimeChoice | None, column: int) -> str:
+    """The option that reads a column of counts or of a frequency as a speed, by what one of them is in m/s."""
+    known = {at: entry for at, entry in _known(layout, time, ()).items() if "?" not in entry and "speed" not in entry}
+    entries = {**known, column: "wind_speed[? m/s]"}
+    line = ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
+    return (
+        f'--columns "{line}" with what one of them is in m/s in place of the ?, as wind_speed[0.765 m/s]; '
+        "a calibration with an offset is a recipe's gain and offset"
+    )
 
 
 def _understood(time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import counted, possible, unitcheck, zones
+from flagdata.ingest.anemometer import codes, counted, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.growing import Growing
@@ -323,12 +323,12 @@ def read_table(
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         cells = column.value(order)  # NaN where a cell is no number
-        if name in DOUBTED:
-            coded = unitcheck.nines(cells)
-            found = unitcheck.coded(name, cells, coded, line)
+        away = CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from")
+        if name in DOUBTED or (away and layout.unit in ("deg", "10 deg")):
+            coded = codes.within_a_turn(cells) if away else codes.speeds(cells)
+            findings.extend(codes.report(name, cells, coded, line))
             state = np.where(coded, np.uint8(Cell.MISSING), state)
             cells = np.where(coded, np.nan, cells)
-            findings.extend(found)
         value = in_si(cells, layout)
         if name in DOUBTED:
             span = float(time.max() - time.min()) / NANOSECONDS
@@ -336,7 +336,7 @@ def read_table(
             findings.extend([doubt] if doubt is not None else [])
         channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
-        if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
+        if away:
             value, found = possible.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
             findings.extend(found)
             value = turned(value, layout)

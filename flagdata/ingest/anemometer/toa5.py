@@ -154,7 +154,7 @@ class Toa5:
         if not {"wind_speed", "wind_x"} & set(channels):
             raise InputError(
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
-                fix=f"{_offer(source)}; or describe the file by a recipe; its columns are {', '.join(names)}",
+                fix=f"{_offer(source)}describe the file by a recipe; its columns are {', '.join(names)}",
             )  # fmt: skip
         rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
         form, found = _FORM, ()
@@ -244,6 +244,6 @@ def _faults(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _offer(source: TextFile) -> str:
-    """The option that says what the columns are, as far as they are known."""
+    """The option that says what the columns are, as far as they are known, with "; or " behind it; "" for no table."""
     layout = lay_out(source.head(HEAD_LINES), interest=interest)
-    return "" if layout is None else stated_columns.offer(layout, find_time(layout), ())
+    return "" if layout is None else f"{stated_columns.offer(layout, find_time(layout), ())}; or "

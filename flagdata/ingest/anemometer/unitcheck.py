@@ -32,9 +32,6 @@ _STEPS: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("mph", (1.0, 0.5, 0.1)), ("kn", (1.0, 0.5, 0.1)), ("km/h", (1.0, 0.1)), ("m/s", (1.0, 0.5, 0.1)),
 )  # fmt: skip
 _SHOWN = ("m/s", "km/h", "mph", "kn")
-_NINES = (99_999.0, 9999.9, 9999.0, 999.99, 999.9, 999.0, 99.99, 99.9, 99.0)
-_OTHERS = 10
-"""Other values that show how fast the wind is."""
 _GUSTS = (1.0, 3.2)
 _FACTOR = 6e-4
 """Relative error of the factors that loggers convert with (0.447, 0.514, 1.609)."""
@@ -123,44 +120,18 @@ def contradiction(
     if len(known) < 10 or scale < unit("km/h").scale:
         return None
     median, high = float(np.median(known)), float(np.quantile(known, 0.99))
-    if not (high > FASTEST or (median > WINDY and span >= DAY)):
+    tenths = scale == 1.0 and bool(np.all(known % 1 == 0)) and median > WINDY
+    if not (high > FASTEST or tenths or (median > WINDY and span >= DAY)):
         return None
     # Of the units that are smaller, the first in which the wind is an ordinary one.
     others = [name for name in ("km/h", "mph", "kn") if unit(name).scale < 0.9 * scale]
     if not others:
         return None
-    return _finding(channel, stated, Evidence(unit=others[0], reason=_too_fast(median / scale, high / scale, stated)))
-
-
-def nines(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) which speeds are a code for no value that nobody named: 99, 99.9, 999 and so on, twice all others or more.
-
-    Args:
-        values: (n,) as written, NaN where missing.
-    """
-    found = np.zeros(len(values), dtype=bool)
-    for code in _NINES:
-        here = values == code
-        others = values[np.isfinite(values) & ~here & ~found]
-        if here.any() and len(others) >= _OTHERS and 2 * float(others.max()) < code:
-            found |= here
-    return found
-
-
-def coded(
-    channel: str, values: NDArray[np.float64], found: NDArray[np.bool_], line: NDArray[np.int64]
-) -> tuple[Finding, ...]:
-    """The finding about values that were taken for a code, see `nines`."""
-    if not found.any():
-        return ()
-    listed = ", ".join(f"{value:g}" for value in np.unique(values[found]))
-    what = (
-        f"{int(found.sum())} values of {channel} are {listed}, at least twice all others: taken as a code for no value"
-    )
-    return (Finding(
-        kind="code-for-missing", severity=Severity.WARNING, count=int(found.sum()), where=f"line {line[found][0]}",
-        what=what, fix="name the code in a recipe's [file] missing",
-    ),)  # fmt: skip
+    reason = _too_fast(median / scale, high / scale, stated)
+    if tenths:
+        smaller = "0.1 m/s" if median < 10 * FASTEST / 3 else "0.01 m/s"
+        reason += f"; whole numbers may also be in {smaller} (--unit '{smaller}')"
+    return _finding(channel, stated, Evidence(unit=others[0], reason=reason))
 
 
 def gust_factor(mean: NDArray[np.float64], gust: NDArray[np.float64]) -> float | None:

@@ -6,11 +6,15 @@ from collections.abc import Sequence
 
 from flagdata.ingest.anemometer import stated_columns
 from flagdata.ingest.anemometer.angles import may_be_direction
-from flagdata.ingest.anemometer.headings import words_of
+from flagdata.ingest.anemometer.cells import numbers
+from flagdata.ingest.anemometer.directions import judge
+from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.instruments import COMPONENTS, Wind
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.timechoice import TimeChoice
 
+_RELATIVE = frozenset({"rel", "relative", "apparent", "bow", "awa"})
+"""Words of a direction from its platform's bow or mark."""
 _FROM_NORTH = frozenset({"twd", "gwd"})
 """Directions that instruments of boats compute, from whichever north their compass is set to."""
 
@@ -47,9 +51,42 @@ def directions(
     taken = {*time.columns, *(column.index for one in (wind, *winds) for column in one.columns.values())}
     found: list[str] = []
     for index, name in enumerate(layout.names):
-        if index in taken or any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
+        if index in taken:
+            continue
+        called = repr(name) if name else f"number {index + 1}"
+        units = _may_be(layout, index)
+        if units:
+            line = stated_columns.read_also(layout, time, wind, index, unit_name=units[0])
+            others = f", or with {' or '.join(f'[{unit}]' for unit in units[1:])}" if units[1:] else ""
+            found.append(f'to read column {called} as the wind\'s direction: --columns "{line}"{others}')
+            continue
+        if any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
+            continue
+        if set(words_of(name)) & _RELATIVE:
+            line = stated_columns.read_also(layout, time, wind, index, channel="apparent_wind_direction")
+            what = "is a direction from its platform's bow or mark, not from north"
+            found.append(f'column {called} {what}: left out; to keep it as such: --columns "{line}"')
             continue
         line = stated_columns.read_also(layout, time, wind, index)
-        called = repr(name) if name else f"number {index + 1}"
         found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
     return tuple(found)
+
+
+def relative(layout: Layout, winds: Sequence[Wind]) -> tuple[str, ...]:
+    """A remark for each direction from a platform's bow that is left out beside one from north."""
+    taken = {column.index for wind in winds for column in wind.columns.values()}
+    north = [column.index for wind in winds for name, column in wind.columns.items() if name == "wind_direction"]
+    return tuple(
+        f"column {name!r} is relative to its platform: left out beside {layout.names[north[0]]!r}, which is from north"
+        for index, name in enumerate(layout.names)
+        if north and index not in taken and set(words_of(name)) & _RELATIVE and may_be_direction(layout, index)
+    )
+
+
+def _may_be(layout: Layout, index: int) -> tuple[str, ...]:
+    """The units that a direction which is left out for its numbers may be in; none where it is no such column."""
+    heading = understand(layout.names[index], layout.units[index])
+    if heading.channel != "wind_direction":
+        return ()
+    judged = judge(heading, numbers(layout.column(index), decimal=layout.decimal).value, heading.channel)
+    return judged.may_be if judged.left_out else ()

@@ -1,0 +1,31 @@
+"""Columns of a wind whose numbers are no speeds: counts and volts before a calibration, and Beaufort's classes."""
+
+from __future__ import annotations
+
+from flagdata.ingest.anemometer.headings import understand, words_of
+from flagdata.ingest.anemometer.layout import Layout
+
+_CLASSES = frozenset({"bft", "beaufort", "bf"})
+_COUNTED = frozenset(
+    {
+        "hz", "count", "counts", "pulse", "pulses", "ticks", "clicks", "rotations", "revolutions", "rpm", "freq",
+        "frequency", "adc", "v", "mv", "volt", "volts", "voltage", "ma",
+    }
+)  # fmt: skip
+"""Words of what an anemometer gives before its calibration."""
+
+
+def beaufort(layout: Layout) -> tuple[str, ...]:
+    """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
+    return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def counts(layout: Layout) -> tuple[int, ...]:
+    """Columns of what an anemometer counts or gives, its frequency, pulses or volts, which are no speeds yet."""
+    found: list[int] = []
+    for index, name in enumerate(layout.names):
+        words = set(words_of(name))
+        of_wind = words & {"wind", "anemometer", "anem", "cup", "ws", "windspeed"}
+        if of_wind and (words & _COUNTED or understand(name, layout.units[index]).strange.lower() in _COUNTED):
+            found.append(index)
+    return tuple(found)
