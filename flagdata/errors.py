@@ -58,6 +58,10 @@ class TimeError(FlagdataError):
     kind = "time"
 
 
+class NothingMeasuredError(InputError):
+    """A log, or one anemometer of a log, none of whose values can be used."""
+
+
 class ZoneMissingError(TimeError):
     """Stamps of a wall clock whose zone nobody named."""
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
-from flagdata.errors import FlagdataError, InputError
+from flagdata.errors import FlagdataError, InputError, NothingMeasuredError
+from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
@@ -206,7 +207,13 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
 
 
 def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]:
-    """The artifact of a log; of a table that holds several anemometers one of each, named by its label."""
+    """The artifact of a log; of a table that holds several anemometers one of each, named by its label.
+
+    An anemometer none of whose values can be used is left out, and the report of the first of the others says so.
+
+    Raises:
+        NothingMeasuredError: no value of any of them can be used.
+    """
     from flagdata.ingest.anemometer import anemometers
     from flagdata.ingest.store import ingest_wind
 
@@ -214,13 +221,27 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     if not found:
         return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
     stem = options.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
-    return tuple(
-        ingest_wind(
-            lake, source, replace(options.wind, wind=replace(options.wind.wind, wind=label)),
-            labels=replace(options.labels, name=f"{stem}:{label}"), branch=options.branch,
-        )
-        for label in found
-    )  # fmt: skip
+    results: list[IngestResult] = []
+    dead: list[tuple[str, NothingMeasuredError]] = []
+    for label in found:
+        labels = replace(options.labels, name=f"{stem}:{label}")
+        wind = replace(options.wind, wind=replace(options.wind.wind, wind=label))
+        try:
+            results.append(ingest_wind(lake, source, wind, labels=labels, branch=options.branch))
+        except NothingMeasuredError as error:
+            dead.append((label, error))
+    if not results:
+        raise dead[0][1]
+    told = [
+        Finding(
+            kind="anemometer-left-out", severity=Severity.WARNING, what=f"the anemometer {label!r}: {error.what}",
+            where=error.where, fix=error.fix,
+        ).as_dict()
+        for label, error in dead
+    ]  # fmt: skip
+    first = results[0]
+    report = {**first.report, "findings": [*first.report["findings"], *told]}
+    return (replace(first, report=report), *results[1:])
 
 
 def _meshes(lake: Lake, source: Path, kind: Guess, options: Given) -> IngestResult:

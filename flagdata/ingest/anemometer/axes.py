@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from flagdata.ingest.anemometer.headings import Heading, words_of
+from flagdata.ingest.anemometer.headings import VERTICAL, Heading, words_of
 from flagdata.ingest.anemometer.layout import Layout
 
 _AXES = (
@@ -29,7 +29,7 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
         for side, channel in ((sides[0][0], "wind_y"), (sides[1][0], "wind_x")):
             found[side] = replace(headings[side], channel=channel, quantity=channel, sure=True, spread=False, label=())
         for at, said in enumerate(words):
-            if said & {"up", "upward", "vertical"} and headings[at].quantity in ("", "wind_z") and "wind" in said:
+            if said & {"up", "upward", *VERTICAL} and headings[at].quantity in ("", "wind_z") and "wind" in said:
                 found[at] = replace(headings[at], channel="wind_z", quantity="wind_z", sure=True, label=())
         return found, True
     if not any(heading.quantity for heading in headings if heading.sure and "wind" in heading.quantity):

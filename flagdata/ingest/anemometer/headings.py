@@ -45,6 +45,8 @@ _DIRECTION = frozenset(
         "bearing",
     }
 )  # fmt: skip
+VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", "vertikale", "vertic"})
+"""Words of the component of the wind upwards, which is no speed of wind."""
 _OTHER = frozenset(
     {
         "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "rotor",
@@ -52,7 +54,7 @@ _OTHER = frozenset(
         "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
-        "load", "density", "elevation", "vertical", "gyro", "acc", "accel", "course", "heading", "track", "duration",
+        "load", "density", "elevation", *VERTICAL, "gyro", "acc", "accel", "course", "heading", "track", "duration",
         "id", "unit", "units",
     }
 )  # fmt: skip
@@ -96,7 +98,9 @@ _NO_AIR = frozenset(
         "heat",
         "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
         "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
-        "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in", "gyro", "mpu",
+        "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",
+        "gyro", "mpu", "w", "wt",
+        "wtemp", "watertemp", "therm", "thermistor",
     }
 )  # fmt: skip
 _TEMPERATURE = frozenset(
@@ -188,7 +192,7 @@ def understand(name: str, stated: str = "") -> Heading:
     spread = bool(known & _SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
     quantity, sure, used = _quantity(words, compact, unit, rest)
     if quantity and known & _OTHER and not (quantity.endswith("direction") and known & {"course"}):
-        excluded = known & _OTHER - {"vertical"} if quantity == "wind_z" else known & _OTHER
+        excluded = known & _OTHER - VERTICAL if quantity == "wind_z" else known & _OTHER
         if "wind" in quantity and excluded:
             quantity, sure = "", False
     if quantity.endswith("wind_speed") and known & _AXES:

@@ -28,10 +28,14 @@ _TIME = (
     r"时间|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|годин[аи]|godzina|čas|zaman|waktu|tanggal|aika|kellonaika|"
     r"tidspunkt|időpont|ώρα|שעה|الوقت|thời gian|laikas|laiks)\b"
 )
+_STATION = (
+    r"城市|站点|站名|测站|観測所|観測地点|地点名|관측소|지점명|"
+    r"\b(?:город|станция|станції|станція|пункт|asema|állomás)\b"
+)
 _WORDS = tuple(
     (re.compile(pattern, re.IGNORECASE), word)
     for pattern, word in (
-        (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
+        (_STATION, "station"), (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
         (r"\b(?:дата|päivämäärä|dátum|ημερομηνία|תאריך|التاريخ|ngày)\b", "date"),
         (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"), (r"^\s*[日일]\s*$", "day"),
         (r"^\s*[時时시]\s*$", "hour"), (r"^\s*[分분]\s*$", "minute"), (r"^\s*[秒초]\s*$", "second"),

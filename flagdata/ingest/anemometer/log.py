@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, TimeError, UsageError, ZoneMissingError
+from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform, possible, quality, spelled_stamps, untimed, zero, zones
 from flagdata.ingest.anemometer import recipe as recipes
@@ -95,7 +95,7 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     """A finding where no wind can be used, but the log measured something else.
 
     Raises:
-        InputError: nothing else either; a direction beside speeds that are all missing is none.
+        NothingMeasuredError: nothing else either; a direction beside speeds that are all missing is none.
     """
     winds = [values for name, values in reading.channels.items() if name in WIND_CHANNELS]
     usable = (reading.flags & UNUSABLE) == 0
@@ -111,7 +111,7 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     what = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
     if not others:
         fix = "check the sensor and the recipe's columns; if calm air reads below zero, give --zero-offset"
-        raise InputError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
+        raise NothingMeasuredError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
     text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
     return (
         Finding(

@@ -10,6 +10,7 @@ the others it holds the value that was told last before it, as programs write wh
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,13 +24,16 @@ from flagdata.ingest.anemometer.restated import table
 from flagdata.ingest.anemometer.sites import sites
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
 from flagdata.ingest.anemometer.source import TableText, TextFile
-from flagdata.ingest.anemometer.timecolumns import find_time
+from flagdata.ingest.anemometer.timechoice import TimeChoice
+from flagdata.ingest.anemometer.timecolumns import find_time, time_as
 from flagdata.units import spelled
 
 _VALUES = frozenset({"value", "val", "state", "payload", "reading", "measurement", "wert", "valor", "valeur", "data"})
 _NUMBERED = frozenset({"code", "id", "number", "num", "no"})
 """Words beside which a state is one of a country."""
 _UNITS = frozenset({"unit", "units", "einheit", "unidad", "unité"})
+_SHORT = re.compile(r"(?<![A-Za-z\d])W(?:S|SPD?|DS?P)(?![A-Za-z])", re.IGNORECASE)
+"""How a name says the speed of the wind shortly: WS_ms_Avg, ws, WSP."""
 _MOST = 500
 """Names of quantities beyond which a column of words is something else."""
 _SHARE = 0.9
@@ -155,7 +159,7 @@ def _shape(lines: Sequence[str]) -> _Shape | None:
         ):
             continue
         alone = replace(layout, rows=tuple(row for row in layout.rows if row[column].strip() == speed))
-        time = find_time(alone)
+        time = _time(alone, layout)
         rest = [index for index in range(width) if index != column and (time is None or index not in time.columns)]
         value = _value(layout, rest)
         if time is None or value is None or any(wind.sure for wind in find_winds(layout, time=time.columns)[0]):
@@ -168,8 +172,24 @@ def _shape(lines: Sequence[str]) -> _Shape | None:
     return None
 
 
+def _time(alone: Layout, layout: Layout) -> TimeChoice | None:
+    """The time of the rows with one name. Of several that no line names, the one that most names share.
+
+    The other is then that of the message, which came some time after the reading.
+    """
+    time = find_time(alone)
+    if time is None or time.form is None or len(time.columns) != 1 or any(layout.names[at] for at in time.columns):
+        return time
+    unnamed = (index for index, name in enumerate(layout.names) if not name)
+    choices = [choice for index in unnamed if (choice := time_as(alone, (index,), time.form)) is not None]
+    return min(choices, key=lambda choice: (len(set(layout.column(choice.columns[0]))), choice.columns), default=time)
+
+
 def _value(layout: Layout, rest: Sequence[int]) -> int | None:
-    """The column of the values: the only one that is called so, or the only one of numbers."""
+    """The column of the values: the only one that is called so, or the only one of numbers.
+
+    Where no line names the columns, numbers that stay the same (a place, a mark) and instants are none.
+    """
     told = [
         index for index in rest
         if set(words_of(layout.names[index])) & _VALUES and not set(words_of(layout.names[index])) & _NUMBERED
@@ -177,13 +197,21 @@ def _value(layout: Layout, rest: Sequence[int]) -> int | None:
     ]  # fmt: skip
     numbers = [index for index in rest if _share_of(layout, index, "number") >= _SHARE and not _measured(layout, index)]
     values = told if len(told) == 1 else numbers
+    if len(values) > 1 and not any(layout.names):
+        values = [at for at in values if len(set(layout.column(at))) > 1 and not _instants(layout, at)]
     return values[0] if len(values) == 1 else None
+
+
+def _instants(layout: Layout, index: int) -> bool:
+    return any(time_as(layout, (index,), form) is not None for form in ("epoch-s", "epoch-ms"))
 
 
 def _hints(line: str) -> bool:
     """Whether a line may hold the name of a speed, so that most tables are told at once to be none."""
     text = line.lower()
-    return any(word in text for word in ("wind", "speed", "anem", "wspd", "viento", "vent", "vind", "风", "風"))
+    return any(
+        word in text for word in ("wind", "speed", "anem", "wspd", "viento", "vent", "vind", "风", "風")
+    ) or bool(_SHORT.search(line))
 
 
 def _measured(layout: Layout, index: int) -> bool:

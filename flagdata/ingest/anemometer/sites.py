@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from flagdata.ingest.anemometer.angles import compass_unit
 from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 
 _SITES = frozenset(
     {
         "station", "site", "stid", "id", "sensor", "device", "node", "location", "logger", "mast", "turbine", "address",
-        "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot",
+        "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot", "city",
+        "town", "place", "stadt", "ort", "messstelle", "messstation", "wetterstation", "stationsname", "ville", "lieu",
+        "poste", "ciudad", "lugar", "estacion", "estación", "cidade", "estacao", "estação", "stazione", "citta",
+        "città", "località", "stad", "plaats", "weerstation", "stasjon", "stacja", "miasto", "buoy", "boya", "wtg",
     }
 )  # fmt: skip
 _STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})
 """Words of a heading whose cells, where they are words, are places, though each has one row."""
+_MOST = 50
+"""Sites beyond which a column of words is something else."""
+_FEWEST, _SHARE = 3, 0.6
+"""Rows of a site, and the share of the sites that a stamp holds, by which words alone tell sites apart."""
 _NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
 """Words beside which a heading is still that of a site."""
 
@@ -31,7 +39,7 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
             continue
         cells = layout.column(index)
         kinds = sorted({cell for cell in cells if cell})
-        if not 2 <= len(kinds) <= 50:
+        if not 2 <= len(kinds) <= _MOST:
             continue
         if words & _STATIONS and words <= _STATIONS | _NUMBERED and all(cell_kind(kind) == "text" for kind in kinds):
             return index, tuple(kinds)
@@ -39,6 +47,24 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
             return index, tuple(kinds)
         apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
         if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
+            return index, tuple(kinds)
+    return _in_every_stamp(layout, time, stamps) if shared else None
+
+
+def _in_every_stamp(layout: Layout, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
+    """The column of words, whatever its heading, of which each stamp holds nearly every word once, and the words.
+
+    So do the sites of a table that lists the same hours for each of them; a state, or the weather in words, does not.
+    """
+    for index, name in enumerate(layout.names):
+        cells = layout.column(index)
+        kinds = sorted({cell for cell in cells if cell})
+        if index in time or understand(name).quantity or not 2 <= len(kinds) <= _MOST:
+            continue
+        if any(cell_kind(kind) != "text" for kind in kinds) or compass_unit(layout, index) is not None:
+            continue
+        apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
+        if len(apart) == len(cells) >= _FEWEST * len(kinds) and len(cells) >= _SHARE * len(kinds) * len(set(stamps)):
             return index, tuple(kinds)
     return None
 

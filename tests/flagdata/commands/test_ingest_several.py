@@ -58,3 +58,29 @@ def test_a_unit_that_is_missing_is_asked_for_and_taken(run: Run, lake: Lake, tmp
     best = json.loads(out)["sources"][0]["guesses"][0]
     assert best["doubts"] == []
     assert 'unit = "km/h"' in best["draft"]
+
+
+def test_an_anemometer_without_one_usable_value_is_left_out_and_named(run: Run, lake: Lake, tmp_path: Path) -> None:
+    path = tmp_path / "mast.csv"
+    rows = [row.rpartition(",")[0] + ",NaN" for row in ROWS]
+    path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *rows[:10], *ROWS[10:12], *rows[12:]]) + "\n")
+    code, _, err = run(path)
+    assert code == 0, err
+    path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *(row.replace("NaN", "400") for row in rows)]) + "\n")
+    code, out, err = run(path, "--json")
+    assert code == 0, err
+    results = json.loads(out)["results"]
+    assert [result["name"] for result in results] == ["mast:Spd80m (m/s)"]
+    left_out = [one for one in results[0]["report"]["findings"] if one["kind"] == "anemometer-left-out"]
+    assert [one["severity"] for one in left_out] == ["warning"]
+    assert "'Spd40m (m/s)'" in left_out[0]["what"]
+
+
+def test_a_table_none_of_whose_anemometers_measured_is_refused(run: Run, lake: Lake, tmp_path: Path) -> None:
+    path = tmp_path / "mast.csv"
+    rows = [f"{row.partition(',')[0]},500,600" for row in ROWS]
+    path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *rows]) + "\n")
+    code, _, err = run(path)
+    assert code == 1
+    assert "nothing to measure" in err
+    assert lake.rows().num_rows == 0
