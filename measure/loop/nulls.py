@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from flagdata.errors import FlagdataError
 from flagdata.rng import stream
 from measure.loop.columns import Calibration
 from measure.observe.interpolation import onto
@@ -23,7 +24,7 @@ from sim.handles import Handles
 from sim.integrate import Integrator
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.split import SplitEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate.symplectic import SAFETY, Symplectic
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
 
@@ -33,6 +34,7 @@ _SETTLE = 3.0  # s; a flag of 1.5 m has forgotten a start from rest after two sw
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
 _UNEVEN = 0.2  # share of the spacing by which inner vertices are moved at most
+_HALVINGS = 3  # of the step of a run that diverges
 _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
 
 
@@ -100,9 +102,28 @@ class NullBatch:
         return flat, tuple(held)
 
     def _frames(self, flat: Mesh, held: tuple[int, ...]) -> Floats:
-        """(frame, vertex, 3, recording) [m], after the start has been forgotten."""
+        """(frame, vertex, 3, recording) [m], after the start has been forgotten.
+
+        Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew in smaller steps.
+
+        Raises:
+            FlagdataError: it diverges in the smallest steps as well.
+        """
+        for halvings in range(1 + _HALVINGS):
+            found = self._run(flat, held, halvings)
+            if np.isfinite(found).all():
+                return found
+        raise FlagdataError(
+            f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
+            where=f"{self.calibrations[0]}, stretching × {self.stretching:.3g}, winds "
+            f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
+            fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
+        )  # fmt: skip
+
+    def _run(self, flat: Mesh, held: tuple[int, ...], halvings: int) -> Floats:
+        """The same in steps that were halved so often; not finite where it diverges."""
         specimen = self.specimen
-        integrator, damped = self._method()
+        integrator, damped = self._method(halvings)
         lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
         offset = flat.rest - specimen.mesh.rest[lowest]
         start = specimen.anchors[np.argmin(specimen.anchors[:, 2])] + np.stack(
@@ -130,11 +151,11 @@ class NullBatch:
                     frames.append(state.position.double().numpy().copy())
         return np.stack(frames)
 
-    def _method(self) -> tuple[Integrator, float]:
-        """A method for these dampings, and the damping it adds by itself [s]."""
+    def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
+        """A method for these dampings with steps that were halved so often, and the damping it adds by itself [s]."""
         if max(c.damping for c in self.calibrations) <= _GENTLE and not self.effects:
-            return Symplectic(), 0.0
-        step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))]
+            return Symplectic(safety=SAFETY / 2**halvings), 0.0
+        step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))] / 2**halvings
         base = BackwardEuler(step=step, tolerance=1e-4)
         return SplitEuler(base=base) if self.effects else base, step
 

@@ -30,8 +30,8 @@ from sim.kernel.fused import Kernel
 from sim.state import State
 from sim.system import Drive, System
 
-# Share of the linear stability limit that is used: large deformation stiffens faces beyond the estimate.
-_SAFETY = 0.7
+SAFETY = 0.7
+"""Share of the linear stability limit that is used: large deformation stiffens faces beyond the estimate."""
 # Wind and cloth so much faster together call for another estimate of the longest outer step.
 _RISEN = 1.3
 
@@ -43,15 +43,17 @@ class Symplectic:
     """Leapfrog.
 
     Attributes:
-        step: upper bound of the step [s]; None for 0.7 of the stability limit of the system.
+        step: upper bound of the step [s]; None for a share of the stability limit of the system.
+        safety: that share.
         outer: upper bound of the outer step of what the base model lacks [s]; None for every step.
         backend: what computes the forces.
 
     Raises:
-        UsageError: an outer step that is not positive.
+        UsageError: an outer step that is not positive, or a share that is not between 0 and 1.
     """
 
     step: float | None = None
+    safety: float = SAFETY
     outer: float | None = None
     backend: Backend = Backend.AUTO
 
@@ -59,6 +61,10 @@ class Symplectic:
         if self.outer is not None and not (math.isfinite(self.outer) and self.outer > 0):
             raise UsageError(
                 f"an outer step of {self.outer!r} s", where="integrator symplectic", fix="give a positive one, or none"
+            )
+        if not 0 < self.safety < 1:
+            raise UsageError(
+                f"{self.safety!r} of the stability limit", where="integrator symplectic", fix="give a share below 1"
             )
 
     def steps(self, system: System, duration: float) -> int:
@@ -69,7 +75,7 @@ class Symplectic:
         """
         limit = stable_step(system)
         if self.step is None:
-            return max(1, math.ceil(duration / (_SAFETY * limit) - 1e-9))
+            return max(1, math.ceil(duration / (self.safety * limit) - 1e-9))
         if not (0 < self.step < limit):
             raise UsageError(
                 f"a step of {self.step:g} s is unstable: the limit of this mesh and material is {limit:.3g} s",

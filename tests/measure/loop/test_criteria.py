@@ -36,7 +36,7 @@ METHOD = {
     "inference": {"_HERE", "_SHIFTS", "_POWERS", "_UNSEEN"},
     "lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},
     "named": {"_SETTLE", "_FRAMES", "_ROUGH"},
-    "nulls": {"_SETTLE", "_FINER", "_STEPS", "_UNEVEN", "_GENTLE"},
+    "nulls": {"_SETTLE", "_FINER", "_STEPS", "_UNEVEN", "_HALVINGS", "_GENTLE"},
     "quantity": {"_DIGITS", "_MOST_DIGITS", "_WIDEST", "_NARROWEST"},
     "reference": {"_GROUPS", "_NOTHING"},
     "refine": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST"},
