@@ -74,8 +74,9 @@ from flagdata.errors import UsageError
     "--azimuth", type=float, metavar="DEG", help="Wind: bearing of the sensor's north or bow, clockwise from north."
 )
 @click.option(
-    "--clock", type=click.Choice(["first", "last"]),
-    help="Wind: where the log's clock was set back or on, whose stamps are right: those before it, or those after.",
+    "--clock", type=click.Choice(["first", "last", "sort"]),
+    help="Wind: where the log's clock was set back or on, whose stamps are right: those before it, or those after. "
+    "With sort no clock was set: the rows are out of order.",
 )  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where it cannot be told.")

@@ -19,8 +19,9 @@ from flagdata.findings import Finding, Severity
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, iso
 
-ClockChoice: TypeAlias = Literal["first", "last"]
-"""Whose stamps are right where the clock was set anew: those before the first jump, or those after the last."""
+ClockChoice: TypeAlias = Literal["first", "last", "sort"]
+"""Whose stamps are right where they run back: those before the first jump, those after the last, or all ("sort"), since
+no clock was set and the rows are out of order."""
 
 JITTER = 2 * NANOSECONDS
 """Disorder that buffers of a computer explain; a clock that is set back jumps further."""
@@ -114,9 +115,9 @@ def _jump(row: int, step: int, usual_step: int) -> Jump:
 def excursions(time: Instants, *, most: int) -> NDArray[np.bool_]:
     """Rows whose stamps leave the log's time and come back to it: (n,), at most `most` rows at a time.
 
-    Such a stretch lies between a step back and a step forward of half its size or more, in either order, and the rows
-    on both sides of it follow each other as rows do. Beside the log's first or last row only one side is seen: a
-    stretch there counts where it is more than a day off.
+    Such a stretch lies between a step back and a step forward of half its size or more and no usual one, in either
+    order, and the rows on both sides of it follow each other as rows do. Beside the log's first or last row only one
+    side is seen: a stretch there counts where it is more than a day off.
     """
     wild = np.zeros(len(time), dtype=bool)
     steps = np.diff(time)
@@ -133,7 +134,7 @@ def _excursion(time: Instants, steps: NDArray[np.int64], at: int, step: int, mos
 
     def follows(first: int, after: int, forward: int) -> bool:
         over = int(time[after] - time[first - 1])
-        return 2 * forward >= back and 0 < over <= 3 * (after - first + 1) * step + JITTER
+        return 2 * forward >= max(back, 3 * step) and 0 < over <= 3 * (after - first + 1) * step + JITTER
 
     for first in range(at - 1, max(0, at - 1 - most), -1):
         if follows(first, at, int(steps[first - 1])):

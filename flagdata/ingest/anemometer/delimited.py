@@ -16,11 +16,12 @@ from flagdata.ingest.anemometer.layout import cut
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer.rowclock import Given
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
-from flagdata.ingest.anemometer.table import Given, read_table
+from flagdata.ingest.anemometer.table import read_table
 
 _DRAFTED = 0.55
 """Score of a draft without doubts: it is taken, but any format that knows the file goes before it."""
@@ -146,7 +147,7 @@ def _argument(text: str) -> str:
 
 def _read(source: TextFile, recipe: Recipe, options: WindOptions, where: str) -> Reading:
     rows = RowReader(source, recipe.file)
-    given = Given(start=options.start, date=options.date)
+    given = Given(start=options.start, date=options.date, clock=options.clock)
     columns = platform.position_columns(rows.header or ())
     table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns or (), given=given)
     reading = with_horizontal(table.reading, options.azimuth, where=where)

@@ -23,6 +23,7 @@ from flagdata.ingest.anemometer.dates import decide
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, FileLayout, Recipe, TimeLayout
+from flagdata.ingest.anemometer.rowclock import Given
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
@@ -194,7 +195,7 @@ def read_export(source: TextFile, export: Export, options: WindOptions) -> Readi
         channels=assigned.channels, sensor=export.sensor, checks=export.checks,
     )  # fmt: skip
     rows = CompassRows(source, export.file, export.compass)
-    reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
+    reading = read_table(rows, recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock)).reading
     found = [*column_findings(assigned)]
     if rows.points:
         text = f"{rows.points} directions are points of the compass, 22.5° apart"

@@ -14,6 +14,7 @@ from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer.rowclock import Given
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
@@ -85,7 +86,9 @@ class HostStamped:
             )  # fmt: skip
         rows = HostRows(source, recipe)
         where = str(source.path)
-        reading = read_table(rows, recipe, where=where, zone_name=options.zone).reading
+        reading = read_table(
+            rows, recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock)
+        ).reading
         return with_horizontal(reading, options.azimuth, where=where)
 
 

@@ -15,6 +15,7 @@ from flagdata.ingest.anemometer.dates import decide
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
+from flagdata.ingest.anemometer.rowclock import Given
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
@@ -127,7 +128,13 @@ class Kestrel:
         if unread:
             text = ", ".join(unread)
             findings.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(unread), what=text))
-        table = read_table(RowReader(source, recipe.file), recipe, where=where, zone_name=options.zone)
+        table = read_table(
+            RowReader(source, recipe.file),
+            recipe,
+            where=where,
+            zone_name=options.zone,
+            given=Given(clock=options.clock),
+        )
         return table.reading.with_findings(tuple(findings))
 
 

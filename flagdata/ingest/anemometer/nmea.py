@@ -122,6 +122,9 @@ class Nmea:
                 raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
             raise InputError(what, where=where, fix=fix)
         line = np.array(stream.line, dtype=np.int64)
+        if options.clock == "sort":
+            fix = "give --clock first or --clock last, or leave it out"
+            raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
         once = len({frozenset(row) for row in stream.values}) == len(stream.values)
         placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, once=once)
         channels = {

@@ -54,7 +54,7 @@ class WindOptions:
         azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative
             direction stays sensor-relative.
         clock: whose stamps are right where the log's clock was set back or on: those before it ("first") or those after
-            it ("last"); `None` where nobody said.
+            it ("last"); "sort" where all are right and the rows are out of order; `None` where nobody said.
         unit: of the wind's speed, for a file that does not state it; of a file that does, the user's word counts.
         start: instant of the first row [UTC ns], for stamps that count from a start.
         rate: readings a second [Hz] of a file whose rows carry no time; needs `start`.
@@ -87,8 +87,8 @@ class WindOptions:
             raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy, mdy or ymd")
         if self.platform not in (None, "fixed", "moving"):
             raise UsageError(f"platform {self.platform!r}", where="platform", fix="give fixed or moving")
-        if self.clock not in (None, "first", "last"):
-            raise UsageError(f"clock {self.clock!r}", where="clock", fix="give first or last")
+        if self.clock not in (None, "first", "last", "sort"):
+            raise UsageError(f"clock {self.clock!r}", where="clock", fix="give first or last, or sort")
         if self.azimuth is not None and not -7.0 < self.azimuth < 7.0:
             raise UsageError(f"azimuth {self.azimuth} is not in radians", where="azimuth", fix="give -2π to 2π")
         if self.unit is not None and unit(self.unit, where="unit").si != "m/s":

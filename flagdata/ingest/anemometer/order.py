@@ -1,21 +1,21 @@
 """Rows into strictly increasing time; what is out of order, repeated or too coarse is reported, flagged or left out.
 
 Rules, in order:
-1. A stretch that comes again with the same stamps and values, as when downloads overlap, is left out.
-2. Few rows whose stamps leave the log's time and come back to it are left out.
-3. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
+1. Rows that the file lists out of order are sorted (`disorder`), by evidence or by the user's word.
+2. A stretch that comes again with the same stamps and values, as when downloads overlap, is left out.
+3. Few rows whose stamps leave the log's time and come back to it are left out.
+4. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
    those before, or those before are made to fit the ones after, as the user says; without a word of the user it is
    reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. So it is where the clock was set on,
    except that without a word of the user nothing is changed. Refused: time that runs back again and again, or by no
    whole hour to where the log never was, as in files that were joined.
-4. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE.
-5. Rows equal in stamp and values are the same row written twice: one is kept.
-6. Rows that share a stamp are given instants of their own (`spread`).
+5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE.
+6. Rows equal in stamp and values are the same row written twice: one is kept.
+7. Rows that share a stamp are given instants of their own (`spread`).
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import clock
+from flagdata.ingest.anemometer import clock, disorder
 from flagdata.ingest.anemometer.clock import DAY, JITTER, ClockChoice, Jump
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.spread import FAST, distinct
@@ -42,15 +42,27 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
     """Apply the rules above.
 
     Args:
-        choice: whose stamps are right where the clock was set anew; `None` where nobody said.
+        choice: whose stamps are right where the clock was set anew, or that the rows are out of order; `None` where
+            nobody said.
 
     Raises:
         TimeError: time runs back in a way that no rule explains.
     """
+    reading = _put_in_order(reading, choice)
     reading = _without_repeated_stretches(reading)
-    reading = _sorted(reading, where, choice)
+    reading = _sorted(reading, where, None if choice == "sort" else choice)
     reading = _without_repeats(reading)
     return distinct(reading)
+
+
+def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:
+    found = disorder.sorting(reading.time, choice)
+    if found is not None:
+        return reading.with_findings((found.finding(reading.line),)).take(found.order)
+    if choice == "sort" and disorder.KIND not in {finding.kind for finding in reading.findings}:
+        text = "the rows are in the order of their stamps: --clock sort is not used"
+        return reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=text),))
+    return reading
 
 
 def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
@@ -123,7 +135,7 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str) -> Re
         TimeError: they are many.
     """
     time = reading.time
-    keep = _longest_rise(time)
+    keep = disorder.longest_rise(time)
     wild = np.ones(len(time), dtype=bool)
     wild[keep] = False
     count = int(wild.sum())
@@ -136,7 +148,8 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str) -> Re
             "joined",
             where=f"{where}, line {reading.line[at]}",
             fix="split the file there and ingest the parts by themselves; or, if one log's clock was set anew, say "
-            "whose stamps are right: --clock first (before it) or --clock last (after it)",
+            "whose stamps are right: --clock first (before it) or --clock last (after it); or, if all stamps are right "
+            "and only the rows are out of order: --clock sort",
         )  # fmt: skip
     return reading.take(keep).with_findings((_left_out(reading, wild, lag),))
 
@@ -181,29 +194,6 @@ def _without_repeated_stretches(reading: Reading) -> Reading:
         what=f"{count} rows bring earlier stamps and values again, as when downloads of a logger overlap; left out",
     )  # fmt: skip
     return reading.take(~drop).with_findings((finding,))
-
-
-def _longest_rise(time: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Indices of a longest non-decreasing subsequence (Schensted 1961; patience sorting)."""
-    tops: list[int] = []
-    heads: list[int] = []
-    previous = np.full(len(time), -1, dtype=np.int64)
-    for index, value in enumerate(time.tolist()):
-        place = bisect_right(tops, value)
-        if place:
-            previous[index] = heads[place - 1]
-        if place == len(tops):
-            tops.append(value)
-            heads.append(index)
-        else:
-            tops[place] = value
-            heads[place] = index
-    chain = np.empty(len(tops), dtype=np.int64)
-    at = heads[-1]
-    for place in range(len(tops) - 1, -1, -1):
-        chain[place] = at
-        at = int(previous[at])
-    return chain
 
 
 def _without_repeats(reading: Reading) -> Reading:

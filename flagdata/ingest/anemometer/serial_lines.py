@@ -25,11 +25,11 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import possible
 from flagdata.ingest.anemometer.exports import described
 from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.rowclock import instants
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
 from flagdata.ingest.anemometer.stamps import Stamps
 from flagdata.ingest.anemometer.stamps import parse as parse_stamps
-from flagdata.ingest.anemometer.table import instants
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
 

@@ -18,11 +18,11 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.nmea import WINDS, Nmea
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.rowclock import instants
 from flagdata.ingest.anemometer.sentences import ChecksumError, checksum, split
 from flagdata.ingest.anemometer.serial_lines import split_stamp, stamps_of
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.source import TextFile
-from flagdata.ingest.anemometer.table import instants
 from flagdata.schema import SampleFlag
 
 _MILLISECOND = 1_000_000

@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata import compass
-from flagdata.errors import InputError, UnknownNameError, UsageError, ZoneMissingError
+from flagdata.errors import InputError, UnknownNameError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import codes, counted, possible, unitcheck, zones
+from flagdata.ingest.anemometer import codes, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.growing import Growing
-from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
-from flagdata.ingest.anemometer.stamps import YEARS, Stamps, is_date_alone
-from flagdata.ingest.anemometer.wall import to_utc, zone_advice
+from flagdata.ingest.anemometer.rowclock import Block, Given, Order, RowClock, cells_of
+from flagdata.ingest.anemometer.stamps import YEARS
 from flagdata.schema import CHANNELS, SampleFlag
-from flagdata.signals import Instants
-from flagdata.timebase import NANOSECONDS, zone
+from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
 
 DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 """Channels whose unit is held against their values."""
-NEWEST_FIRST = 0.9
-"""Share of rows older than the row before them from which a log is a list with the newest row on top."""
-
-Block: TypeAlias = Columns | Sequence[Sequence[str]]
-"""Rows of cells, or their columns."""
 
 
 class Rows(Protocol):
@@ -62,14 +54,6 @@ class Table:
     extra: Mapping[str, NDArray[np.float64]]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Given:
-    """What the user says about time beside the zone: the first row's instant [UTC ns], or its day."""
-
-    start: int | None = None
-    date: dt.date | None = None
-
-
 @dataclass
 class _Column:
     """One column as its blocks come in."""
@@ -80,12 +64,12 @@ class _Column:
     values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
-    def value(self, order: slice) -> NDArray[np.float64]:
+    def value(self, order: Order) -> NDArray[np.float64]:
         """All values; they are let go, so that a long log is not held twice."""
         found, self.values = self.values.view()[order], Growing(np.float64)
         return found
 
-    def state(self, order: slice) -> NDArray[np.uint8]:
+    def state(self, order: Order) -> NDArray[np.uint8]:
         """All states; likewise."""
         found, self.states = self.states.view()[order], Growing(np.uint8)
         return found
@@ -99,7 +83,7 @@ class _Check:
     index: int
     right: list[NDArray[np.bool_]] = field(default_factory=list)
 
-    def faults(self, order: slice, line: NDArray[np.int64]) -> tuple[NDArray[np.bool_], tuple[Finding, ...]]:
+    def faults(self, order: Order, line: NDArray[np.int64]) -> tuple[NDArray[np.bool_], tuple[Finding, ...]]:
         fault = ~np.concatenate(self.right)[order]
         if not fault.any():
             return fault, ()
@@ -110,79 +94,11 @@ class _Check:
 
 
 @dataclass
-class _Clock:
-    """One clock's stamps as their blocks come in."""
-
-    form: str
-    columns: list[int]
-    step: int = 2**62
-    bare_dates: int = 0
-    ns: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
-    utc: Growing[np.bool_] = field(default_factory=lambda: Growing(np.bool_))
-
-    def parse(self, block: Block) -> Stamps:
-        if len(self.columns) == 1:
-            texts = _cells(block, self.columns[0])
-        elif isinstance(block, Columns):
-            texts = block.joined(self.columns)
-        else:
-            texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
-        if self.form in counted.FORMS or counted.is_time_of_day(self.form):
-            return counted.parse(texts, self.form)
-        stamps, bare = parse_with_bare_dates(texts, self.form)
-        self.bare_dates += bare
-        return stamps
-
-    def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
-        self.ns.add(stamps.ns[keep])
-        self.utc.add(stamps.utc[keep])
-        self.step = min(self.step, stamps.step)
-
-    def stated(self) -> bool:
-        """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
-        return counted.is_elapsed(self.form) or bool(self.utc.view().all())
-
-    def order(self) -> slice:
-        """The rows from the oldest on, for logs that list the newest first."""
-        steps = np.diff(self.ns.view())
-        turned = len(steps) > 1 and float((steps < 0).mean()) > NEWEST_FIRST
-        return slice(None, None, -1) if turned else slice(None)
-
-    def instants(
-        self, order: slice, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
-    ) -> tuple[Instants, tuple[Finding, ...]]:
-        """The instants and what was found; the blocks are let go."""
-        wall, utc = self.ns.view()[order], self.utc.view()[order]
-        self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
-        if counted.is_elapsed(self.form):
-            return counted.since_start(wall, self.form, start=given.start, line=line, where=where)
-        found: tuple[Finding, ...] = ()
-        if counted.is_time_of_day(self.form):
-            wall, found = counted.on_days(wall, date=given.date, line=line, where=where)
-        elif given.start is not None or given.date is not None:
-            option = "--start" if given.start is not None else "--date"
-            raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
-        if is_date_alone(self.form):
-            what = "the stamps are dates without a time of day: each row stands for a whole day, put at its midnight"
-            fix = "a mean of a day is no wind at a flag: export the log with the times of its readings"
-            found = (
-                *found,
-                Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),
-            )
-        if self.bare_dates:
-            what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
-            bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)
-            found = (*found, bare)
-        time, further = instants(wall, utc, line=line, zone_name=zone_name, where=where)
-        return time, (*found, *further)
-
-
-@dataclass
 class _Gathered:
     """All cells wanted, as the blocks come in."""
 
-    clock: _Clock
-    host: _Clock | None
+    clock: RowClock
+    host: RowClock | None
     channels: dict[str, _Column]
     extra: dict[str, _Column]
     checks: list[_Check]
@@ -216,7 +132,7 @@ class _Gathered:
         self.distant += int(stamps.distant.sum())
         self.lines.add(line[keep])
         for column in self.columns():
-            cells = _cells(block, column.index)
+            cells = cells_of(block, column.index)
             cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
             parsed = numbers(
                 cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix
@@ -229,10 +145,6 @@ class _Gathered:
 
     def line(self) -> NDArray[np.int64]:
         return self.lines.view()
-
-
-def _cells(block: Block, index: int) -> Sequence[str] | pa.StringArray:
-    return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]
 
 
 def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
@@ -280,9 +192,9 @@ def read_table(
         TimeError: stamps without a zone, or impossible ones.
     """
     own = [_index(column, rows, where) for column in recipe.time.columns]
-    host = _Clock(form=recipe.file.host, columns=[0]) if recipe.file.host else None
+    host = RowClock(form=recipe.file.host, columns=[0]) if recipe.file.host else None
     gathered = _Gathered(
-        clock=_Clock(form=recipe.time.format, columns=own) if own or host is None else host,
+        clock=RowClock(form=recipe.time.format, columns=own) if own or host is None else host,
         host=host if own else None,
         channels={
             name: _Column(
@@ -298,17 +210,15 @@ def read_table(
         gathered.add(line, block, recipe)
     pa.default_memory_pool().release_unused()  # the text of the last blocks
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
-    order = gathered.clock.order()
+    given = given or Given()
+    order, found = gathered.clock.order(gathered.line(), given.clock)
     line = gathered.line()[order]
-    if order.step == -1:
-        text = "the newest row comes first: read from the end"
-        findings.append(Finding(kind="newest-first", severity=Severity.NOTE, count=len(line), what=text))
+    findings.extend(found)
     if zone_name is not None and gathered.host is None and gathered.clock.stated():
         text = f"the stamps state their own zone: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
         zone_name = None
     told, zone_name = zone_name, zone_name or recipe.time.zone
-    given = given or Given()
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
     if told is not None and recipe.time.zone is not None:
@@ -408,27 +318,6 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
             f"{names.count(column)} columns are called {column!r}", where=where, fix="give the column's number instead"
         )
     return names.index(column)
-
-
-def instants(
-    wall: NDArray[np.int64], utc: NDArray[np.bool_], *, line: NDArray[np.int64], zone_name: str | None, where: str
-) -> tuple[Instants, tuple[Finding, ...]]:
-    """UTC nanoseconds of stamps, some of which may state their own zone.
-
-    Raises:
-        TimeError: stamps without a zone and none named, or impossible in it.
-    """
-    if utc.all():
-        return wall, ()
-    if zone_name is None:
-        at = int(np.flatnonzero(~utc)[0])
-        raise ZoneMissingError(
-            "the stamps carry no time zone", where=f"{where}, line {line[at]}", fix=zone_advice(wall, line)
-        )  # fmt: skip
-    time = wall.copy()
-    rows = ~utc
-    time[rows], found = to_utc(wall[rows], zone(zone_name), lines=line[rows], where=where)
-    return time, found
 
 
 def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:

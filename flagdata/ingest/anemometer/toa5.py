@@ -24,6 +24,7 @@ from flagdata.ingest.anemometer.layout import lay_out
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
+from flagdata.ingest.anemometer.rowclock import Given
 from flagdata.ingest.anemometer.rows import RowReader
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
@@ -76,7 +77,9 @@ class Toa5:
         recipe, assigned, found = self._recipe(source, header, options)
         extra = [name for name in names if name == "RECORD" or _DIAGNOSTIC.fullmatch(name)]
         rows = RowReader(source, recipe.file)
-        table = read_table(rows, recipe, where=str(source.path), zone_name=options.zone, extra=extra)
+        table = read_table(
+            rows, recipe, where=str(source.path), zone_name=options.zone, given=Given(clock=options.clock), extra=extra
+        )
         flags = table.reading.flags.copy()
         listed = tuple(f"{name} [{units[names.index(name)]}]" for name in assigned.unread)
         found.extend(column_findings(replace(assigned, unread=listed)))

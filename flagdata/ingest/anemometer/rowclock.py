@@ -1,0 +1,157 @@
+"""The clock of a table's rows: stamps as their blocks come in, the order of the rows, and their instants in UTC."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError, ZoneMissingError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import counted, disorder
+from flagdata.ingest.anemometer.clock import ClockChoice
+from flagdata.ingest.anemometer.columns import Columns
+from flagdata.ingest.anemometer.growing import Growing
+from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.stamps import Stamps, is_date_alone
+from flagdata.ingest.anemometer.wall import to_utc, zone_advice
+from flagdata.signals import Instants
+from flagdata.timebase import zone
+
+NEWEST_FIRST = 0.9
+"""Share of rows older than the row before them from which a log is a list with the newest row on top."""
+
+Block: TypeAlias = Columns | Sequence[Sequence[str]]
+"""Rows of cells, or their columns."""
+Order: TypeAlias = slice | NDArray[np.int64]
+"""Rows of a table, by a slice or by their indices."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """What the user says about time beside the zone.
+
+    Attributes:
+        start: the first row's instant [UTC ns].
+        date: its day.
+        clock: whose stamps are right where they run back.
+    """
+
+    start: int | None = None
+    date: dt.date | None = None
+    clock: ClockChoice | None = None
+
+
+@dataclass
+class RowClock:
+    """One clock's stamps as their blocks come in."""
+
+    form: str
+    columns: list[int]
+    step: int = 2**62
+    bare_dates: int = 0
+    ns: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
+    utc: Growing[np.bool_] = field(default_factory=lambda: Growing(np.bool_))
+
+    def parse(self, block: Block) -> Stamps:
+        if len(self.columns) == 1:
+            texts = cells_of(block, self.columns[0])
+        elif isinstance(block, Columns):
+            texts = block.joined(self.columns)
+        else:
+            texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
+        if self.form in counted.FORMS or counted.is_time_of_day(self.form):
+            return counted.parse(texts, self.form)
+        stamps, bare = parse_with_bare_dates(texts, self.form)
+        self.bare_dates += bare
+        return stamps
+
+    def add(self, stamps: Stamps, keep: NDArray[np.bool_]) -> None:
+        self.ns.add(stamps.ns[keep])
+        self.utc.add(stamps.utc[keep])
+        self.step = min(self.step, stamps.step)
+
+    def stated(self) -> bool:
+        """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
+        return counted.is_elapsed(self.form) or bool(self.utc.view().all())
+
+    def order(self, line: NDArray[np.int64], choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
+        """The rows from the oldest on, for logs that list the newest first or out of order; and what is said of it.
+
+        Args:
+            line: (n,) numbers of the rows' lines, for messages.
+            choice: what the user says of stamps that run back.
+        """
+        wall = self.ns.view()
+        steps = np.diff(wall)
+        turned = len(steps) > 1 and float((steps < 0).mean()) > NEWEST_FIRST
+        order: Order = slice(None, None, -1) if turned else slice(None)
+        found: tuple[Finding, ...] = ()
+        if turned:
+            text = "the newest row comes first: read from the end"
+            found = (Finding(kind="newest-first", severity=Severity.NOTE, count=len(wall), what=text),)
+        if counted.is_elapsed(self.form) or counted.is_time_of_day(self.form):
+            return order, found  # the order of the rows is what tells their days
+        sorting = disorder.sorting(wall[order], choice)
+        if sorting is None:
+            return order, found
+        return np.arange(len(wall))[order][sorting.order], (*found, sorting.finding(line[order]))
+
+    def instants(
+        self, order: Order, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
+    ) -> tuple[Instants, tuple[Finding, ...]]:
+        """The instants and what was found; the blocks are let go."""
+        wall, utc = self.ns.view()[order], self.utc.view()[order]
+        self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
+        if counted.is_elapsed(self.form):
+            return counted.since_start(wall, self.form, start=given.start, line=line, where=where)
+        found: tuple[Finding, ...] = ()
+        if counted.is_time_of_day(self.form):
+            wall, found = counted.on_days(wall, date=given.date, line=line, where=where)
+        elif given.start is not None or given.date is not None:
+            option = "--start" if given.start is not None else "--date"
+            raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
+        if is_date_alone(self.form):
+            what = "the stamps are dates without a time of day: each row stands for a whole day, put at its midnight"
+            fix = "a mean of a day is no wind at a flag: export the log with the times of its readings"
+            found = (
+                *found,
+                Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),
+            )
+        if self.bare_dates:
+            what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
+            bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)
+            found = (*found, bare)
+        time, further = instants(wall, utc, line=line, zone_name=zone_name, where=where)
+        return time, (*found, *further)
+
+
+def cells_of(block: Block, index: int) -> Sequence[str] | pa.StringArray:
+    """The cells of one column."""
+    return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]
+
+
+def instants(
+    wall: NDArray[np.int64], utc: NDArray[np.bool_], *, line: NDArray[np.int64], zone_name: str | None, where: str
+) -> tuple[Instants, tuple[Finding, ...]]:
+    """UTC nanoseconds of stamps, some of which may state their own zone.
+
+    Raises:
+        TimeError: stamps without a zone and none named, or impossible in it.
+    """
+    if utc.all():
+        return wall, ()
+    if zone_name is None:
+        at = int(np.flatnonzero(~utc)[0])
+        raise ZoneMissingError(
+            "the stamps carry no time zone", where=f"{where}, line {line[at]}", fix=zone_advice(wall, line)
+        )  # fmt: skip
+    time = wall.copy()
+    rows = ~utc
+    time[rows], found = to_utc(wall[rows], zone(zone_name), lines=line[rows], where=where)
+    return time, found

@@ -1,0 +1,129 @@
+"""Rows in another order than they were logged in are sorted; a clock that was set back is still told as such."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from flagdata.errors import TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.clock import ClockChoice
+from flagdata.ingest.anemometer.disorder import longest_rise, sorting
+from flagdata.rng import stream
+from flagdata.signals import WindLog
+
+Read = Callable[..., WindLog]
+START = dt.datetime(2026, 5, 1)  # noqa: DTZ001
+N = 300
+SPEEDS = np.round(stream(8, "disorder").uniform(2, 9, N), 2)
+
+
+def log(rows: Sequence[int], *, site: Callable[[int], str] | None = None) -> str:
+    """The rows of a log of 10 min by their numbers, as a turbine's table has them."""
+    heading = "Timestamp,Wind speed (m/s)\n" if site is None else "Turbine,Timestamp,Wind speed (m/s)\n"
+    text = heading
+    for row in rows:
+        stamp = START + dt.timedelta(minutes=10 * row)
+        text += f"{'' if site is None else site(row) + ','}{stamp},{SPEEDS[row]}\n"
+    return text
+
+
+def blocks(order: Sequence[int], *, size: int = 50) -> list[int]:
+    return [row for block in order for row in range(block * size, (block + 1) * size)]
+
+
+def told(found: WindLog, kind: str) -> Finding:
+    (one,) = [finding for finding in found.findings if finding.kind == kind]
+    return one
+
+
+SHUFFLED = stream(9, "disorder").permutation(N).tolist()
+
+
+@pytest.mark.parametrize(
+    ("rows", "displaced"),
+    [
+        (SHUFFLED, None),
+        (blocks([5, 4, 3, 2, 1, 0]), 250),
+        (blocks([3, 0, 4, 1, 2, 5]), 100),
+        (blocks([1, 0], size=150), 150),
+        ([row for block in range(6) for row in range(block * 50 + 49, block * 50 - 1, -1)], None),
+        ([*range(100), 105, *range(101, 105), 100, *range(106, N)], 2),
+    ],
+)
+def test_rows_out_of_order_are_sorted_and_counted(read: Read, rows: list[int], displaced: int | None) -> None:
+    found = read(log(rows), zone="UTC")
+    assert found.series.channels["wind_speed"].tolist() == SPEEDS.tolist()
+    assert set(np.diff(found.series.time)) == {600_000_000_000}
+    assert not found.series.flags.any()
+    finding = told(found, "rows-sorted")
+    assert finding.severity is Severity.WARNING
+    assert displaced in (None, finding.count)
+    assert "--clock first" in (finding.fix or "")
+    assert not [f for f in found.findings if f.kind in ("time-backwards", "clock-set-back", "gaps")]
+
+
+def test_rows_written_twice_in_a_disordered_file_are_reported(read: Read) -> None:
+    found = read(log([*SHUFFLED[:150], *SHUFFLED[40:60], *SHUFFLED[150:]]), zone="UTC")
+    assert len(found.series) == N
+    assert told(found, "duplicate-rows").count == 20
+
+
+def test_the_rows_of_each_turbine_are_sorted_by_themselves(read: Read) -> None:
+    text = log(SHUFFLED, site=lambda row: f"T{row % 2}")
+    found = read(text, zone="UTC", wind="T1")
+    assert found.series.channels["wind_speed"].tolist() == SPEEDS[1::2].tolist()
+    assert told(found, "rows-sorted").severity is Severity.WARNING
+
+
+def test_wall_clock_rows_are_sorted_before_daylight_saving_is_told(read: Read) -> None:
+    # Amsterdam, 25 October: a fixed zone's hours do not repeat, and the place's do once, here without a second pass
+    found = read(log(blocks([5, 4, 3, 2, 1, 0])), zone="Europe/Amsterdam")
+    assert found.series.time[0] == np.datetime64("2026-04-30T22:00", "ns").astype(np.int64)
+    assert set(np.diff(found.series.time)) == {600_000_000_000}
+
+
+@pytest.mark.parametrize("back", [6, 3, 30])
+def test_a_clock_that_was_set_back_is_no_disorder(read: Read, back: int) -> None:
+    again = iter(SPEEDS)  # the rows after the jump bring readings of their own
+    lines = log([*range(150), *range(150 - back, N - back)]).splitlines()
+    text = "\n".join([lines[0], *(f"{line.rpartition(',')[0]},{next(again)}" for line in lines[1:])]) + "\n"
+    found = read(text, zone="UTC")
+    assert told(found, "clock-set-back").value == -back * 600
+    assert not [f for f in found.findings if f.kind == "rows-sorted"]
+
+
+def test_the_users_word_goes_before_the_evidence(read: Read) -> None:
+    rows = blocks([1, 0], size=150)
+    assert told(read(log(rows), zone="UTC", clock="first"), "clock-set-back").count == 150
+    # a month between two parts that were joined the wrong way round may also be a clock that was set back
+    text = log(range(150, 294)) + log(range(144)).partition("\n")[2].replace("2026-05-01", "2026-04-01")
+    with pytest.raises(TimeError, match="--clock sort"):
+        read(text, zone="UTC")
+    found = read(text, zone="UTC", clock="sort")
+    assert found.series.channels["wind_speed"].tolist() == [*SPEEDS[:144], *SPEEDS[150:294]]
+    assert told(found, "rows-sorted").severity is Severity.NOTE
+
+
+def test_sorting_what_is_in_order_is_said_to_be_unused(read: Read) -> None:
+    assert "--clock sort is not used" in told(read(log(range(N)), zone="UTC", clock="sort"), "clock-not-set").what
+    with pytest.raises(UsageError, match="order in which they came"):
+        read(
+            "".join(f"$GPZDA,12000{s},01,05,2026,00,00\n$WIMWV,10.0,R,{3 + s % 3},M,A\n" for s in range(9)),
+            clock="sort",
+        )
+
+
+@pytest.mark.parametrize("choice", ["first", "last", None])
+def test_a_single_stamp_of_another_year_is_no_row_out_of_order(choice: ClockChoice | None) -> None:
+    for place in (0, 10, 59):
+        time = np.arange(60) * 600_000_000_000 + 1_777_593_600_000_000_000
+        time[place] = 315_532_800_000_000_000
+        assert sorting(time, choice) is None
+
+
+def test_the_longest_rise_is_the_longest() -> None:
+    assert longest_rise(np.array([3, 1, 2, 9, 4, 5])).tolist() == [1, 2, 4, 5]
