@@ -16,27 +16,46 @@ from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import words_of
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
-from flagdata.ingest.anemometer.timechoice import TimeChoice, fits, share, time_choice, whole_numbers
+from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice, whole_numbers
+from flagdata.timebase import NANOSECONDS
 
 MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 """Dates with the name of the month; {s} is the sign between their parts."""
-_PARTS: tuple[tuple[str, str, int, int], ...] = (
-    ("%m", r"mo|mm|month|monat", 1, 12), ("%d", r"d|da|dd|dy|day|dom|tag", 1, 31),
-    ("%H", r"h|hh( 24)?|hr|hour|stunde", 0, 24),
-    ("%M", r"mi|min|mn|mm|minute|m|mi format.*", 0, 59), ("%S%f", r"s|ss|sec|second|sekunde", 0, 60),
-)  # fmt: skip
 _WORDS = {
-    "year": r"year|yyyy|yr|yy|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год",
-    "month": r"month|mon|mo|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц",
-    "day": r"day|dy|dom|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
-    "doy": r"doy|jday|julian|day of year|julian day|yday|jd|dayofyear",
-    "hour": r"hour|hours|hr|hrs|hh|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day",
+    "year": r"year|yyyy|yr|yy|y|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год|year month day .* yyyy",
+    "month": r"month|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц|mon|mo",
+    "day": r"day|dom|dy|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
+    "doy": r"doy|jday|julian|day of year|julian day|julian date|yday|jd|j day|dayofyear|year ?day"
+    r"|(?:decimal|dec) (?:day|doy)|day of year decimal|decimal day of year",
+    "hour": r"hour|hours|hr|hrs|hh( 24)?|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day|hhmm|hour minute",
     "minute": r"minute|minutes|min|mins|minuto|минута|mm",
     "second": r"seconds?|sec|secs|ss|sekunde|seconde|segundo",
 }
 """Headings of the parts of a time in columns of their own, wherever these stand."""
+_BEHIND: dict[str, tuple[str, frozenset[str]]] = {
+    "month": (r"mm?", frozenset({"year", "day"})), "day": (r"da|dd|d", frozenset({"month"})),
+    "hour": (r"h", frozenset({"day", "doy"})), "minute": (r"mi|mn|m|mi format.*", frozenset({"hour"})),
+    "second": (r"s", frozenset({"minute"})),
+}  # fmt: skip
+"""Headings that are of a part of a time only behind another part: they are short, or mean other things as well."""
+_ZONES = r"( utc| gmt| local| lst)?"
+_LIMITS = {
+    "year": (0, 2100), "month": (1, 12), "day": (1, 31), "doy": (1, 367), "hour": (0, 24), "minute": (0, 59),
+    "second": (0, 60),
+}  # fmt: skip
 _OR_LEAST = frozenset({"min", "mins", "mm"})
 """Headings of minutes that may as well be of minima or millimetres."""
+_HOURS_OF_YEAR = re.compile(r"(?:hour|hr|hours) of (?:the )?year|hoy|hour of yr|year ?hour")
+_OF_DAY = {
+    "%G": (re.compile(r"(?:minute|minutes|min) (?:of|in) (?:the )?day|mod"), 1440),
+    "%K": (re.compile(r"(?:second|seconds|sec|secs) (?:of|in) (?:the )?day|sod"), 86_400),
+}
+"""Headings of a time of day in one count, and the largest one."""
+_ENDS = (
+    "the hours run from 1 to 24: each is taken as the end of its hour, 24 as midnight; if they are numbers "
+    "of hours that begin then, the times are an hour late"
+)
+_UNNAMED = (("%m", 1, 12), ("%d", 1, 31), ("%H", 0, 24), ("%M", 0, 59))
 _YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
 _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
@@ -62,10 +81,32 @@ def choices(
         dates: columns that hold whole dates.
         order: of dates written with numbers only, as the user says.
     """
-    found = _parts(layout, columns) or _unnamed_parts(layout, columns) or _unnamed_ordinal(layout, columns)
+    columns = [_whole(cells) for cells in columns]
+    for choice in _choices(layout, columns, dates, order):
+        directives = (choice.form or "").split(" ")
+        at = (
+            choice.columns[directives.index("%H")]
+            if len(directives) == len(choice.columns) and "%H" in directives
+            else None
+        )
+        ends = at is not None and _ends_of_hours([cell for cell in columns[at] if cell])
+        yield replace(choice, remark=_ENDS) if ends else choice
+
+
+def _ends_of_hours(cells: Sequence[str]) -> bool:
+    """Whether hours run from 1 to 24."""
+    hours = numbers(cells).value
+    return bool(np.any(hours == 24)) and not np.any(hours == 0)
+
+
+def _choices(
+    layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int], order: Order | None
+) -> Iterator[TimeChoice]:
+    found = _unnamed_parts(layout, columns) or _unnamed_ordinal(layout, columns)
     if found is not None:
         yield found
     named = _named(layout, columns)
+    yield from _counted(layout, columns, named, dates, order)
     yield from _of_parts(layout, columns, named)
     yield from _by_heading(layout, columns)
     yield from _month_by_name(layout, columns)
@@ -104,50 +145,112 @@ def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator
             yield from _read(layout, columns, taken, forms, score=2.2)
 
 
+def _whole(cells: Sequence[str]) -> Sequence[str]:
+    """Whole numbers written as floats, such as 2026.0, without their ".0"."""
+    filled = [cell for cell in cells if cell]
+    if not filled or not all(re.fullmatch(r"\d+\.0?", cell) for cell in filled):
+        return cells
+    return [cell.partition(".")[0] for cell in cells]
+
+
 def hour_alone(layout: Layout, columns: Sequence[Sequence[str]], index: int) -> bool:
     """Whether a column is the hour of a day and nothing more: its numbers are no minutes, nor hours and minutes."""
-    name = " ".join(words_of(layout.names[index]))
-    if not re.fullmatch(rf"(?:{_WORDS['hour']})( utc| gmt| local| lst)?", name):
+    if not _fits("hour", " ".join(words_of(layout.names[index])), ""):
         return False
     cells = [cell for cell in columns[index] if cell]
     return share(_TWO_DIGITS, cells) and whole_numbers(cells, 0, 24) and not any(re.match(r"0\d\d", c) for c in cells)
 
 
+def _fits(part: str, name: str, before: str) -> bool:
+    """Whether a heading is of a part of a time; `before` is the part that the column before it is of, "" for none."""
+    if re.fullmatch(rf"(?:{_WORDS[part]}){_ZONES}", name):
+        return name not in _OR_LEAST or before == "hour"
+    if part == "hour" and re.fullmatch(
+        r"(?:hour|hours|hr|hrs) (?:ending|end|ended|beginning|begin|starting|start)", name
+    ):
+        return True
+    short, parts = _BEHIND.get(part, ("", frozenset()))
+    return before in parts and bool(re.fullmatch(rf"(?:{short}){_ZONES}", name))
+
+
 def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int]:
     """The first column of each part of a time by its heading, where its numbers are such."""
-    limits = {
-        "year": (0, 2100), "month": (1, 12), "day": (1, 31), "doy": (1, 367), "hour": (0, 24), "minute": (0, 59),
-        "second": (0, 60),
-    }  # fmt: skip
     found: dict[str, int] = {}
+    before = ""
+    maxima = any("max" in words_of(heading) for heading in layout.names)
     for index, heading in enumerate(layout.names):
         name = " ".join(words_of(heading))
-        for part, words in _WORDS.items():
-            if name in _OR_LEAST and not _behind_hours(layout, index):
+        cells = [cell for cell in columns[index] if cell]
+        of = ""
+        for part in _WORDS:
+            if not _fits(part, name, before) or (part == "minute" and name in _OR_LEAST and maxima):
                 continue
-            fitting = part not in found and re.fullmatch(rf"(?:{words})( utc| gmt| local| lst)?", name)
-            if fitting and part == "month" and share(_MONTH_NAME, [cell for cell in columns[index] if cell]):
+            month = part == "month" and share(_MONTH_NAME, cells)
+            clock = part == "hour" and _hours_and_minutes(cells)
+            if part not in found and (month or clock or whole_numbers(cells, *_LIMITS[part])):
+                of = part
                 found[part] = index
                 break
-            if fitting and whole_numbers([cell for cell in columns[index] if cell], *limits[part]):
-                found[part] = index
-                break
+        before = of
+    if "year" in found and not {"month", "doy"} & set(found):
+        # A day beside a year and no month is one of the year.
+        found.pop("day", None)
+        for index, heading in enumerate(layout.names):
+            cells = [cell for cell in columns[index] if cell]
+            if _fits("day", " ".join(words_of(heading)), "") and whole_numbers(cells, *_LIMITS["doy"]):
+                return {**found, "doy": index}
     return found
 
 
-def _behind_hours(layout: Layout, index: int) -> bool:
-    """Whether a column called "min" is of minutes: it follows the hours, and no column is of maxima."""
-    names = [" ".join(words_of(name)) for name in layout.names]
-    return index > 0 and bool(re.fullmatch(_WORDS["hour"], names[index - 1])) and "max" not in names
+def _hours_and_minutes(cells: Sequence[str]) -> bool:
+    """Whether numbers are hours and minutes in one, 0 to 2400, without leading zeros or with them."""
+    if not share(_DIGITS, cells) or not whole_numbers(cells, 0, 2400) or not any(len(cell) > 2 for cell in cells):
+        return False
+    return all(int(cell) % 100 < 60 for cell in cells if cell.isdigit())
+
+
+def _counted(
+    layout: Layout,
+    columns: Sequence[Sequence[str]],
+    named: Mapping[str, int],
+    dates: Sequence[int],
+    order: Order | None,
+) -> Iterator[TimeChoice]:
+    """The hour of the year beside a year, and the minute or second of the day beside a date."""
+    for index, heading in enumerate(layout.names):
+        name = " ".join(words_of(heading))
+        cells = [cell for cell in columns[index] if cell]
+        if "year" in named and _HOURS_OF_YEAR.fullmatch(name) and whole_numbers(cells, 0, 8784):
+            yield from _read(layout, columns, [named["year"], index], ["%Y %E"], score=2.2)
+        for form, (words, most) in _OF_DAY.items():
+            if not words.fullmatch(name) or not whole_numbers(cells, 0, most):
+                continue
+            if {"year", "doy"} <= set(named):
+                yield from _read(layout, columns, [named["year"], named["doy"], index], [f"%Y %j {form}"], score=2.2)
+            if {"year", "month", "day"} <= set(named):
+                taken = [named["year"], named["month"], named["day"], index]
+                yield from _read(layout, columns, taken, [f"%Y %m %d {form}"], score=2.2)
+            for date in dates:
+                try:
+                    forms = [f"{date_form} {form}" for date_form in date_forms(layout, date, order)]
+                except TimeError as error:
+                    yield TimeChoice(
+                        columns=(date, index), form=None, zone=None, zoned=False, score=2.5, doubt=error.what,
+                        fix=error.fix,
+                    )  # fmt: skip
+                    continue
+                yield from _read(layout, columns, [date, index], forms, score=2.2)
 
 
 def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:
     """A year with its month and day or day of the year, in any order, and the time of day beside; or that alone."""
     year = "%Y" if "year" in named and any(len(cell) == 4 for cell in columns[named["year"]]) else "%y"
-    if {"year", "month", "day"} <= set(named):
+    dated = {"year", "month", "day"} <= set(named)
+    ordinal = {"year", "doy"} <= set(named) and year == "%Y"
+    if dated and not (ordinal and named["doy"] < min(named["month"], named["day"]) and "hour" not in named):
         month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
         date, of_date = f"{year} {month} %d", [named[part] for part in ("year", "month", "day")]
-    elif {"year", "doy"} <= set(named) and year == "%Y":
+    elif ordinal:
         whole = not share(_DECIMAL, columns[named["doy"]])
         date, of_date = f"%Y {'%j' if whole else '%J'}", [named["year"], named["doy"]]
         if not whole:
@@ -161,7 +264,7 @@ def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[s
         return
     clock, of_clock = _clock(columns, named)
     if clock:
-        yield from _read(layout, columns, [*of_date, *of_clock], [f"{date} {clock}"], score=2.1)
+        yield from _read(layout, columns, [*of_date, *of_clock], [f"{date} {clock}"], score=2.2)
         return
     for index, cells in enumerate(columns):
         filled = [cell for cell in cells if cell]
@@ -209,6 +312,8 @@ def _clock(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> tuple[
     hours = columns[named["hour"]]
     if share(_DECIMAL, [cell for cell in hours if cell]):
         return _pointed(hours), [named["hour"]]
+    if _hours_and_minutes([cell for cell in hours if cell]):
+        return "%H%M", [named["hour"]]
     if not share(_TWO_DIGITS, [cell for cell in hours if cell]):
         return "", []
     form, taken = "%H", [named["hour"]]
@@ -252,7 +357,7 @@ def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ..
     Raises:
         TimeError: their numbers may be day and month, or month and day.
     """
-    named = ("%Y%m%d", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
+    named = ("%Y%m%d", "%Y%j", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
     try:
         numbered = decide(layout.column(index), told=order or order_of(layout.names[index]), where="").directives()
     except TimeError as error:
@@ -271,41 +376,6 @@ def order_of(heading: str) -> Order | None:
     return known.get(found["first"][0] + found["second"][0])
 
 
-def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
-    """Year, month, day, hour and so on in columns of their own, in this order; or year and day of the year."""
-    names = [" ".join(words_of(name)) for name in layout.names]
-    for index, name in enumerate(names):
-        if not re.fullmatch(r"(y|yy|yyyy|yr|year|jahr|year month day .* yyyy)( utc)?", name) or not whole_numbers(
-            columns[index], 1990, 2100
-        ):
-            continue
-        taken, form = [index], "%Y"
-        at = index + 1
-        if at < len(names) and re.fullmatch(r"doy|jday|julian|jd|day of year|j day|julian day|yday", names[at]):
-            if _part_at(names, columns, at + 1, _PARTS[0]) and _part_at(names, columns, at + 2, _PARTS[1]):
-                at += 1
-            else:
-                taken, form, at = [index, at], "%Y %j", at + 1
-        for part in _PARTS if form == "%Y" else _PARTS[2:]:
-            if not _part_at(names, columns, at, part):
-                break
-            taken, form, at = [*taken, at], f"{form} {part[0]}", at + 1
-        clock = [cell for cell in columns[at] if cell] if at < len(names) else []
-        beside = names[at] if at < len(names) else ""
-        if "%H" not in form and re.fullmatch(r"(hhmm|time|hour minute)( utc)?", beside) and share(_DIGITS, clock):
-            taken, form = [*taken, at], f"{form} %H%M"
-        elif form == "%Y %m %d" and clock and share(_CLOCK, clock):
-            known = next((found for found in CLOCKS if fits(counted.parse(clock, found))), None)
-            taken, form = [*taken, at], f"{form} {known}" if known else form
-        if ("%H" not in form and "%I" not in form) or ("%d" not in form and "%j" not in form):
-            continue
-        texts = [" ".join(cells) for cells in zip(*(columns[i] for i in taken), strict=True)]
-        found, _ = parse_with_bare_dates(texts, form)
-        if fits(found):
-            return time_choice(layout, tuple(taken), form, found, 2.2)
-    return None
-
-
 def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
     """Year, month, day, hour, minute and second side by side where no line names the columns.
 
@@ -318,14 +388,14 @@ def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoi
         if not share(_YEAR, cells):
             continue
         taken, form = [index], "%Y"
-        for (directive, _, low, high), at in zip(_PARTS[:4], range(index + 1, len(columns)), strict=False):
+        for (directive, low, high), at in zip(_UNNAMED, range(index + 1, len(columns)), strict=False):
             if not share(_TWO_DIGITS, columns[at]) or not whole_numbers(columns[at], low, high):
                 break
             taken, form = [*taken, at], f"{form} {directive}"
-        if "%M" not in form:
+        if "%H" not in form or ("%M" not in form and not _hourly([columns[at] for at in taken])):
             continue
         after = taken[-1] + 1
-        if after < len(columns) - 1 and _seconds(columns[after], [columns[at] for at in taken]):
+        if "%M" in form and after < len(columns) - 1 and _seconds(columns[after], [columns[at] for at in taken]):
             taken, form = [*taken, after], f"{form} %S%f"
         texts = [" ".join(row) for row in zip(*(columns[i] for i in taken), strict=True)]
         found, _ = parse_with_bare_dates(texts, form)
@@ -356,6 +426,13 @@ def _unnamed_ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeCh
     return None
 
 
+def _hourly(parts: Sequence[Sequence[str]]) -> bool:
+    """Whether year, month, day and hour in columns that nothing names are those of a log of a row an hour."""
+    found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], "%Y %m %d %H")
+    steps = np.diff(found.ns)
+    return len(steps) >= 24 and bool(found.valid.all()) and float((steps == 3600 * NANOSECONDS).mean()) >= SHARE
+
+
 def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
     """Whether a column behind that of the minutes, which nothing names, is of the seconds."""
     if not share(_SECONDS_OF_MINUTE, cells) or not whole_numbers([cell.split(".")[0] for cell in cells], 0, 59):
@@ -372,9 +449,3 @@ def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
         return bool(np.all(steps[same] > 0))
     # Rows minutes apart: the second of a steady clock stays or drifts, a speed does not.
     return padded and len(steps) > 2 and bool(np.all(np.abs(steps) <= 2))
-
-
-def _part_at(names: Sequence[str], columns: Sequence[Sequence[str]], at: int, part: tuple[str, str, int, int]) -> bool:
-    if at >= len(names):
-        return False
-    return bool(re.fullmatch(rf"({part[1]})( utc)?", names[at])) and whole_numbers(columns[at], part[2], part[3])

@@ -172,6 +172,8 @@ def draft(
     if time is not None and time.unnamed:
         shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
+    if time is not None and time.remark is not None:
+        warnings = (*warnings, time.remark)
     if columns is None and chosen is not None:
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))

@@ -4,8 +4,12 @@ Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which stands for an opt
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
 optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
 for "AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read. %Q is the hour with its fraction,
-%J the day of the year with its own (1.5 is noon of 1 January). 24:00 is the midnight that ends a day (ISO 8601:2004,
-4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+%J the day of the year with its own (1.5 is noon of 1 January). %E is the hour of the year since New Year, %G the
+minute and %K the second of the day, each with a fraction or none. %s is Unix time in seconds; %L, %U and %N are the
+milli-, micro- and nanoseconds of a second in a number of their own ("12:00:01 50" with %L is 01.050). %D is a day
+numbered from a start that the user gives. Numbers between blanks may end in ".0", as tables of floats have them.
+24:00 is the midnight that ends a day (ISO 8601:2004, 4.2.3). A blank stands for any run of blanks or a "T". Two-digit
+years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -31,6 +35,9 @@ DAY = 86_400 * NANOSECONDS
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
+    "E": r"(?P<E>\d{1,4}(?:\.\d{0,9})?)", "G": r"(?P<G>\d{1,4}(?:\.\d{0,9})?)", "K": r"(?P<K>\d{1,5}(?:\.\d{0,9})?)",
+    "s": r"(?P<s>\d{9,10})", "L": r"(?P<L>\d{1,3})", "U": r"(?P<U>\d{1,6})", "N": r"(?P<N>\d{1,9})",
+    "D": r"(?P<D>\d{1,5})",
     "Q": r"(?P<Q>\d{1,2}(?:\.\d{1,9})?)", "J": r"(?P<J>\d{1,3}(?:\.\d{1,9})?)",
     "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
     "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
@@ -46,6 +53,15 @@ _CLOCK_RUNS = {
 """Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
 _NUMERIC = re.compile(r"%[YymdjHIMS]")
 """Directives of numbers; those with nothing between them have all their digits."""
+_WHOLE = re.compile(r"%[YmdjHMSLUNsD](?= |$)")
+"""Directives of whole numbers, where a blank or the end follows."""
+_DECIMALS = (
+    ("Q", 3600 * NANOSECONDS, 0.0, 24.0), ("J", DAY, 1.0, 367.0), ("E", 3600 * NANOSECONDS, 0.0, 8784.0),
+    ("G", 60 * NANOSECONDS, 0.0, 1440.0), ("K", NANOSECONDS, 0.0, 86_400.0),
+)  # fmt: skip
+"""Directives of counts with a fraction: letter, length of one [ns], first and last."""
+_SUBSECONDS = {"L": 1_000_000, "U": 1_000, "N": 1}
+"""Directives of parts of a second [ns]."""
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
     r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?"
@@ -115,6 +131,8 @@ def pattern(form: str) -> str:
             beside = _NUMERIC.match(form, position + 2) or (position > 1 and _NUMERIC.match(form, position - 2))
             fixed = bool(beside) and directive in "mdHMSI"
             out.append(f"(?P<{directive}>\\d{{2}})" if fixed else _GROUPS[directive])
+            if _WHOLE.match(form, position) and (position == 0 or form[position - 1] == " "):
+                out.append(r"(?:\.0*)?")
             position += 2
             continue
         out.append(r"[T\s]+" if letter == " " else re.escape(letter))
@@ -123,16 +141,17 @@ def pattern(form: str) -> str:
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
     dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
     dated = dated or {"y", "b", "d"} <= set(used)
-    if not (dated or {"Y", "j"} <= set(used) or {"Y", "J"} <= set(used)):
+    dated = dated or "s" in used or ("Y" in used and bool({"j", "J", "E", "D"} & set(used)))
+    if not dated:
         raise UsageError("no whole date in it", where=f"time format {form!r}", fix="name year, month and day")
-    if not {"H", "I", "Q"} & set(used) and {"M", "S", "f", "p"} & set(used):
+    if not {"H", "I", "Q", "E", "G", "K"} & set(used) and {"M", "S", "f", "p"} & set(used):
         raise UsageError("no hour in it", where=f"time format {form!r}", fix="name the hour, or the date alone")
     return "^" + "".join(out) + "$"
 
 
 def is_date_alone(form: str) -> bool:
     """Whether a format has directives of a date, but none of the time of day."""
-    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSfQJ")
+    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSfQJEGKs")
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
@@ -157,21 +176,26 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     zero = np.zeros(len(text), dtype=np.int64)
     minute, second = zero if minute is None else minute, zero if second is None else second
     valid &= ((hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))) & (minute < 60) & (second < 60)
-    year = zero if year is None else year
+    year = np.full_like(zero, 1970 if "%s" in form else 0) if year is None else year
     distant = written & ((year < YEARS[0]) | (year > YEARS[1]))
     days, ok = _days(found, part, year)
     valid &= ok
     fraction, digits = _fraction(found)
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
     decimal_step = 0
-    for name, length, first, last in (("Q", 3600 * NANOSECONDS, 0.0, 24.0), ("J", DAY, 1.0, 366.0)):
+    for name, length, first, last in _DECIMALS:
         decimal = _decimal(found, name, length)
         if decimal is None:
             continue
         count, rounded, decimal_step = decimal
         ns = ns + rounded - round(first) * length
-        valid &= (count >= first) & (count <= last + (name == "J"))
+        valid &= (count >= first) & (count <= last)
     offset, utc = _offset(found, len(text))
+    if (unix := part("s")) is not None:
+        ns, utc, distant = ns + unix * NANOSECONDS, np.ones_like(valid), np.zeros_like(valid)
+    for name, length in _SUBSECONDS.items():
+        if (parts := part(name)) is not None:
+            ns, digits = ns + parts * length, {"L": 3, "U": 6, "N": 9}[name]
     step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else 60 * NANOSECONDS
     step = 10 ** (9 - digits) if digits else step
     step = decimal_step or step
@@ -272,8 +296,10 @@ def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[
 def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Days since 1970 and whether the date exists (Hinnant, "chrono-compatible low-level date algorithms")."""
     of_year = part("j")
-    if _field(found, "J") is not None:
+    if any(_field(found, name) is not None for name in ("J", "E", "s")):
         of_year = np.ones_like(year)  # the days are counted with their fraction
+    if (numbered := part("D")) is not None:
+        return _civil(year, np.ones_like(year), np.ones_like(year)) + numbered, np.ones(len(year), dtype=bool)
     if of_year is not None:
         first = _civil(year, np.ones_like(year), np.ones_like(year))
         leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))

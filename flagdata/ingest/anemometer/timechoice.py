@@ -30,6 +30,7 @@ class TimeChoice:
         fix: what the user can say.
         score: how well it fits, for the choice among several.
         counts: whether it counts from a start, by a unit that may not be known.
+        remark: what was taken for granted, and may be otherwise; `None` where nothing was.
         unnamed: whether it is told by its numbers alone, since no line names the columns.
     """
 
@@ -42,6 +43,7 @@ class TimeChoice:
     fix: str | None = None
     counts: bool = False
     unnamed: bool = False
+    remark: str | None = None
 
 
 def share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:

@@ -24,6 +24,7 @@ from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
+    r"|^\s*(19|20)\d\d(?:[0-2]\d\d|3[0-6]\d)\s*$"
 )
 _CLOCK = re.compile(
     r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"

@@ -132,3 +132,53 @@ def test_a_year_a_day_of_it_and_a_clock_that_nothing_names_are_offered_as_such(l
     assert ",year,day_of_year,time[%H%M]," in (caught.value.fix or "")
     time = _times(path, zone="UTC", columns=",year,day_of_year,time[%H%M],wind_speed[m/s],wind_direction[deg]")
     assert time[0] == np.datetime64("2026-05-01T07:00")
+
+
+@pytest.mark.parametrize(
+    ("heading", "row", "first", "step"),
+    [
+        ("Year,Hour of year", lambda at: f"2026,{at}", "2026-01-01T00:00", 60),
+        ("Year,HOY", lambda at: f"2026,{at + 1}", "2026-01-01T01:00", 60),
+        (
+            "Year,Day,Hour",
+            lambda at: f"2026,{100 + at // 48},{at % 48 // 2 * 100 + at % 2 * 30}",
+            "2026-04-10T00:00",
+            30,
+        ),
+        ("Year,Julian Day,Hour", lambda at: f"2026,{100 + at // 24},{at % 24 * 100}", "2026-04-10T00:00", 60),
+        ("Year,Month,Day,Hour", lambda at: f"2026,5,{1 + at // 24},{at % 24 * 100}", "2026-05-01T00:00", 60),
+        ("Year,Month,Day,Hour", lambda at: f"2026.0,5.0,{1 + at // 24}.0,{at % 24}.0", "2026-05-01T00:00", 60),
+        ("Year,Decimal day", lambda at: f"2026,{1 + at / 48:.4f}", "2026-01-01T00:00", 30),
+        ("Date,Hour ending", lambda at: f"2026-05-{1 + at // 24:02d},{at % 24 + 1}", "2026-05-01T01:00", 60),
+        ("Date,Minute of day", lambda at: f"2026-05-{1 + at // 288:02d},{at % 288 * 5}", "2026-05-01T00:00", 5),
+        ("Date,Seconds of day", lambda at: f"2026-05-01,{at * 60}", "2026-05-01T00:00", 1),
+        ("Year,DOY,Minute of day", lambda at: f"2026,{100 + at // 288},{at % 288 * 5}", "2026-04-10T00:00", 5),
+        ("Day,Hour", lambda at: f"2026{100 + at // 24},{at % 24}", "2026-04-10T00:00", 60),
+        ("yyyy,mm,dd,hh,mm,ss", lambda at: f"2026,5,1,{at // 60},{at % 60},0", "2026-05-01T00:00", 1),
+    ],
+)
+def test_counts_of_hours_days_and_minutes_are_times(
+    log_file: Write, heading: str, row: Callable[[int], str], first: str, step: int
+) -> None:
+    rows = "".join(f"{row(at)},{3 + at % 2}.5\n" for at in range(200))
+    time = _times(log_file(f"{heading},wind speed (m/s)\n{rows}"), zone="UTC")
+    assert len(time) == 200
+    assert time[0] == np.datetime64(first)
+    assert np.all(np.diff(time) == np.timedelta64(step, "m"))
+
+
+@pytest.mark.parametrize(("first", "said"), [(1, True), (0, False)])
+def test_hours_from_1_to_24_are_said_to_be_ends(log_file: Write, first: int, said: bool) -> None:
+    rows = "".join(f"2026,5,{1 + at // 24},{at % 24 + first},{3 + at % 2}.5\n" for at in range(72))
+    found = read_log(log_file(f"Year,Month,Day,Hour,wind speed (m/s)\n{rows}"), WindOptions(zone="UTC"))
+    assert np.all(np.diff(found.series.time.astype("datetime64[ns]")) == _HOUR)
+    assert said == any("hours run from 1 to 24" in finding.what for finding in found.findings)
+
+
+def test_a_year_a_month_a_day_and_an_hour_that_nothing_names_are_offered_as_such(log_file: Write) -> None:
+    rows = "".join(f"2026 5 {1 + at // 24} {at % 24} {3 + at % 2}.5 230\n" for at in range(72))
+    with pytest.raises(InputError, match='"year,month,day,hour,') as caught:
+        _times(log_file(rows), zone="UTC")
+    assert caught.value.fix
+    columns = "year,month,day,hour,wind_speed[m/s],wind_direction[deg]"
+    assert np.all(np.diff(_times(log_file(rows), zone="UTC", columns=columns)) == _HOUR)
