@@ -1,7 +1,7 @@
-"""How alike the errors of a model are in two windows of one film: measured on films whose truth is known.
+"""How alike the errors of a model are in two windows of one film: measured on simulated films, whose truth is known.
 
 All is on the targets' logits z, less the prior's mean and over its standard deviation; a window's posterior there has
-mean m and variance v. Correlations are those over films, one film a simulation.
+mean m and variance v. Correlations are those of all pairs of windows of a film, over films, one film a simulation.
 
 - Of the wind, of which each window has its own posterior: of the errors (m − z)/√v.
 - Of the cloth, of which likelihoods are multiplied: of the scores s = m/v − (1/v − 1) z, the derivatives at the truth
@@ -9,17 +9,14 @@ mean m and variance v. Correlations are those over films, one film a simulation.
   of 0, whereas its error is that of the prior, the same in both. Tempering by the correlation of scores adjusts the
   magnitude of a composite likelihood (Ribatet, Cooley and Davison, Statistica Sinica 22, 2012).
 
-Films of a data set are two seconds long, so that their first and last windows of 1.2 s share up to a third of their
-frames; what is found is then an upper bound for windows that follow each other, and errs on the side of wider
-intervals.
-
-The result belongs to a model. It stands in the model's card under "window_correlation", where `of_model` finds it;
-`python -m measure.estimate.dependence` measures it anew and writes it there.
+Windows of the films (`measure.estimate.long_films`) follow each other and do not overlap, as those do that an answer
+rests on. The result belongs to a model. It stands in the model's card under "window_correlation", where `of_model`
+finds it; `python -m measure.estimate.dependence` measures it anew and writes it there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,10 +27,10 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.console import progress, say
-from flagdata.dataset import Pairs
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, UNKNOWN, Dependence
+from measure.estimate.long_films import LongFilm, simulated
 from models.estimator import SHIPPED, Estimator
 from models.storage import read_card, write_card
 from models.targets import truth
@@ -47,70 +44,66 @@ _UPPER = 0.9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Errors:
-    """Errors of two windows of each film: of `OWN` targets standardised errors, of the cloth's scores.
+    """Errors of the windows of each film: of `OWN` targets standardised errors, of the cloth's scores.
 
     Attributes:
         names: of the targets.
-        first, last: (film, target).
+        values: (film, window, target).
     """
 
     names: tuple[str, ...]
-    first: NDArray[np.float64]
-    last: NDArray[np.float64]
+    values: NDArray[np.float64]
 
     def correlation(self, name: str, *, seed: int = 0) -> tuple[float, float]:
-        """The correlation of one target, and the upper end of its one-sided 90 % interval by resampling films."""
-        column = self.names.index(name)
-        a, b = self.first[:, column], self.last[:, column]
+        """The correlation of one target in two windows, and the upper end of its one-sided 90 % interval by resampling
+        films."""
+        own = self.values[..., self.names.index(name)]
         generator = stream(seed, "window-correlation", name)
-        drawn = generator.integers(len(a), size=(_RESAMPLES, len(a)))
-        return _about_zero(a, b), float(np.quantile([_about_zero(a[rows], b[rows]) for rows in drawn], _UPPER))
+        drawn = generator.integers(len(own), size=(_RESAMPLES, len(own)))
+        return _about_zero(own), float(np.quantile([_about_zero(own[rows]) for rows in drawn], _UPPER))
 
     def dependence(self, *, seed: int = 0) -> Dependence:
         """What is used: upper ends, not below 0; of the cloth's targets the largest."""
         ends = {name: min(max(self.correlation(name, seed=seed)[1], 0.0), 1.0) for name in self.names}
+        films, windows, _ = self.values.shape
         return Dependence(
             wind=max((end for name, end in ends.items() if name in OWN), default=1.0),
             cloth=max((end for name, end in ends.items() if name not in OWN), default=1.0),
-            source=f"upper 90 % limits over {len(self.first)} simulated films",
+            source=f"upper 90 % limits over {films} simulated films of {windows} windows",
         )
 
 
-def errors(model: Estimator, pairs: Pairs, *, seed: int = 0, advance: Callable[[int], None] | None = None) -> Errors:
-    """Errors of the first and the last window of films whose truth is known, one film a simulation.
+def errors(model: Estimator, films: Iterable[LongFilm], *, seed: int = 0) -> Errors:
+    """Errors of the windows of films whose truth is known, one film a simulation.
 
     Args:
-        pairs: clips of such films; they must not have been trained on.
-        advance: called with 1 for each film.
+        films: all of the same number of windows, two at least.
 
     Raises:
-        InputError: fewer than ten simulations, films no longer than a window, or clips that do not state the truth.
+        InputError: fewer than ten films, or films that do not state the truth.
     """
-    table = pairs.table
-    chosen = np.unique(table.seed, return_index=True)[1].tolist()
-    if len(chosen) < 10:
-        raise InputError(f"{len(chosen)} simulations", where="clips", fix="give clips of ten simulations or more")
     scaling = model.learners[0].scaling
-    logits: list[list[NDArray[np.float64]]] = []
-    count = model.front_end.frames
-    for number, index in enumerate(chosen):
-        film = pairs.film(index)
-        if len(film) <= count:
-            raise InputError(
-                f"a film of {len(film)} frames has no two windows of {count}",
-                where=str(table.recording[index]), fix="give longer films",
-            )  # fmt: skip
-        inputs = model.inputs(np.stack([film[:count], film[-count:]]))
-        told = model.logits(model.embeddings(inputs), seed=child_seed(seed, "film", number), draws=_DRAWS)
-        logits.append([part.double().numpy() for part in told])
-        if advance is not None:
-            advance(1)
-    draws = np.array(logits)  # (film, 2, draw, target)
-    parameters = table.parameter_columns(chosen)
-    known = scaling.learned(torch.from_numpy(truth(parameters, scaling.names))).double().numpy()
+    logits: list[NDArray[np.float64]] = []
+    parameters: list[dict[str, float]] = []
+    for number, film in enumerate(films):
+        told = model.logits(
+            model.embeddings(model.inputs(film.windows)), seed=child_seed(seed, "film", number), draws=_DRAWS
+        )
+        logits.append(told.double().cpu().numpy())
+        parameters.append(film.parameters)
+    if len(logits) < 10:
+        raise InputError(f"{len(logits)} films", where="films", fix="give ten or more")
+    known = truth(columns_of(parameters), scaling.names)
     centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
-    found = errors_of((draws - centre) / spread, (known - centre) / spread, scaling.quantities)
-    return Errors(names=scaling.quantities, first=found[:, 0], last=found[:, 1])
+    place = scaling.learned(torch.from_numpy(known)).double().numpy()
+    found = errors_of((np.array(logits) - centre) / spread, (place - centre) / spread, scaling.quantities)
+    return Errors(names=scaling.quantities, values=found)
+
+
+def columns_of(parameters: Sequence[dict[str, float]]) -> dict[str, NDArray[np.float64]]:
+    """Name → (film,) values; NaN where a film does not state one."""
+    names = {name for one in parameters for name in one}
+    return {name: np.array([one.get(name, np.nan) for one in parameters]) for name in names}
 
 
 def errors_of(draws: NDArray[np.float64], truth: NDArray[np.float64], names: Sequence[str]) -> NDArray[np.float64]:
@@ -129,10 +122,13 @@ def errors_of(draws: NDArray[np.float64], truth: NDArray[np.float64], names: Seq
     return np.where(own, error, score)
 
 
-def _about_zero(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Correlation of (n,) values whose means are known to be 0; 1 where one of them is 0 throughout."""
-    scale = float(np.sqrt(np.square(a).sum() * np.square(b).sum()))
-    return float((a * b).sum()) / scale if scale > 0 else 1.0
+def _about_zero(own: NDArray[np.float64]) -> float:
+    """Correlation of two windows of (film, window) values whose means are known to be 0, over all pairs of windows; 1
+    where all are 0."""
+    count = own.shape[1]
+    square = np.square(own).sum()
+    pairs = np.square(own.sum(axis=1)).sum() - square
+    return float(pairs / (count - 1) / square) if square > 0 else 1.0
 
 
 def card_entry(found: Errors, *, seed: int = 0) -> dict[str, Any]:
@@ -166,26 +162,28 @@ def of_model(model: Estimator) -> Dependence:
 
 @click.command()
 @click.argument("name")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
-              help="Where the films are.")  # fmt: skip
-@click.option("--at", help="Version of the lake.")
-@click.option("--side", default="validation", show_default=True, help="Side of the data; it must not be trained on.")
+@click.option("--films", type=click.IntRange(10), default=200, show_default=True, help="How many films are simulated.")
+@click.option("--windows", type=click.IntRange(2), default=6, show_default=True, help="How many windows a film has.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the films.")
 @click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
-def main(name: str, lake_path: Path, at: str | None, side: str, out: Path) -> None:
-    """Measure how alike two windows of one film are to the shipped model NAME, and write it into its card."""
-    import flagdata
+def main(name: str, films: int, windows: int, seed: int, out: Path) -> None:
+    """Measure how alike windows of one film are to the shipped model NAME, and write it into its card."""
     from models.estimator import load
-    from models.training.recipe import DataSpec
 
     model = load(out / name)
-    recipe: Any = model.card["recipe"]
-    spec = DataSpec.of_identity(recipe["data"])
-    pairs = flagdata.open(lake_path).pairs(at=at, split=side, split_by=spec.split("train", side))
-    with progress(len(set(pairs.table.seed.tolist())), label="windows", unit="film") as advance:
-        entry = card_entry(errors(model, pairs, advance=advance))
+    with progress(films, label="windows", unit="film") as advance:
+        entry = card_entry(
+            errors(model, _counted(simulated(model, count=films, windows=windows, seed=seed), advance)), seed=seed
+        )
     card = {key: value for key, value in read_card(out / name).items() if key != "format"}
     write_card(out / name, {**card, CARD_KEY: entry})
     say(f"errors of two windows correlate by {entry['wind']:.2f} in wind and {entry['cloth']:.2f} in cloth")
+
+
+def _counted(films: Iterable[LongFilm], advance: Callable[[int], None]) -> Iterable[LongFilm]:
+    for film in films:
+        advance(1)
+        yield film
 
 
 if __name__ == "__main__":

@@ -1,94 +1,229 @@
-"""Whether intervals of several windows together hold what they say: on the test side's films, whose truth is known.
+"""Whether intervals of one window and of several together hold what they say, on long films whose truth is known.
 
-The lake is that of FLAGDATA_LAKE, with the data set that the shipped model was trained on. A film of it is two seconds
-long: its first and last 1.2 s are two windows that share up to a third of their frames, as they did when the
-correlation of their errors was measured, on the validation side.
+Films of six windows of 1.2 s are simulated of the cloths that the shipped model was trained on, each with a seed of its
+own (`measure.estimate.long_films`). One window of each: ranks of simulation-based calibration (Talts et al.,
+arXiv:1804.06788), coverage, and expected coverage by random points (TARP). Two, four and six: coverage, error and width
+of the answer that `flagdata measure` gives. How errors of two windows correlate is told by how far they are apart.
+
+FLAGDATA_WINDOWS_FILMS says how many films (300).
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-import flagdata
 from flagdata.console import progress
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, combined
-from measure.estimate.dependence import of_model
+from measure.estimate.dependence import columns_of, of_model
+from measure.estimate.long_films import simulated
 from models import estimator
 from models.estimator import Estimator
+from models.evaluation.bootstrap import Resamples
+from models.evaluation.calibration import LEVELS, Coverage, coverage, rank_histogram, tarp
+from models.evaluation.predictions import WIND, Predictions
 from models.targets import truth
-from models.training.recipe import DataSpec
 
-LEVELS = (0.5, 0.8, 0.9)
-FILMS = 300
+FILMS = int(os.environ.get("FLAGDATA_WINDOWS_FILMS", "300"))
+WINDOWS = 6
+TOGETHER = (1, 2, 4, 6)
 _DRAWS = 400
 
+Array = NDArray[np.float64]
 
-def run(*, seed: int, out: object) -> dict[str, Any]:
-    """Coverage, width and error of one window and of two, by target."""
-    path = os.environ.get("FLAGDATA_LAKE")
-    if path is None:
-        return {"left_out": "no lake; set FLAGDATA_LAKE to the one that the shipped model was trained on"}
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Told:
+    """What the model says of films.
+
+    Attributes:
+        logits: (film, window, draw, target).
+        known: (film, target).
+        dataset: (film,) whose cloth it shows.
+    """
+
+    logits: Array
+    known: Array
+    dataset: NDArray[np.str_]
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Calibration of one window and of several, and how errors of windows correlate."""
+    torch.set_num_threads(1)
     model = estimator.shipped()
-    recipe: Any = model.card["recipe"]
-    data: Any = model.card["data"]
-    spec = DataSpec.of_identity(recipe["data"])
-    split = spec.split("train", "test")
-    pairs = flagdata.open(path).pairs(at=data["at"], split="test", split_by=split)
-    chosen = np.unique(pairs.table.seed, return_index=True)[1][:FILMS].tolist()
-    names = tuple(model.learners[0].scaling.names)
-    columns = pairs.table.parameter_columns(chosen)
-    known = truth(columns, names)
-    draws: dict[str, list[NDArray[np.float64]]] = {"one window": [], "two windows": []}
-    count = model.front_end.frames
-    with progress(len(chosen), label="windows", unit="film") as advance:
-        for number, index in enumerate(chosen):
-            film = pairs.film(index)
-            inputs = model.inputs(np.stack([film[:count], film[-count:]]))
-            found = model.logits(model.embeddings(inputs), seed=child_seed(seed, "film", number), draws=_DRAWS)
-            logits = found.double().numpy()
-            for label, windows in (("one window", logits[:1]), ("two windows", logits)):
-                draws[label].append(_joint(model, windows, seed=seed, number=number))
-            advance(1)
+    told = _told(model, seed=seed)
+    answers = {count: _answers(model, told, count, seed=seed) for count in TOGETHER}
+    resamples = Resamples.of(answers[1].group, generator=stream(seed, "measure-windows", "bootstrap"))
     dependence = of_model(model)
-    return {
-        "model": model.name, "films": len(chosen),
+    found = {
+        "model": model.name, "films": len(told.known), "windows": WINDOWS,
         "dependence": {"wind": dependence.wind, "cloth": dependence.cloth, "source": dependence.source},
-        **{label: _judged(np.stack(values), known, names) for label, values in draws.items()},
+        "correlation_by_distance": _correlations(model, told),
+        "one_window": {
+            "ranks": {name: _ranks(answers[1], name) for name in answers[1].targets},
+            "tarp": _shares(
+                tarp((answers[1],), resamples, generator=stream(seed, "measure-windows", "tarp"), levels=LEVELS)
+            ),
+        },
+        "together": {
+            str(count): {name: _scores(answer, name, resamples) for name in answer.targets}
+            for count, answer in answers.items()
+        },
+        "by_dataset": {
+            str(name): {str(count): _wind(answer, told.dataset == name) for count, answer in answers.items()}
+            for name in np.unique(told.dataset)
+        },
     }  # fmt: skip
+    (out / "validate-measure-windows.md").write_text(page(found), encoding="utf-8")
+    return found
 
 
-def _joint(model: Estimator, logits: NDArray[np.float64], *, seed: int, number: int) -> NDArray[np.float64]:
-    """(draw, target) of windows together, the wind their mean."""
+def _told(model: Estimator, *, seed: int) -> Told:
+    logits: list[Array] = []
+    parameters: list[dict[str, float]] = []
+    dataset: list[str] = []
+    own = child_seed(seed, "measure-windows", "films")
+    with progress(FILMS, label="windows", unit="film") as advance:
+        for number, film in enumerate(simulated(model, count=FILMS, windows=WINDOWS, seed=own)):
+            found = model.logits(
+                model.embeddings(model.inputs(film.windows)), seed=child_seed(own, "film", number), draws=_DRAWS
+            )
+            logits.append(found.double().numpy())
+            parameters.append(film.parameters)
+            dataset.append(film.dataset)
+            advance(1)
+    known = truth(columns_of(parameters), model.learners[0].scaling.names)
+    return Told(logits=np.array(logits), known=known, dataset=np.array(dataset))
+
+
+def _answers(model: Estimator, told: Told, count: int, *, seed: int) -> Predictions:
+    """What is said of each film by its first windows together, the wind their mean."""
     learner = model.learners[0]
-    names = tuple(learner.scaling.names)
-    winds, cloth = combined(
-        logits, names=names, centre=learner.centre.double().numpy(), spread=learner.spread.double().numpy(),
-        dependence=of_model(model), generator=stream(seed, "combine", number),
+    names = learner.scaling.quantities
+    own = np.array([name in OWN for name in names])
+    draws = []
+    for number, logits in enumerate(told.logits[:, :count]):
+        winds, cloth = combined(
+            logits, names=names, centre=learner.centre.double().numpy(), spread=learner.spread.double().numpy(),
+            dependence=of_model(model), generator=stream(seed, "combine", number),
+        )  # fmt: skip
+        whole = np.empty((*winds.shape[:2], len(names)))
+        whole[..., own] = winds
+        whole[..., ~own] = cloth
+        draws.append(learner.scaling.values(torch.from_numpy(whole)).numpy().mean(axis=0))
+    samples = np.array(draws, dtype=np.float32)
+    return Predictions(
+        label=f"{count} windows", targets=names, truth=told.known, mean=samples.mean(axis=1, dtype=np.float64),
+        samples=samples, embedding=None, group=np.arange(len(samples)), parameters=0, milliseconds=0.0, note="",
     )  # fmt: skip
-    whole = np.empty((*winds.shape[:2], len(names)))
-    whole[..., [name in OWN for name in names]] = winds
-    whole[..., [name not in OWN for name in names]] = cloth
-    return learner.scaling.values(torch.from_numpy(whole)).numpy().mean(axis=0)
 
 
-def _judged(draws: NDArray[np.float64], known: NDArray[np.float64], names: tuple[str, ...]) -> dict[str, Any]:
-    """Of draws (film, draw, target) against the truth (film, target)."""
-    covered = {}
-    for level in LEVELS:
-        low, high = np.quantile(draws, [(1 - level) / 2, (1 + level) / 2], axis=1)
-        covered[f"{level:g}"] = ((low <= known) & (known <= high)).mean(axis=0)
-    low, high = np.quantile(draws, [0.05, 0.95], axis=1)
-    error = draws.mean(axis=1) - known
+def _correlations(model: Estimator, told: Told) -> list[float]:
+    """Of the errors of the wind's logit, standardised, in windows that are 1, 2, … apart."""
+    column = model.learners[0].scaling.quantities.index(WIND)
+    place = model.learners[0].scaling.learned(torch.from_numpy(told.known)).double().numpy()[:, column]
+    draws = told.logits[..., column]
+    error = (draws.mean(axis=2) - place[:, None]) / draws.std(axis=2)
+    found = []
+    for apart in range(1, WINDOWS):
+        first, second = error[:, :-apart], error[:, apart:]
+        found.append(float((first * second).sum() / np.sqrt(np.square(first).sum() * np.square(second).sum())))
+    return found
+
+
+def _ranks(answer: Predictions, name: str) -> dict[str, Any]:
+    histogram = rank_histogram((answer,), name)
     return {
-        name: {
-            "rmse": float(np.sqrt(np.mean(error[:, k] ** 2))), "median_absolute": float(np.median(np.abs(error[:, k]))),
-            "width": float((high - low)[:, k].mean()), "covered": {level: float(c[k]) for level, c in covered.items()},
-        }
-        for k, name in enumerate(names)
+        "share": list(histogram.share), "low": histogram.low, "high": histogram.high, "outside": histogram.outside,
     }  # fmt: skip
+
+
+def _shares(found: Sequence[Coverage]) -> dict[str, Any]:
+    return {f"{one.level:g}": one.share.as_dict() for one in found}
+
+
+def _scores(answer: Predictions, name: str, resamples: Resamples) -> dict[str, Any]:
+    """Covered shares, error and mean width of the 90 % interval."""
+    column = answer.column(name)
+    return {
+        "covered": _shares(coverage((answer,), name, resamples)),
+        "rmse": float(np.sqrt(np.square(answer.mean - answer.truth)[:, column].mean())),
+        "width": float(_widths(answer)[:, column].mean()),
+    }  # fmt: skip
+
+
+def _widths(answer: Predictions) -> Array:
+    assert answer.samples is not None
+    low, high = np.quantile(answer.samples, [0.05, 0.95], axis=1)
+    return high - low
+
+
+def _wind(answer: Predictions, chosen: NDArray[np.bool_]) -> dict[str, Any]:
+    assert answer.samples is not None
+    column = answer.column(WIND)
+    known, draws = answer.truth[chosen, column], answer.samples[chosen, :, column]
+    low, high = np.quantile(draws, [0.05, 0.95], axis=1)
+    error = answer.mean[chosen, column] - known
+    return {
+        "films": int(chosen.sum()), "bias": float(error.mean()), "rmse": float(np.sqrt(np.square(error).mean())),
+        "covered_90": float(((low <= known) & (known <= high)).mean()),
+    }  # fmt: skip
+
+
+def page(found: Mapping[str, Any]) -> str:
+    """The sheet in Markdown."""
+    lines = [
+        "# Intervals of one window and of several", "",
+        _about(found), "",
+        "| windows | wind: RMSE [m/s] | width of the 90 % interval [m/s] | covered at 50 % | at 80 % | at 90 % |",
+        "|---|---|---|---|---|---|",
+        *(_of_wind(count, of[WIND]) for count, of in found["together"].items()), "",
+        "Expected coverage of all targets together by random points, one window: " + "; ".join(
+            f"{float(level):.0%}: {_share(share)}" for level, share in found["one_window"]["tarp"].items()
+        ) + ".", "",
+        "| target, one window | covered at 50 % | at 80 % | at 90 % | rank bins out of the 99 % band, of 10 |",
+        "|---|---|---|---|---|",
+        *(
+            f"| {name} | " + " | ".join(_share(share) for share in of["covered"].values())
+            + f" | {found['one_window']['ranks'][name]['outside']} |"
+            for name, of in found["together"]["1"].items()
+        ), "",
+        "| films of | how many | windows | bias [m/s] | RMSE [m/s] | covered at 90 % |", "|---|---|---|---|---|---|",
+        *(
+            f"| {name} | {of['films']} | {count} | {of['bias']:+.2f} | {of['rmse']:.2f} | {of['covered_90']:.0%} |"
+            for name, own in found["by_dataset"].items() for count, of in own.items()
+        ), "",
+        "Errors of the wind in two windows that begin 1.2, 2.4, … s apart correlate by "
+        + ", ".join(f"{value:.2f}" for value in found["correlation_by_distance"])
+        + f"; {found['dependence']['wind']:.2f} is assumed ({found['dependence']['source']}).",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _about(found: Mapping[str, Any]) -> str:
+    return (
+        f"The shipped model {found['model']!r} on {found['films']} simulated films of {found['windows']} windows "
+        "of 1.2 s each, of the cloths that it was trained on (`python -m tests.validation measure-windows`). Intervals in "
+        "brackets are of 90 %, over films."
+    )
+
+
+def _of_wind(count: str, of: Mapping[str, Any]) -> str:
+    return (
+        f"| {count} | {of['rmse']:.2f} | {of['width']:.2f} | "
+        + " | ".join(_share(share) for share in of["covered"].values())
+        + " |"
+    )
+
+
+def _share(share: Mapping[str, Any]) -> str:
+    low, high = share["interval"]
+    return f"{share['value']:.0%} [{low:.0%}, {high:.0%}]"

@@ -26,7 +26,7 @@ def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
     draws = (observed / noise * variance)[:, :, None] + np.sqrt(variance) * np.array([-1.0, 1.0])[:, None]
     names = ("wind_speed", "density")
     found = errors_of(draws, truth, names)
-    return Errors(names=names, first=found[:, 0], last=found[:, 1])
+    return Errors(names=names, values=found)
 
 
 @pytest.mark.parametrize("noise", [0.1, 20.0])

@@ -1,0 +1,115 @@
+"""Long films of the cloths that a model was trained on, with their truth, which show what its windows have in common.
+
+Films of a training set are two seconds long, in which two windows overlap. Here the same scenes are simulated for
+longer, from seeds of their own, and filmed by one camera each, with the data set's noise and coding. Nothing is stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.record.video import decode
+from flagdata.rng import child_seed
+from models.estimator import Estimator
+from models.training.recipe import DataSpec
+from sim.assets import Assets
+from sim.datasets import jobs, picture
+from sim.datasets.cast import Cast
+from sim.datasets.films import EPOCH, Film
+from sim.datasets.reading import load
+from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.record import parameters_of
+from sim.run.members import Crew
+from sim.run.recipe import Recipe
+
+_SIDE = "train"
+_BATCH = 8
+"""Cloths that are simulated together; a long sequence of one takes 2 MB."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LongFilm:
+    """One cloth in one wind before one camera.
+
+    Attributes:
+        dataset: whose scene, light and camera it was drawn from.
+        windows: (k, frames, height, width) uint8, gray, one right after the other.
+        parameters: name → value, SI, as simulated records state them.
+    """
+
+    dataset: str
+    windows: NDArray[np.uint8]
+    parameters: dict[str, float]
+
+
+def simulated(model: Estimator, *, count: int, windows: int, seed: int) -> Iterator[LongFilm]:
+    """Films of so many windows of a model's length.
+
+    The data sets that the model was trained on share the films as they share its training simulations. A cloth that
+    cannot be simulated to the end is left out.
+
+    Args:
+        count: of films.
+        windows: of each.
+        seed: of all of them.
+
+    Raises:
+        InputError: a model whose card does not say what it was trained on.
+    """
+    for name, share in _shares(model, count).items():
+        yield from _of_dataset(load(name), share, model, windows=windows, seed=child_seed(seed, "long-films", name))
+
+
+def _shares(model: Estimator, count: int) -> dict[str, int]:
+    """Data set → films, in proportion to its training sequences."""
+    recipe = model.card.get("recipe")
+    if not isinstance(recipe, dict) or "data" not in recipe:
+        raise InputError(
+            f"the card of the model {model.name!r} does not say what it was trained on", where="recipe.data",
+            fix="give a model that was trained by a recipe",
+        )  # fmt: skip
+    names = DataSpec.of_identity(recipe["data"]).datasets
+    each = np.array([load(name).side(_SIDE).sequences for name in names])
+    ends = np.rint(count * np.cumsum(each) / each.sum()).astype(int)
+    return dict(zip(names, np.diff(ends, prepend=0).tolist(), strict=True))
+
+
+def _of_dataset(recipe: DatasetRecipe, count: int, model: Estimator, *, windows: int, seed: int) -> Iterator[LongFilm]:
+    frames = model.front_end.frames
+    time = replace(recipe.simulation.time, frames=windows * frames, rate=model.front_end.rate)
+    simulation = replace(recipe.simulation, name=f"{recipe.name}-long", seed=seed, count=count, batch=_BATCH, time=time)
+    crew, side = Crew(simulation), recipe.side(_SIDE)
+    bases: dict[int, list[int]] = {}
+    for index in range(count):
+        bases.setdefault(crew.member(index).base, []).append(index)
+    for base, indices in bases.items():
+        for first in range(0, len(indices), _BATCH):
+            yield from _batch(recipe, simulation, Cast(side=side, session=None, simulation=simulation), base,
+                              indices[first : first + _BATCH], windows)  # fmt: skip
+
+
+def _batch(
+    recipe: DatasetRecipe, simulation: Recipe, cast: Cast, base: int, indices: Sequence[int], windows: int
+) -> Iterator[LongFilm]:
+    assets = Assets(photos=recipe.photos)
+    for outcome in jobs.simulate(simulation, base, indices, "cpu").outcomes:
+        if outcome.sequence is None:
+            continue
+        member = outcome.member
+        seed = child_seed(simulation.seed, "film", member.index)
+        job = Film(
+            name=f"{simulation.name}-{member.index}", cast=cast, index=member.index, sequence="", seed=seed,
+            sequence_seed=member.seed, look=seed, begin=EPOCH, filming={},
+        )  # fmt: skip
+        zeta, drawn = recipe.prior.draw(seed, assets), picture.settings(recipe.camera, seed=seed)
+        seen = jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
+        film = np.stack(decode(picture.coded(seen, drawn, recipe.camera, seed=seed), where=job.name))
+        yield LongFilm(
+            dataset=recipe.name, windows=film.reshape(windows, -1, *film.shape[1:]),
+            parameters=parameters_of(member, zeta, drawn, recipe.anemometer.truth),
+        )  # fmt: skip
