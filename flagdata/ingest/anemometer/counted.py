@@ -6,6 +6,7 @@ times of day whose date the user gives.
     datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
     elapsed-s, -ms, -us, -min   since a start that the user gives; a counter of 32 bits in ms or us may run over
     %H:%M:%S and the like       of the day that the user gives, and those that follow
+    %b %d %H:%M and the like    of the year of that day (see `yearless`)
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import stamps
+from flagdata.ingest.anemometer import stamps, yearless
 from flagdata.ingest.anemometer.stamps import DAY, Stamps
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -44,9 +45,25 @@ def is_time_of_day(form: str) -> bool:
     """Whether a format has directives of the time of day alone."""
     return (
         "%" in form
-        and not any(f"%{letter}" in form for letter in "YymdjbJ")
-        and any(f"%{letter}" in form for letter in "HIQ")
+        and not any(f"%{letter}" in form for letter in "YymdjbJEsD")
+        and any(f"%{letter}" in form for letter in "HIQGK")
     )
+
+
+def needs_date(form: str) -> bool:
+    """Whether a format lacks the date, or the year of one, so that the user gives that of the first row."""
+    return is_time_of_day(form) or yearless.is_yearless(form)
+
+
+def check(form: str) -> None:
+    """Refuse a format that cannot be read.
+
+    Raises:
+        UsageError: see `stamps.pattern`.
+    """
+    if form not in (*stamps.EPOCH, *FORMS):
+        date = "%Y-%m-%d " if is_time_of_day(form) else ""
+        stamps.pattern(yearless.full(form) if yearless.is_yearless(form) else f"{date}{form}")
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
@@ -58,6 +75,8 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     text = pc.utf8_trim_whitespace(texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string()))
     if is_time_of_day(form):
         return stamps.parse(pc.binary_join_element_wise("1970-01-01", text, " "), f"%Y-%m-%d {form}")
+    if yearless.is_yearless(form):
+        return yearless.parse(text, form)
     none = np.zeros(len(text), dtype=bool)
     if form in _EPOCH:
         whole = pc.match_substring_regex(text, r"^\d{15,19}$")

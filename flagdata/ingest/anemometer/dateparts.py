@@ -107,7 +107,7 @@ def _choices(
         yield found
     named = _named(layout, columns)
     yield from _counted(layout, columns, named, dates, order)
-    yield from _of_parts(layout, columns, named)
+    yield from _of_parts(layout, columns, named, dates)
     yield from _by_heading(layout, columns)
     yield from _month_by_name(layout, columns)
     yield from _beside_dates(layout, columns, named, dates, order)
@@ -242,8 +242,12 @@ def _counted(
                 yield from _read(layout, columns, [date, index], forms, score=2.2)
 
 
-def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:
+def _of_parts(
+    layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int], dates: Sequence[int]
+) -> Iterator[TimeChoice]:
     """A year with its month and day or day of the year, in any order, and the time of day beside; or that alone."""
+    if "year" not in named and not dates:
+        yield from _without_year(layout, columns, named)
     year = "%Y" if "year" in named and any(len(cell) == 4 for cell in columns[named["year"]]) else "%y"
     dated = {"year", "month", "day"} <= set(named)
     ordinal = {"year", "doy"} <= set(named) and year == "%Y"
@@ -272,6 +276,26 @@ def _of_parts(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[s
             forms = [f"{date} {form}" for form in CLOCKS]
             yield from _read(layout, columns, [*of_date, index], forms, score=2.1)
     yield from _read(layout, columns, of_date, [date], score=0.9)
+
+
+def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:
+    """A month and day, or a day of the year, with the time of day beside and no year."""
+    clock, of_clock = _clock(columns, named)
+    if not clock:
+        clocks = (
+            at for at, cells in enumerate(columns) if (filled := [c for c in cells if c]) and share(_CLOCK, filled)
+        )
+        of_clock = list(itertools.islice(clocks, 1))
+        texts = [cell for at in of_clock for cell in columns[at] if cell]
+        clock = next((form for form in CLOCKS if texts and fits(counted.parse(texts, form))), "")
+    if "doy" in named and share(_DECIMAL, [cell for cell in columns[named["doy"]] if cell]):
+        yield from _read(layout, columns, [named["doy"]], ["%J"], score=1.9)
+    elif "doy" in named and clock:
+        yield from _read(layout, columns, [named["doy"], *of_clock], [f"%j {clock}"], score=1.9)
+    elif {"month", "day"} <= set(named) and clock:
+        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        taken = [named["month"], named["day"], *of_clock]
+        yield from _read(layout, columns, taken, [f"{month} %d {clock}"], score=1.9)
 
 
 def _beside_dates(
@@ -344,8 +368,7 @@ def _read(
     """The time in these columns by the first of the formats that reads it."""
     texts = [" ".join(cells) for cells in zip(*(columns[index] for index in taken), strict=True) if all(cells)]
     for form in forms:
-        alone = counted.is_time_of_day(form)
-        found = counted.parse(texts, form) if alone else parse_with_bare_dates(texts, form)[0]
+        found = counted.parse(texts, form) if counted.needs_date(form) else parse_with_bare_dates(texts, form)[0]
         if fits(found):
             yield time_choice(layout, tuple(taken), form, found, score)
             return

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, stated_columns, stated_rate, unitcheck, unread, zones
+from flagdata.ingest.anemometer import counted, stated_columns, stated_rate, unitcheck, unread, yearless, zones
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.codes import NO_ANGLE, below_zero
 from flagdata.ingest.anemometer.headings import interest, understand
@@ -139,15 +139,16 @@ def draft(
     else:
         time = find_time(layout, order=order)
         of_time = time.columns if time is not None else ()
+        mixed = None
+        if time is not None:
+            mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
-        if wind is not None and wind not in {one.label for one in winds}:
+        of_site = mixed is not None and wind is not None and (wind.isdigit() or wind.partition(":")[0] in mixed[1])
+        if wind is not None and not of_site and wind not in {one.label for one in winds}:
             said, odd = named_wind(layout, wind, time=of_time, told=unit)
             winds, warnings = (*winds, *said), (*warnings, *odd)
         if time is None and not winds:
             return None
-        mixed = None
-        if time is not None:
-            mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
     if mixed is not None:
         winds = tuple(
             replace(one, site=(mixed[0], site), label=site if len(winds) == 1 else f"{site}:{one.label}")
@@ -205,6 +206,11 @@ def _needs(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tup
     if time.form is not None and counted.is_time_of_day(time.form):
         fix = "give the day of the first row: --date DATE"
         found.append(Need(what="its stamps have no date", fix=fix, option="date"))
+    if time.form is not None and yearless.is_yearless(time.form):
+        texts = _stamps(layout, time.columns)
+        read = counted.parse([text for text in texts if text.strip()], time.form)
+        what, fix = yearless.missing(time.form, int(read.ns[read.valid].flat[0]))
+        found.append(Need(what=what, fix=fix, option="date"))
     if not time.zoned and time.zone is None:
         statement = zones.stated(lines)
         fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
@@ -346,8 +352,8 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
     if time is not None:
         stamps = " and ".join(_shown(layout, index) for index in time.columns)
         zone = "which state their zone" if time.zoned else f"in {time.zone}" if time.zone else "without a zone"
-        if time.form is not None and (counted.is_elapsed(time.form) or counted.is_time_of_day(time.form)):
-            zone = "without a date"
+        if time.form is not None and (counted.is_elapsed(time.form) or counted.needs_date(time.form)):
+            zone = "without a year" if yearless.is_yearless(time.form) else "without a date"
         unknown = "a count in a unit that is not told" if time.counts else "a date in an order that is not told"
         zone = "from a start" if time.counts else zone
         found.append(f"column {stamps} is the time, as {time.form or unknown}, {zone}")

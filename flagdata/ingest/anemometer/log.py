@@ -47,8 +47,12 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         options = replace(options, start=None, rate=None)
     if recipe is None and options.columns is None and untimed.clocked(source):
         if options.date is None:
-            what = "the lines of an instrument stand after times of day without a date"
-            raise TimeError(what, where=str(path), fix="give the day of the first: --date 2026-05-01, and its --zone")
+            day = untimed.year_alone(source)
+            lacking = "dates without a year" if day else "times of day without a date"
+            what = f"the lines of an instrument stand after {lacking}"
+            example = f"YYYY-{day}, with its year in place of YYYY" if day else "2026-05-01"
+            fix = f"give the day of the first: --date {example}, and its --zone"
+            raise TimeError(what, where=str(path), fix=fix)
         source, options = untimed.dated(source, options.date), replace(options, date=None)
     elif recipe is None and options.columns is None and spelled_stamps.spelled(source.head()):
         source, options = spelled_stamps.restamped(source, options.date_order), replace(options, date_order=None)

@@ -104,10 +104,8 @@ class TimeLayout:
     zone: str | None = None
 
     def __post_init__(self) -> None:
-        if self.columns and counted.is_time_of_day(self.format):
-            pattern(f"%Y-%m-%d {self.format}")
-        elif self.columns and self.format not in (*EPOCH, *counted.FORMS):
-            pattern(self.format)
+        if self.columns:
+            counted.check(self.format)
         if self.zone is not None:
             zone(self.zone, where="[time] zone")
 

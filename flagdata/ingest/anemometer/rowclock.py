@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import counted, disorder
+from flagdata.ingest.anemometer import counted, disorder, yearless
 from flagdata.ingest.anemometer.clock import ClockChoice
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.growing import Growing
@@ -65,7 +65,7 @@ class RowClock:
             texts = block.joined(self.columns)
         else:
             texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
-        if self.form in counted.FORMS or counted.is_time_of_day(self.form):
+        if self.form in counted.FORMS or counted.needs_date(self.form):
             return counted.parse(texts, self.form)
         stamps, bare = parse_with_bare_dates(texts, self.form)
         self.bare_dates += bare
@@ -95,7 +95,7 @@ class RowClock:
         if turned:
             text = "the newest row comes first: read from the end"
             found = (Finding(kind="newest-first", severity=Severity.NOTE, count=len(wall), what=text),)
-        if counted.is_elapsed(self.form) or counted.is_time_of_day(self.form):
+        if counted.is_elapsed(self.form) or (counted.needs_date(self.form) and not yearless.numbered(self.form)):
             return order, found  # the order of the rows is what tells their days
         sorting = disorder.sorting(wall[order], choice)
         if sorting is None:
@@ -113,6 +113,8 @@ class RowClock:
         found: tuple[Finding, ...] = ()
         if counted.is_time_of_day(self.form):
             wall, found = counted.on_days(wall, date=given.date, line=line, where=where)
+        elif yearless.is_yearless(self.form):
+            wall, found = yearless.on_years(wall, self.form, date=given.date, line=line, where=where)
         elif given.start is not None or given.date is not None:
             option = "--start" if given.start is not None else "--date"
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")

@@ -15,6 +15,7 @@ _SITES = frozenset(
         "town", "place", "stadt", "ort", "messstelle", "messstation", "wetterstation", "stationsname", "ville", "lieu",
         "poste", "ciudad", "lugar", "estacion", "estación", "cidade", "estacao", "estação", "stazione", "citta",
         "città", "località", "stad", "plaats", "weerstation", "stasjon", "stacja", "miasto", "buoy", "boya", "wtg",
+        "turb",
     }
 )  # fmt: skip
 _STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})

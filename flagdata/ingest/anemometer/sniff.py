@@ -46,7 +46,8 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     try:
         opened = open_text(path, limits=Limits())
         if untimed.clocked(opened):
-            return recognise(untimed.dated(opened, dt.date(2000, 1, 1)))
+            day = untimed.year_alone(opened) or "01-01"
+            return recognise(untimed.dated(opened, dt.date.fromisoformat(f"2000-{day}")))
         if spelled_stamps.spelled(opened.head()):
             return recognise(spelled_stamps.provisional(opened))
         source = restate(opened)

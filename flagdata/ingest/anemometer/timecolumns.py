@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import counted, dateparts
+from flagdata.ingest.anemometer import counted, dateparts, yearless_columns
 from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
@@ -69,7 +69,7 @@ def time_as(layout: Layout, columns: tuple[int, ...], form: str) -> TimeChoice |
     """
     texts = [" ".join(cells) for cells in zip(*(layout.column(index) for index in columns), strict=True)]
     texts = [text for text in texts if text.strip()]
-    found = counted.parse(texts, form) if counted.is_time_of_day(form) else _parsed(texts, form)
+    found = counted.parse(texts, form) if counted.needs_date(form) else _parsed(texts, form)
     return time_choice(layout, columns, form, found, 2.0) if fits(found) else None
 
 
@@ -136,6 +136,8 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     days = [] if clocks else list(_days(layout, columns, dates, order))
     yield from days
     yield from dateparts.choices(layout, columns, dates=dates, order=order)
+    if not dates:
+        yield from yearless_columns.choices(layout, columns, clocks, order)
     for index in clocks:
         clock = _with_half((index,), halves)
         texts = _joined(columns, clock)

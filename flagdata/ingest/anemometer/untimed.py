@@ -14,13 +14,13 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from flagdata.errors import UsageError
+from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import labelled, stated_columns
 from flagdata.ingest.anemometer.headings import interest
 from flagdata.ingest.anemometer.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.restated import restate
-from flagdata.ingest.anemometer.serial_lines import split_stamp
+from flagdata.ingest.anemometer.serial_lines import MONTHS, split_stamp
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.source import TableText, TextFile
 from flagdata.ingest.anemometer.timecolumns import find_time
@@ -30,9 +30,11 @@ _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
 _WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
 _TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
 _CLOCK_BEFORE = re.compile(
-    r"\s*[\[(<\"]?(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+(?P<rest>\S.*)$"
+    r"\s*[\[(<\"]?(?:(?P<month>[A-Za-z]{3})\s+(?P<day>\d{1,2})\s+)?"
+    r"(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+"
+    r"(?(month)(?:\S+ [\w./-]+(?:\[\d+\])?: )?)(?P<rest>\S.*)$"
 )
-"""A time of day before a line."""
+"""A time of day before a line, with a date without its year or none; and the host and program that syslog writes."""
 _TABLES = frozenset({"delimited", "host-stamped"})
 """Formats of tables, which have a way of their own."""
 
@@ -99,6 +101,37 @@ def clocked(source: TextFile) -> bool:
     return of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
 
 
+def year_alone(source: TextFile) -> str | None:
+    """The month and day of the first line, as 12-31, where the lines stand after dates without a year."""
+    match = next((found for line in source.head(HEAD_LINES) if (found := _CLOCK_BEFORE.match(line))), None)
+    if match is None or not match["month"] or match["month"].lower() not in MONTHS:
+        return None
+    return f"{MONTHS.index(match['month'].lower()) + 1:02d}-{int(match['day']):02d}"
+
+
+def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) -> dt.date:
+    """The date of a line that names its month and day.
+
+    Args:
+        before: of the line before, or of the first line as the user gives it.
+
+    Raises:
+        TimeError: no such month or day, or another one than the user gives.
+    """
+    name = match["month"].lower()
+    month = MONTHS.index(name) + 1 if name in MONTHS else 0
+    year = before.year + (month < before.month - 6)
+    try:
+        found = dt.date(year, month, int(match["day"]))
+    except ValueError:
+        what = f"{match['month']} {match['day']} is no day of {year}"
+        raise TimeError(what, where=where, fix="give --date with the year in which the log began") from None
+    if first and found != before:
+        what = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
+        raise TimeError(what, where=where, fix=f"give its day with its year, such as --date {found.isoformat()}")
+    return found
+
+
 def dated(source: TextFile, date: dt.date) -> TextFile:
     """The lines of an instrument, each after a time of day, with the date before it.
 
@@ -113,11 +146,16 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
             text.append(line)
             continue
         clock = match["time"].replace(",", ".").rjust(8, "0")
-        if last and int(clock[:2]) + 12 < int(last[:2]):
+        if match["month"]:
+            day = _of_year(match, day, first=not last, where=str(source.path))
+        elif last and int(clock[:2]) + 12 < int(last[:2]):
             day += dt.timedelta(days=1)
         last = clock
         text.append(f"{day.isoformat()}T{clock} {match['rest']}")
     days = (day - date).days
+    if year_alone(source):
+        what = f"dates without a year before each line; the first is of {date.isoformat()}, as given"
+        return TableText.of(source, text, [Finding(kind="date-given", severity=Severity.NOTE, what=what)])
     what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
     found = Finding(kind="date-given", severity=Severity.NOTE, what=what)
     return TableText.of(source, text, [found])
