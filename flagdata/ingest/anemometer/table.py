@@ -106,6 +106,7 @@ class _Gathered:
     lines: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
+    blank: list[int] = field(default_factory=list)
 
     def columns(self) -> list[_Column]:
         return [*self.channels.values(), *self.extra.values()]
@@ -130,6 +131,8 @@ class _Gathered:
         self.clock.add(stamps, keep)
         self.bad_stamps.extend(line[~keep].tolist())
         self.distant += int(stamps.distant.sum())
+        empty = [_among(block, index, ("",)) for index in self.clock.columns]
+        self.blank.extend(line[~keep & np.logical_and.reduce(empty)].tolist())
         self.lines.add(line[keep])
         for column in self.columns():
             cells = cells_of(block, column.index)
@@ -282,12 +285,16 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, where: str) -> tuple[Findin
         )
     if not bad:
         return ()
-    refuse_if_most(len(bad), count, f"rows without a stamp as {form}", where)
+    blank = sum(number < gathered.line()[0] for number in gathered.blank)
+    refuse_if_most(len(bad) - blank, count, f"rows without a stamp as {form}", where)
+    unset = f"{blank} rows before the first stamp have none: the clock was not set; left out"
     return (
         Finding(
             kind="unreadable-stamps", severity=Severity.ERROR, count=len(bad), where=f"line {bad[0]}",
             what=f"{len(bad)} rows whose stamp is {years}: a clock that was not set; left out"
             if distant == len(bad)
+            else unset
+            if blank == len(bad)
             else f"{len(bad)} rows whose stamp is not {form} or no date; left out{far}",
         ),
     )  # fmt: skip
