@@ -3,8 +3,10 @@
 Source: Anemoment (LI-COR), TriSonica Mini User Manual (July 2022), "Output data": tags S (wind speed), S2 and S3 (in
 two and three dimensions), D and DV (direction, clockwise from the north mark, and its elevation), U, V, W, T [°C], C
 (speed of sound), H [%], DP, P [mbar], PI, RO, MD and others; m/s. Tags may be switched off one by one; values of -99
-and below are codes for "no value". U and V are kept as written: their axes are a setting. Written by the manual and
-examples of lines; no log of such an instrument was at hand.
+and below are codes for "no value". Tags can be renamed: where one comes twice (P for the pressure and the pitch, D
+for the wind and the compass), the first is the one of the manual's order, in which the wind and the air go before the
+attitude. U and V are kept as written: their axes are a setting. Written by the manual and examples of lines; no log
+of such an instrument was at hand.
 """
 
 from __future__ import annotations
@@ -25,12 +27,12 @@ CHANNELS = (
     "wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature", "relative_humidity",
     "air_pressure",
 )  # fmt: skip
-_LINE = re.compile(r"(?:[A-Z][A-Z0-9]{0,2}[ ,:]+-?\d+(?:\.\d+)?(?:[ ,;]+|$))++")
-_PAIR = re.compile(r"([A-Z][A-Z0-9]{0,2})[ ,:]+(-?\d+(?:\.\d+)?)")
+_LINE = re.compile(r"(?:[A-Z][A-Z0-9]{0,2}[ ,:]+(?:-?\d+(?:\.\d+)?|nan)(?:[ ,;]+|$))++")
+_PAIR = re.compile(r"([A-Z][A-Z0-9]{0,2})[ ,:]+(-?\d+(?:\.\d+)?|nan)")
 _BEGINS = re.compile(r"S[23]?[ ,:]+-?\d")
 _TAGS = frozenset(
     ("S", "S2", "S3", "D", "DV", "U", "V", "W", "T", "T1", "T2", "C", "H", "DP", "P", "TU", "AD", "AX", "AY", "AZ")
-) | frozenset(("PI", "RO", "MX", "MY", "MZ", "MD", "TD", "ID", "NW", "Q"))
+) | frozenset(("PI", "RO", "R", "MX", "MY", "MZ", "MD", "TD", "ID", "NW", "Q"))
 _CODE = -99.0
 
 
@@ -60,7 +62,9 @@ def parse(raw: str) -> Sample | Defect:
     text = raw.strip()
     if not _LINE.fullmatch(text):
         return Defect.CUT if _BEGINS.match(text) else Defect.OTHER
-    values = {tag: float(number) for tag, number in _PAIR.findall(text)}
+    values: dict[str, float] = {}
+    for tag, number in _PAIR.findall(text):
+        values.setdefault(tag, float(number))
     wind = {"S", "S2", "S3"} & set(values) or {"U", "V"} <= set(values)
     if len(values) < 3 or not wind or not set(values) <= _TAGS:
         return Defect.OTHER
