@@ -30,6 +30,7 @@ from flagdata.ingest.anemometer.layout import Layout, lay_out
 from flagdata.ingest.anemometer.no_speeds import beaufort, counts
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.recipe import DELIMITERS
+from flagdata.ingest.anemometer.rows_above import rows_above
 from flagdata.ingest.anemometer.sites import site_of_all, sites
 from flagdata.ingest.anemometer.timechoice import TimeChoice
 from flagdata.ingest.anemometer.timecolumns import find_time
@@ -170,6 +171,8 @@ def draft(
     if layout.short:
         shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
         warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
+    above = rows_above(lines, layout)
+    warnings = (*warnings, above) if above else warnings
     if time is not None and time.unnamed:
         shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
         warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")

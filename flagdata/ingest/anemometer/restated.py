@@ -30,6 +30,7 @@ KINDS = (
     "flagdata.ingest.anemometer.blocks",
     "flagdata.ingest.anemometer.bracketed",
     "flagdata.ingest.anemometer.before_cells",
+    "flagdata.ingest.anemometer.headings_anew",
 )
 LOOKED_AT = 60
 """Lines by which a kind is told."""

@@ -56,9 +56,16 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     best: TimeChoice | None = None
     choices = list(_choices(layout, order))
     for choice in _without_false_epochs(layout, choices):
+        choice = replace(choice, score=choice.score - 2.0 * (1.0 - _filled(layout, choice)))
         if best is None or choice.score > best.score + 1e-9:
             best = choice
     return best
+
+
+def _filled(layout: Layout, choice: TimeChoice) -> float:
+    """The share of rows that have something in a time's first column: one that few rows have is of something else."""
+    cells = layout.column(choice.columns[0]) if choice.columns else []
+    return sum(map(bool, cells)) / len(cells) if cells else 1.0
 
 
 def time_as(layout: Layout, columns: tuple[int, ...], form: str) -> TimeChoice | None:
