@@ -123,6 +123,8 @@ _INSIDE = {
 _NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
 """What stands in brackets behind a direction for the north it is from."""
 _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
+_OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
+"""How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
 _TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
 """What a heading says of numbers that are ten or a hundred times the quantity, or a tenth: it is to be asked."""
 _TURNED = re.compile(r"\bccw\b|counter.?clock|anti.?clock|from east|mathemat|\bmath\b", re.IGNORECASE)
@@ -170,7 +172,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english(name[:120].strip().strip('"').strip())
-    text = _TENTHS.sub("0.1 ", text)
+    text = _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text))
     tenfold = _TENFOLD.search(text)
     text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)

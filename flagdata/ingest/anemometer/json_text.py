@@ -52,6 +52,10 @@ _TEMPEST = {
         "time [epoch]", "wind lull [m/s]", "wind avg [m/s]", "wind gust [m/s]", "wind direction [deg]", "interval",
         "station pressure [hPa]", "air temperature [degC]", "relative humidity [%]",
     ),
+    "obs_sky": (
+        "time [epoch]", "illuminance", "uv", "rain", "wind lull [m/s]", "wind avg [m/s]", "wind gust [m/s]",
+        "wind direction [deg]",
+    ),
     "rapid_wind": ("time [epoch]", "rapid wind speed [m/s]", "rapid wind direction [deg]"),
 }  # fmt: skip
 _SIGNAL_K = {
@@ -197,14 +201,24 @@ def _rows(source: TextFile, whole: Any) -> Iterator[dict[str, str] | None]:
 
 
 def _items(whole: Any) -> list[Any]:
-    """The rows of a whole file: a list, the one list of objects or of rows that an object holds, or the object."""
+    """The rows of a whole file: a list, the one list of objects or of rows that an object holds, or the object.
+
+    The list may lie in an object within ("observations": {"header": …, "data": [ … ]}).
+    """
     if isinstance(whole, list):
         return whole
-    lists = [
-        member for member in whole.values()
-        if isinstance(member, list) and len(member) > 1 and {type(item) for item in member} in ({dict}, {list})
-    ]  # fmt: skip
-    return lists[0] if len(lists) == 1 else [whole]
+    level = [whole]
+    for _ in range(_DEEPEST):
+        lists = [
+            member for item in level for member in item.values()
+            if isinstance(member, list) and len(member) > 1 and {type(item) for item in member} in ({dict}, {list})
+        ]  # fmt: skip
+        if len(lists) == 1:
+            return lists[0]
+        level = [member for item in level for member in item.values() if isinstance(member, dict)]
+        if lists or not level:
+            break
+    return [whole]
 
 
 def _listed(row: list[Any]) -> dict[str, str] | None:
@@ -251,7 +265,7 @@ def _flat(item: dict[str, Any]) -> dict[str, str]:
     kind = item.get("type")
     names = _TEMPEST.get(kind) if isinstance(kind, str) else None
     if names is not None:
-        rows = item.get("obs") if kind == "obs_st" else [item.get("ob")]
+        rows = item.get("obs") if str(kind).startswith("obs") else [item.get("ob")]
         row = rows[0] if isinstance(rows, list) and rows else None
         if isinstance(row, list):
             return {"type": str(kind)} | {name: _text(value) for name, value in zip(names, row, strict=False)}

@@ -11,6 +11,7 @@ the month and the time in UTC. The month is only in the stamp before the report,
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import re
 from collections.abc import Sequence
 
@@ -24,6 +25,8 @@ _REPORT = re.compile(
     r"\b(?P<station>[A-Z][A-Z0-9]{3})\s+(?P<day>\d{2})(?P<hour>\d{2})(?P<minute>\d{2})Z\s+(?:AUTO\s+|COR\s+)?"
     r"(?P<dir>\d{3}|VRB|///)(?P<speed>P?\d{2,3}|//)(?:G(?P<gust>P?\d{2,3}))?(?P<unit>KT|MPS|KMH)\b"
 )
+_OF_ASOS = re.compile(r"\d{5}[A-Z0-9]{4} [A-Z0-9]{3}(?P<day>\d{8})\d{4}.*\s5-MIN\s")
+"""What stands before a report in NCEI's ASOS of 5 minutes (DSI-6401): the local date, at most a day from UTC's."""
 _UNITS = {"KT": "kn", "MPS": "m/s", "KMH": "km/h"}
 
 
@@ -53,11 +56,26 @@ def as_table(source: TextFile) -> TableText | None:
 
 def _row(line: str) -> list[str] | None:
     """Stamp, station, speed, direction, gust and unit of a line; `None` where it is no report of a known day."""
-    stamp, report = _STAMP.match(line), _REPORT.search(line)
-    if stamp is None or report is None or stamp["day"] != report["day"]:
+    report = _REPORT.search(line)
+    date = None if report is None else _date(line, report["day"])
+    if report is None or date is None:
         return None
-    when = f"{stamp['year']}-{stamp['month']}-{stamp['day']}T{report['hour']}:{report['minute']}:00Z"
+    when = f"{date}T{report['hour']}:{report['minute']}:00Z"
     speed = "" if "/" in report["speed"] else report["speed"].lstrip("P")
     away = report["dir"] if report["dir"].isdigit() and speed.strip("0") else ""
     gust = (report["gust"] or "").lstrip("P")
     return [when, report["station"], speed, away, gust, _UNITS[report["unit"]]]
+
+
+def _date(line: str, day: str) -> str | None:
+    """The date of a report of this day of the month, by the stamp before it; `None` where that is of another day."""
+    asos = _OF_ASOS.match(line)
+    if asos is not None:
+        try:
+            local = dt.datetime.strptime(asos["day"], "%Y%m%d").date()
+        except ValueError:
+            return None
+        near = (local + dt.timedelta(days=days) for days in (0, 1, -1))
+        return next((date.isoformat() for date in near if f"{date:%d}" == day), None)
+    stamp = _STAMP.match(line)
+    return None if stamp is None or stamp["day"] != day else f"{stamp['year']}-{stamp['month']}-{day}"

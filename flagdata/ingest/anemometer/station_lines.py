@@ -1,0 +1,147 @@
+"""Lines of fields without a heading, as weather services and station programs publish them, told by their form.
+
+    2024 05 17 22   123    81 10123   230    42 -9999 -9999 -9999      NOAA's ISD-Lite
+    17/05/24 22:00:00 8.4 84 5.8 24.2 33.0 261 … 6 km/h C hPa mm …     Cumulus, realtime.txt
+    12345 5.7 8.5 232 12.3 77 1012.4 … 22 00 00 station … !!C10.37!!   Weather Display, clientraw.txt
+    94846KORD ORD2024051716002200  0.113 D   229   8   229   12 …      NCEI DSI-6405, ASOS 1-minute
+
+Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
+Cumulus Wiki, "Realtime.txt" (fields 6 average and 7 latest speed, 8 bearing, 14 the unit of the speeds); Weather
+Display's list of the fields of clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to
+31 the clock, 35 and 36 day and month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots
+over 2 minutes and of 5 seconds).
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from flagdata.ingest.anemometer.restated import rows_of, table
+from flagdata.ingest.anemometer.source import TableText, TextFile
+
+_SHARE = 0.8
+_ISD = re.compile(r"\s*(\d{4})\s+(\d\d)\s+(\d\d)\s+(\d\d)((?:\s+-?\d{1,5}){8})\s*")
+_REALTIME = re.compile(r"\d{1,2}[-/.]\d{1,2}[-/.]\d{2}\s+\d{2}:\d{2}:\d{2}\s")
+_UNITS = {"m/s": "m/s", "mph": "mph", "km/h": "km/h", "kts": "kn", "knots": "kn"}
+_ASOS = re.compile(r"\s*\d{5}[A-Z0-9]{4}\s+[A-Z0-9]{3}(?P<day>\d{8})(?P<local>\d{4})(?P<utc>\d{4})(?P<rest>\s.*)")
+_FOUR = re.compile(r"(?:^|\s)[DN]\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})(?:\s|$)")
+_CLIENTRAW = 142
+"""Fields of clientraw.txt up to the year."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Lines:
+    about: str
+    names: tuple[str, ...]
+    row: Callable[[str], list[str] | None]
+
+
+def _isd(line: str) -> list[str] | None:
+    match = _ISD.fullmatch(line)
+    if match is None:
+        return None
+    values = match[5].split()
+    warm, _, _, away, speed = values[:5]
+    calm = speed == "0" and away == "0"
+    tenths = ["" if cell == "-9999" else f"{int(cell) / 10:g}" for cell in (speed, warm)]
+    stamp = f"{match[1]}-{match[2]}-{match[3]}T{match[4]}:00:00Z"
+    return [stamp, tenths[0], "" if away == "-9999" or calm else away, tenths[1]]
+
+
+def _realtime(line: str) -> list[str] | None:
+    cells = line.split()
+    if len(cells) < 17 or not _REALTIME.match(line) or cells[13] not in _UNITS:
+        return None
+    warm = {"C": "degC", "F": "degF"}.get(cells[14], "")
+    return [cells[0], cells[1], cells[5], cells[6], cells[7], cells[2] if warm else "", _UNITS[cells[13]], warm]
+
+
+def _clientraw(line: str) -> list[str] | None:
+    cells = line.split()
+    if len(cells) < _CLIENTRAW or cells[0] != "12345" or not cells[141].isdigit():
+        return None
+    year, month, day, clock = cells[141], cells[36], cells[35], cells[29:32]
+    if not all(part.isdigit() for part in (month, day, *clock)):
+        return None
+    date = f"{year}-{int(month):02d}-{int(day):02d}"
+    return [f"{date} {':'.join(f'{int(part):02d}' for part in clock)}", *cells[1:7]]
+
+
+def _asos(line: str) -> list[str] | None:
+    match = _ASOS.fullmatch(line.rstrip())
+    if match is None or re.fullmatch(r"[01]\d[0-5]\d|2[0-3][0-5]\d", match["utc"]) is None:
+        return None
+    try:
+        local = dt.datetime.strptime(match["day"] + match["local"], "%Y%m%d%H%M")
+    except ValueError:
+        return None
+    clock = dt.timedelta(hours=int(match["utc"][:2]), minutes=int(match["utc"][2:]))
+    utc = local.replace(hour=0, minute=0) + clock
+    for days in (-1, 1):
+        other = utc + dt.timedelta(days=days)
+        utc = other if abs(other - local) < abs(utc - local) else utc
+    wind = _FOUR.search(match["rest"])
+    away, speed, _, gust = wind.groups() if wind is not None else ("", "", "", "")
+    return [f"{utc:%Y-%m-%dT%H:%M:00}Z", speed, "" if speed == "0" else away, gust]
+
+
+_KINDS = (
+    _Lines(
+        about="NOAA's ISD-Lite",
+        names=("time [UTC]", "wind speed [m/s]", "wind direction [deg]", "air temperature [degC]"), row=_isd,
+    ),
+    _Lines(
+        about="Cumulus' realtime.txt",
+        names=("date", "time", "wind speed average", "gust latest", "wind direction [deg]", "air temperature"),
+        row=_realtime,
+    ),
+    _Lines(
+        about="Weather Display's clientraw.txt",
+        names=(
+            "time", "wind speed average [kn]", "gust [kn]", "wind direction [deg]", "air temperature [degC]",
+            "relative humidity [%]", "air pressure sea level [hPa]",
+        ),
+        row=_clientraw,
+    ),
+    _Lines(
+        about="ASOS of one minute (DSI-6405)",
+        names=("time [UTC]", "wind speed [kn]", "wind direction [deg]", "gust [kn]"), row=_asos,
+    ),
+)  # fmt: skip
+
+
+def matches(lines: Sequence[str]) -> bool:
+    """Most lines are of one of these forms."""
+    return _kind(lines) is not None
+
+
+def as_table(source: TextFile) -> TableText | None:
+    """The wind and the weather of each line; `None` where the unit changes from line to line."""
+    from flagdata.ingest.anemometer.restated import LOOKED_AT  # it imports this module by name
+
+    kind = _kind(source.head(LOOKED_AT))
+    if kind is None:
+        return None
+    found, other = rows_of(source, kind.row)
+    names = list(kind.names)
+    if kind.row is _realtime:
+        units = {tuple(row[-2:]) for row in found}
+        if len(units) != 1:
+            return None
+        speed, warm = units.pop()
+        names[2:4] = [f"{name} [{speed}]" for name in names[2:4]]
+        names[5] = f"{names[5]} [{warm}]" if warm else names[5]
+        found = [row[:-2] for row in found]
+    return table(source, names, found, kind="published-lines", what=kind.about, left_out=other)
+
+
+def _kind(lines: Sequence[str]) -> _Lines | None:
+    filled = [line for line in lines if line.strip()]
+    if not filled:
+        return None
+    return next(
+        (kind for kind in _KINDS if sum(kind.row(line) is not None for line in filled) >= _SHARE * len(filled)), None
+    )

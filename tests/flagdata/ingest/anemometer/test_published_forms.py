@@ -1,0 +1,216 @@
+"""Logs in the forms that services, stations and radios publish: what their descriptions say is not asked for."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Callable
+from functools import reduce
+from operator import xor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.signals import WindLog
+
+Read = Callable[..., WindLog]
+Write = Callable[..., Path]
+KNOT, MILE = 1852 / 3600, 0.44704
+START = dt.datetime(2024, 5, 17, 22, 0)
+SPEEDS = [3, 4, 5, 6, 7, 6, 5, 4, 3, 2, 3, 4, 5, 6]
+DEGREES = [220, 230, 240, 250, 260, 250, 240, 230, 220, 210, 200, 210, 220, 230]
+
+
+def rows(step: float = 3600) -> list[tuple[dt.datetime, int, int]]:
+    return [
+        (START + dt.timedelta(seconds=step * at), s, d) for at, (s, d) in enumerate(zip(SPEEDS, DEGREES, strict=True))
+    ]
+
+
+def check(log: WindLog, factor: float, *, start: str = "2024-05-17T22:00:00", missing: int | None = None) -> None:
+    speed, away = np.array(SPEEDS) * factor, np.array(DEGREES, dtype=float)
+    if missing is not None:
+        speed[missing] = away[missing] = np.nan
+    channels = log.series.channels
+    np.testing.assert_allclose(channels["wind_speed"], speed, atol=1e-6)
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), away, atol=1e-6)
+    assert str(np.datetime64(int(log.series.time[0]), "ns"))[:19] == start
+
+
+BUOY = "#YY  MM DD hh mm WDIR WSPD GST  WVHT   PRES  ATMP\n#yr  mo dy hr mn degT m/s  m/s     m    hPa  degC\n"
+
+
+def test_a_buoys_table_is_utc_and_its_nines_are_none(read: Read) -> None:
+    lines = [f"{t:%Y %m %d %H %M} {d:3d} {s:4.1f} {s + 2:4.1f} 99.00 1012.3 15.2" for t, s, d in rows()]
+    lines[3] = f"{rows()[3][0]:%Y %m %d %H %M} 999 99.0 99.0 99.00 9999.0 999.0"
+    check(read(BUOY + "\n".join(lines)), 1.0, missing=3)
+
+
+def test_a_buoys_older_table_has_years_of_two_digits(read: Read) -> None:
+    head = "YY MM DD hh WD   WSPD GST  WVHT  BAR    ATMP\n"
+    lines = [f"94 {t:%m %d %H} {d:3d} {s:4.1f} {s + 2:4.1f} 99.00 1012.3 15.2" for t, s, d in rows()]
+    check(read(head + "\n".join(lines)), 1.0, start="1994-05-17T22:00:00")
+
+
+@pytest.mark.parametrize(
+    ("head", "form", "zone"),
+    [
+        ("STATIONS_ID;MESS_DATUM;QN_3;   F;   D;eor", "       1048;{t:%Y%m%d%H};   10;{s:8.1f};{d:4d};eor", None),
+        ("STATIONS_ID;MESS_DATUM;  QN;FF_10;DD_10;eor", "       1048;{t:%Y%m%d%H%M};    3;{s:5.1f};{d:4d};eor", None),
+        ("numer_sta;date;pmer;dd;ff;t;u;raf10", "07149;{t:%Y%m%d%H%M%S};101230;{d};{s}.0;285.4;77;{s}.9", None),
+        ("NUM_POSTE;NOM_USUEL;AAAAMMJJHH;FF;QFF;DD;QDD", "75114001;X;{t:%Y%m%d%H};{s}.0;1;{d};1", "UTC"),
+        ("STN,YYYYMMDD,   HH,   DD,   FF,   FX", "  260,{t:%Y%m%d},{t:%H},{d:5d},{s}0,{s}9", None),
+    ],
+)  # fmt: skip
+def test_tables_of_services_need_no_unit(read: Read, head: str, form: str, zone: str | None) -> None:
+    lines = [form.format(t=t, s=s, d=d) for t, s, d in rows()]
+    check(read(f"{head}\n" + "\n".join(lines), zone=zone), 1.0)
+
+
+def test_dwds_ten_minutes_before_2000_are_of_central_europe(read: Read) -> None:
+    lines = [f"1048;{t.replace(year=1999):%Y%m%d%H%M};3;{s}.0;{d};eor" for t, s, d in rows()]
+    log = read("STATIONS_ID;MESS_DATUM;QN;FF_10;DD_10;eor\n" + "\n".join(lines))
+    check(log, 1.0, start="1999-05-17T21:00:00")
+
+
+def test_knmis_hour_24_ends_the_day_and_990_is_variable(read: Read) -> None:
+    about = "# FF = Mean wind speed (in 0.1 m/s)\n# DD = Mean wind direction (0=calm 990=variable)\n"
+    lines = [f"  260,20240517,{at + 11:5d},{d},{s}0" for at, (_, s, d) in enumerate(rows())]
+    lines[0] = lines[0].replace(",220,", ",990,")
+    log = read(f"{about}# STN,YYYYMMDD,   HH,   DD,   FF\n\n" + "\n".join(lines))
+    assert str(np.datetime64(int(log.series.time[-1]), "ns"))[:19] == "2024-05-18T00:00:00"
+    np.testing.assert_allclose(log.series.channels["wind_speed"], SPEEDS)
+    assert np.isnan(log.series.channels["wind_direction"][0])
+
+
+def test_words_for_missing_of_a_service_are_none(read: Read) -> None:
+    lines = [f"07149;{t:%Y%m%d%H%M%S};{d};{s}.0" for t, s, d in rows()]
+    lines[3] = f"07149;{rows()[3][0]:%Y%m%d%H%M%S};mq;mq"
+    check(read("numer_sta;date;dd;ff\n" + "\n".join(lines)), 1.0, missing=3)
+
+
+@pytest.mark.parametrize(("number", "factor"), [(1, MILE), (16, 1 / 3.6), (17, 1.0)])
+def test_a_station_archives_own_column_tells_its_units(read: Read, number: int, factor: float) -> None:
+    utc = dt.UTC
+    lines = [f"{int(t.replace(tzinfo=utc).timestamp())},{number},5,29.9,{s},{d}" for t, s, d in rows()]
+    check(read("dateTime,usUnits,interval,barometer,windSpeed,windDir\n" + "\n".join(lines)), factor)
+
+
+def test_an_archive_in_two_units_is_not_read_in_one(log_file: Write) -> None:
+    lines = [f"{1715983200 + 300 * at},{1 if at < 7 else 16},{s},{d}" for at, (_, s, d) in enumerate(rows())]
+    with pytest.raises(FlagdataError):
+        read_log(log_file("dateTime,usUnits,windSpeed,windDir\n" + "\n".join(lines)))
+
+
+def test_isd_lite_is_in_tenths_and_utc(read: Read) -> None:
+    lines = [f"{t:%Y %m %d %H}   123    81 10123 {d:5d} {10 * s:5d} -9999 -9999 -9999" for t, s, d in rows()]
+    lines[3] = f"{rows()[3][0]:%Y %m %d %H}   123    81 10123 -9999 -9999 -9999 -9999 -9999"
+    check(read("\n".join(lines)), 1.0, missing=3)
+
+
+def test_asos_of_one_minute_takes_its_utc_clock_past_midnight(read: Read) -> None:
+    form = (
+        "94846KORD ORD{l:%Y%m%d%H%M}{t:%H%M}   0.113 D                  {d:3d}   {s:3d}   {d:3d}   {g:3d}   28    60+"
+    )
+    lines = [form.format(l=t - dt.timedelta(hours=6), t=t, s=s, g=s + 2, d=d) for t, s, d in rows()]
+    check(read("\n".join(lines)), KNOT)
+
+
+def test_asos_of_five_minutes_is_a_report_of_the_next_day_in_utc(read: Read) -> None:
+    form = "94846KORD ORD{l:%Y%m%d%H%M}082{l:%m/%d/%y %H:%M:%S}  5-MIN "
+    form += "KORD {t:%d%H%M}Z AUTO {d:03d}{s:02d}KT 10SM CLR 12/08"
+    lines = [form.format(l=t - dt.timedelta(hours=6), t=t, s=s, d=d) for t, s, d in rows()]
+    check(read("\n".join(lines)), KNOT)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("km/h", 1 / 3.6), ("mph", MILE), ("kts", KNOT), ("m/s", 1.0)])
+def test_cumulus_realtime_names_its_unit_in_each_line(read: Read, name: str, factor: float) -> None:
+    form = "{t:%d/%m/%y %H:%M:%S} 8.4 84 5.8 {s}.0 {s}.9 {d} 0.0 1.0 999.7 W 6 {u} C hPa mm 146.6 +0.1 85.2 588.4 11.6"
+    check(read("\n".join(form.format(t=t, s=s, d=d, u=name) for t, s, d in rows()), zone="UTC"), factor)
+
+
+def test_lines_of_clientraw_are_in_knots(read: Read) -> None:
+    lines = []
+    for t, s, d in rows():
+        cells = ["0.0"] * 160
+        cells[:7] = ["12345", f"{s}.0", f"{s}.9", str(d), "12.3", "77", "1012.4"]
+        cells[29:32], cells[35], cells[36], cells[141] = (
+            [f"{t:%H}", f"{t:%M}", f"{t:%S}"],
+            str(t.day),
+            str(t.month),
+            "2024",
+        )
+        lines.append(" ".join(cells))
+    check(read("\n".join(lines), zone="UTC"), KNOT)
+
+
+APRS = "g{g:03d}t077r000p000P000h50b09900wRSW"
+
+
+@pytest.mark.parametrize(
+    ("form", "options"),
+    [
+        ("{t:%Y-%m-%d %H:%M:%S} UTC: FW0001>APRS,TCPIP*:@{t:%d%H%M}z4903.50N/07201.75W_{d:03d}/{s:03d}", {}),
+        ("{t:%Y-%m-%d %H:%M:%S}: c{d:03d}s{s:03d}", {"zone": "UTC"}),
+        ("@{t:%d%H%M}z4903.50N/07201.75W_{d:03d}/{s:03d}", {"date": dt.date(2024, 5, 17)}),
+        ("_{t:%m%d%H%M}c{d:03d}s{s:03d}", {"date": dt.date(2024, 5, 17)}),
+    ],
+)
+def test_weather_reports_of_amateur_radio_are_read(read: Read, form: str, options: dict[str, object]) -> None:
+    lines = [(form + APRS).format(t=t, s=s, d=d, g=s + 3) for t, s, d in rows()]
+    check(read("\n".join(lines), **options), MILE)
+
+
+def test_the_day_of_radio_reports_without_a_year_is_asked_for(log_file: Write) -> None:
+    path = log_file("\n".join(("@{t:%d%H%M}z4903.50N/07201.75W_220/004" + APRS).format(t=t, g=6) for t, _, _ in rows()))
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path)
+    assert "--date" in (caught.value.fix or "")
+
+
+def sentence(body: str) -> str:
+    return f"${body}*{reduce(xor, body.encode(), 0):02X}"
+
+
+def test_sentences_of_an_acoustic_sensor_are_in_metres_a_second(read: Read) -> None:
+    lines = [f"{t:%Y-%m-%d %H:%M:%S},{sentence(f'WI,WVP={s:05.1f},{d:03d},0')}" for t, s, d in rows()]
+    lines[3] = f"{rows()[3][0]:%Y-%m-%d %H:%M:%S},{sentence('WI,WVP=000.0,000,1')}"
+    check(read("\n".join(lines), zone="UTC"), 1.0, missing=3)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "PASSKEY=0123&dateutc={t:%Y-%m-%d+%H:%M:%S}&tempf=55.1&winddir={d}&windspeedmph={s}.0&windgustmph={s}.9",
+        '10.0.0.7 - - [{t:%d/%b/%Y:%H:%M:%S} +0000] "GET /up.php?ID=K1&PASSWORD=x&dateutc=now&winddir={d}'
+        '&windspeedmph={s}.0 HTTP/1.1" 200 7',
+        "{t:%Y-%m-%dT%H:%M:%SZ} ID=K1&dateutc=now&winddir={d}&windspeedmph={s}.0",
+    ],
+)
+def test_uploads_of_stations_are_read_without_their_passwords(read: Read, form: str) -> None:
+    log = read("\n".join(form.format(t=t, s=s, d=d) for t, s, d in rows()))
+    check(log, MILE)
+    assert "PASS" not in log.drafted
+
+
+def test_a_list_of_observations_deep_in_an_object_is_a_table(log_file: Write) -> None:
+    data = [
+        {"wmo": 94768, "aifstime_utc": f"{t:%Y%m%d%H%M%S}", "wind_spd_kmh": 3.6 * s, "wind_dir_deg": d}
+        for t, s, d in rows()
+    ]
+    path = log_file(json.dumps({"observations": {"notice": [{"c": 1}], "header": [{"name": "X"}], "data": data}}))
+    assert not anemometers(path)
+    check(read_log(path, WindOptions()), 1.0)
+
+
+def test_skies_observed_by_a_hub_are_winds(read: Read) -> None:
+    lines = [
+        json.dumps(
+            {"type": "obs_sky", "obs": [[int(t.replace(tzinfo=dt.UTC).timestamp()), 9000, 10, 0.0, 1.0, s, 9, d, 3.1]]}
+        )
+        for t, s, d in rows()
+    ]
+    check(read("\n".join(lines)), 1.0)
