@@ -14,12 +14,20 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted, stated_columns, stated_rate, unitcheck, unread, yearless, zones
+from flagdata.ingest.anemometer import (
+    counted,
+    missing_codes,
+    stated_columns,
+    stated_rate,
+    unitcheck,
+    unread,
+    yearless,
+    zones,
+)
 from flagdata.ingest.anemometer.cells import numbers
-from flagdata.ingest.anemometer.codes import NO_ANGLE, below_zero
+from flagdata.ingest.anemometer.codes import below_zero
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.instruments import (
-    COMPONENTS,
     Column,
     Wind,
     find_winds,
@@ -34,12 +42,9 @@ from flagdata.ingest.anemometer.rows_above import rows_above
 from flagdata.ingest.anemometer.sites import site_of_all, sites
 from flagdata.ingest.anemometer.timechoice import TimeChoice
 from flagdata.ingest.anemometer.timecolumns import find_time
-from flagdata.ingest.anemometer.unitcheck import FASTEST
 from flagdata.units import spelled
 from flagdata.units import unit as unit_of
 
-CODES = (-999.0, -9999.0, -99999.0, -6999.0, -7999.0, -99.0, -99.9, -999.9)
-"""Codes for "no value" that are no wind, temperature, humidity, pressure or angle."""
 _STATED = re.compile(
     r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
 )
@@ -50,6 +55,8 @@ _UNIT_WORD = re.compile(
     re.IGNORECASE,
 )
 """Units of speed as a title names them."""
+_COMMENT = ("#", ";", "%", "!")
+"""How lines begin that are no rows."""
 _BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
 """Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
@@ -280,7 +287,7 @@ def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         if column is None:
             continue
         value = numbers(layout.column(column.index), decimal=layout.decimal).value
-        known = value[np.isfinite(value) & ~np.isin(value, CODES)]
+        known = value[np.isfinite(value) & ~np.isin(value, missing_codes.CODES)]
         known = known[~below_zero(known)]
         if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
             continue
@@ -317,7 +324,9 @@ def _stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
 def _unit_doubt(
     lines: Sequence[str], layout: Layout, time: TimeChoice | None, wind: Wind, missing: Sequence[str]
 ) -> Doubt:
-    above = _stated_unit(lines[: layout.preamble])
+    above = _stated_unit(
+        [line if at < layout.preamble or line.lstrip()[:1] in _COMMENT else "" for at, line in enumerate(lines)]
+    )
     if above is not None:
         name, number, words = above
         heading = layout.names[wind.columns[missing[0]].index]
@@ -418,7 +427,7 @@ def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
         'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
         "[file]", f"delimiter = {_quoted(delimiter_name(layout.delimiter))}", f"decimal = {_quoted(layout.decimal)}",
         f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
-        f"missing = [{', '.join(_quoted(f'{code:g}') for code in _codes(layout, wind))}]", "",
+        f"missing = [{', '.join(map(_quoted, missing_codes.of(layout, wind)))}]", "",
         "[time]",
     ]  # fmt: skip
     if time is None:
@@ -462,32 +471,3 @@ def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
     other = layout.unit_columns[column.index]
     alone = understand(layout.names[column.index]).unit is None
     return (other,) if other is not None and alone else ()
-
-
-def _near_a_thousand(layout: Layout, wind: Wind | None) -> bool:
-    """Whether a pressure of the table may be as large as a code for "no direction"."""
-    column = wind.columns.get("air_pressure") if wind is not None else None
-    if column is None:
-        return False
-    value = numbers(layout.column(column.index), decimal=layout.decimal).value
-    return bool(np.nanmedian(np.abs(value)) > 700)
-
-
-def _codes(layout: Layout, wind: Wind | None) -> list[float]:
-    """Codes for "no value": those that no quantity here can have, and those above every other value of the wind."""
-    codes = list(CODES)
-    for channel, column in (wind.columns if wind is not None else {}).items():
-        value = numbers(layout.column(column.index), decimal=layout.decimal).value
-        known = value[np.isfinite(value)]
-        if channel in COMPONENTS and column.unit is not None:
-            # What no component can be in m/s, -99, it can be in cm/s.
-            codes = [code for code in codes if abs(code) * unit_of(column.unit).scale > FASTEST]
-        if channel.endswith("direction") and bool(np.any((known < 0) & ~np.isin(known, CODES))):
-            codes = [code for code in codes if code < -180]
-        if channel.endswith("direction") and not _near_a_thousand(layout, wind):
-            codes.extend(code for code in NO_ANGLE if code in known)
-        for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
-            others = known[known != code]
-            if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:
-                codes.append(code)
-    return list(dict.fromkeys(codes))

@@ -23,9 +23,11 @@ def beaufort(layout: Layout) -> tuple[str, ...]:
 def counts(layout: Layout) -> tuple[int, ...]:
     """Columns of what an anemometer counts or gives, its frequency, pulses or volts, which are no speeds yet."""
     found: list[int] = []
+    beside_vane = any(understand(name).channel == "wind_direction" for name in layout.names)
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
-        of_wind = words & {"wind", "anemometer", "anem", "cup", "ws", "windspeed"}
+        alone = beside_vane and words <= _COUNTED | {"s", "per"} - {"v", "mv", "volt", "volts", "voltage", "ma"}
+        of_wind = alone or words & {"wind", "anemometer", "anem", "cup", "ws", "windspeed"}
         if of_wind and (words & _COUNTED or understand(name, layout.units[index]).strange.lower() in _COUNTED):
             found.append(index)
     return tuple(found)

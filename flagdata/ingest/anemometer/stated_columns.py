@@ -22,6 +22,7 @@ from flagdata.ingest.anemometer.angles import compass_unit, in_tens, may_be_dire
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.dates import Order
+from flagdata.ingest.anemometer.directions import judge
 from flagdata.ingest.anemometer.headings import fits, understand
 from flagdata.ingest.anemometer.instruments import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
@@ -363,7 +364,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
                 found[at] = heading.channel
                 continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
-            if guessed is None and CHANNELS[heading.channel].unit == "rad" and in_tens(layout, at):
+            if guessed is None and CHANNELS[heading.channel].unit == "rad" and _in_doubt(layout, at):
                 guessed = "?"
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
@@ -375,6 +376,13 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         ):
             found[at] = "?"
     return found
+
+
+def _in_doubt(layout: Layout, index: int) -> bool:
+    """Whether the numbers of a direction may be in another unit than degrees, or are no angles."""
+    heading = understand(layout.names[index], layout.units[index])
+    judged = judge(heading, numbers(layout.column(index), decimal=layout.decimal).value, heading.channel)
+    return in_tens(layout, index) or bool(judged.left_out)
 
 
 def _part(form: str, parts: Mapping[str, str]) -> str:

@@ -139,7 +139,17 @@ def test_the_direction_from_north_is_preferred_and_said(read: Read) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["anemometer_hz", "Anemometer [Hz]", "wind speed pulses", "wind ticks", "wind_mV", "windspeed [mA]"]
+    "name",
+    [
+        "anemometer_hz",
+        "Anemometer [Hz]",
+        "wind speed pulses",
+        "wind ticks",
+        "wind_mV",
+        "windspeed [mA]",
+        "counts",
+        "rpm",
+    ],
 )
 def test_counts_of_an_anemometer_are_no_speed_until_their_calibration_is_said(log_file: Write, name: str) -> None:
     path = log_file(table(f"time,{name},wind dir", [str(v / 0.5) for v in SPEEDS], [str(v) for v in DEGREES]))
@@ -198,3 +208,20 @@ def test_what_to_do_with_a_logger_table_without_rows_begins_with_words(log_file:
     )
     fix = refusal(log_file(head)).fix or ""
     assert fix.startswith("describe the file by a recipe")
+
+
+def test_a_unit_in_a_comment_below_the_rows_is_proposed(log_file: Write) -> None:
+    text = table("time,wind speed,wind dir", [str(v) for v in SPEEDS], [str(v) for v in DEGREES])
+    assert "--unit kn" in (refusal(log_file(f"{text}# speeds in knots\n")).fix or "")
+
+
+def test_a_vane_in_millivolts_is_offered_without_a_unit(log_file: Write) -> None:
+    path = log_file(table("time,counts,vane_mV", [str(v) for v in SPEEDS], [str(9 * v) for v in DEGREES]))
+    assert "wind_direction[deg]" not in (refusal(path).fix or "")
+
+
+def test_a_word_for_a_variable_direction_is_a_missing_value(read: Read) -> None:
+    away = ["VRB" if at % 3 == 0 else str(v) for at, v in enumerate(DEGREES)]
+    log = read(table("time,wind speed [m/s],wind direction [deg]", [str(v) for v in SPEEDS], away))
+    assert any(finding.kind == "missing-values" and finding.count == 6 for finding in log.findings)
+    assert "'VRB'" in said(log)
