@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from itertools import islice
@@ -24,6 +24,14 @@ _LOOK = 1.0  # s, from one look at who works to the next
 PATIENCE = 120.0
 """How long jobs wait where nobody works, before that is an error [s]."""
 _AGAIN = "then give the command again: it goes on from the last commit"
+
+_OF_WORKERS = {
+    "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
+    "MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}  # fmt: skip
+"""Numerical libraries take one thread, and memory stays with the process. Dask has freed arrays of 64 kB handed back to
+the system at once (its setting nanny.pre-spawn-environ); filming takes and frees 1 to 30 MB a frame, and to have those
+mapped anew costs a fifth of the time."""
 
 Job = tuple[Callable[..., Any], Sequence[Any]]
 """A function of this package and its arguments."""
@@ -59,7 +67,7 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
             yield client
         return
     with (
-        _threads_per_process(1),
+        _environment(_OF_WORKERS),
         LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0,
             dashboard_address=None,  # pyright: ignore[reportArgumentType]  None is no dashboard, as documented
@@ -95,11 +103,10 @@ def _check(client: Client, *, where: str) -> None:
 
 
 @contextmanager
-def _threads_per_process(count: int) -> Iterator[None]:
-    """What the numerical libraries of processes started meanwhile take."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, str(count)))
+def _environment(wanted: Mapping[str, str]) -> Iterator[None]:
+    """What processes that are started meanwhile find in their environment."""
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
     try:
         yield
     finally:

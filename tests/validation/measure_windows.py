@@ -211,8 +211,8 @@ def page(found: Mapping[str, Any]) -> str:
 def _about(found: Mapping[str, Any]) -> str:
     return (
         f"The shipped model {found['model']!r} on {found['films']} simulated films of {found['windows']} windows "
-        "of 1.2 s each, of the cloths that it was trained on (`python -m tests.validation measure-windows`). Intervals in "
-        "brackets are of 90 %, over films."
+        "of 1.2 s each, of the cloths that it was trained on (`python -m tests.validation measure-windows`). "
+        "Intervals in brackets are of 90 %, over films."
     )
 
 

@@ -1,0 +1,21 @@
+"""What the processes that build a data set find in their environment."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from sim.datasets.cluster import connected
+
+
+def test_workers_keep_their_memory_and_take_one_thread_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Dask itself would set the second to 65,536 B.
+    names = ("OMP_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_")
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MALLOC_TRIM_THRESHOLD_", raising=False)
+    with connected(None, workers=1) as client:
+        (found,) = client.run(lambda: [os.environ.get(name) for name in names]).values()
+    assert found == ["1", str(2**30), str(2**25)]
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "MALLOC_TRIM_THRESHOLD_" not in os.environ
