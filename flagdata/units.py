@@ -155,7 +155,8 @@ def spelled(text: str) -> str | None:
     if known is not None:
         return known
     name = _factored(stripped)
-    return name if name is not None and name.partition(" ")[0] in _TENTHS else None
+    known = name is not None and name.partition(" ")[0] in _TENTHS and UNITS[name].si in ("m/s", "rad")
+    return name if known else None
 
 
 def _factored(text: str) -> str | None:

@@ -16,11 +16,13 @@ from flagdata.ingest.anemometer.cells import Cell, Numbers
 
 NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
 """Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
-_SPEEDS = (
-    99_999.0, 9999.9, 9999.0, 8888.0, 7999.0, 6999.0, 999.99, 999.9, 999.0, 888.8, 888.0, 99.99, 99.9, 99.0, 88.8,
-    65_535.0, 6553.5, 655.35, 65_534.0, 32_767.0, 3276.7, 327.67, 255.0, 25.5,
+_NINES = (99_999.0, 9999.9, 9999.0, 999.99, 999.9, 999.0, 99.99, 99.9, 99.0)
+_OFTEN = (
+    8888.0, 7999.0, 6999.0, 888.8, 888.0, 88.8, 65_535.0, 6553.5, 655.35, 65_534.0, 32_767.0, 3276.7, 327.67, 255.0,
 )  # fmt: skip
-"""Nines and eights of services, codes of Campbell's loggers, and the largest numbers of 16 and 8 bits, also scaled."""
+"""Eights, codes of Campbell's loggers, and the largest numbers of 16 and 8 bits, also scaled: codes where they come
+again and again, since a slow unit may reach them once."""
+_AGAIN = 3
 _ENDLESS = 1e5
 """No speed in any unit is as large; codes such as 1e20 are."""
 _OTHERS = 10
@@ -58,8 +60,10 @@ def speeds(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     endless = np.isfinite(values) & (values >= _ENDLESS)
     if len(np.unique(values[endless])) == 1 < endless.sum() < np.isfinite(values).sum() / 2:
         found |= endless
-    for code in _SPEEDS:
+    for code in (*_NINES, *_OFTEN):
         here = values == code
+        if code in _OFTEN and here.sum() < _AGAIN:
+            continue
         others = values[np.isfinite(values) & ~here & ~found]
         if here.any() and len(others) >= _OTHERS and 2 * float(others.max()) < code:
             found |= here

@@ -123,6 +123,8 @@ _INSIDE = {
 _NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
 """What stands in brackets behind a direction for the north it is from."""
 _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
+_RATE = re.compile(r"(?<![\d.])\d+(?:\.\d+)?\s?k?Hz(?![^\W_])", re.IGNORECASE)
+"""The rate of samples in a heading ("u_20Hz"), which is no unit."""
 _OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
 """How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
 _TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
@@ -172,6 +174,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english(name[:120].strip().strip('"').strip())
+    text = _RATE.sub(" ", text)
     text = _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text))
     tenfold = _TENFOLD.search(text)
     text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"

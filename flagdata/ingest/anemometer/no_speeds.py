@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.layout import Layout
 
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
+_MILLIS = re.compile(r"(?<![^\W_])m[VA](?![^\W_])")
+"""Millivolts and milliamperes, whose capital cuts them in two words."""
 _COUNTED = frozenset(
     {
         "hz", "count", "counts", "pulse", "pulses", "ticks", "clicks", "rotations", "revolutions", "rpm", "freq",
@@ -28,6 +32,10 @@ def counts(layout: Layout) -> tuple[int, ...]:
         words = set(words_of(name))
         alone = beside_vane and words <= _COUNTED | {"s", "per"} - {"v", "mv", "volt", "volts", "voltage", "ma"}
         of_wind = alone or words & {"wind", "anemometer", "anem", "cup", "ws", "windspeed"}
-        if of_wind and (words & _COUNTED or understand(name, layout.units[index]).strange.lower() in _COUNTED):
+        if of_wind and (
+            words & (_COUNTED - {"v"})
+            or _MILLIS.search(name)
+            or understand(name, layout.units[index]).strange.lower() in _COUNTED
+        ):
             found.append(index)
     return tuple(found)

@@ -44,11 +44,18 @@ def _isd(line: str) -> list[str] | None:
     if match is None:
         return None
     values = match[5].split()
-    warm, _, _, away, speed = values[:5]
+    warm, _, pressure, away, speed = values[:5]
+    if not (_is(pressure, 8000, 11_000) and _is(away, 0, 360) and _is(speed, 0, 1100) and _is(warm, -950, 650)):
+        return None
     calm = speed == "0" and away == "0"
     tenths = ["" if cell == "-9999" else f"{int(cell) / 10:g}" for cell in (speed, warm)]
     stamp = f"{match[1]}-{match[2]}-{match[3]}T{match[4]}:00:00Z"
     return [stamp, tenths[0], "" if away == "-9999" or calm else away, tenths[1]]
+
+
+def _is(cell: str, low: int, high: int) -> bool:
+    """Whether a number is missing or lies between."""
+    return cell == "-9999" or low <= int(cell) <= high
 
 
 def _realtime(line: str) -> list[str] | None:

@@ -183,7 +183,7 @@ def test_a_unit_in_the_title_is_proposed(log_file: Write, title: str, name: str)
     [
         ("Knoten", "kn"), ("nudos", "kn"), ("nœuds", "kn"), ("nodi", "kn"), ("Meter pro Sekunde", "m/s"),
         ("kilómetros por hora", "km/h"), ("mètres par seconde", "m/s"), ("metri al secondo", "m/s"), ("км/ч", "km/h"),
-        ("0.1 kn", "0.1 kn"), ("0.1 m/s", "dm/s"), ("10 m/s", None), ("2 m", None), ("0.5 m/s", None),
+        ("0.1 kn", "0.1 kn"), ("0.1 m/s", "dm/s"), ("10 m/s", None), ("2 m", None), ("0.5 m/s", None), ("0.1 m", None),
     ],
 )  # fmt: skip
 def test_units_in_the_words_of_other_languages_and_in_tenths(text: str, name: str | None) -> None:
@@ -225,3 +225,22 @@ def test_a_word_for_a_variable_direction_is_a_missing_value(read: Read) -> None:
     log = read(table("time,wind speed [m/s],wind direction [deg]", [str(v) for v in SPEEDS], away))
     assert any(finding.kind == "missing-values" and finding.count == 6 for finding in log.findings)
     assert "'VRB'" in said(log)
+
+
+@pytest.mark.parametrize("name", ["Wind speed 20Hz [m/s]", "WS_10Hz [m/s]"])
+def test_the_rate_of_samples_in_a_heading_is_no_frequency_of_a_cup(read: Read, name: str) -> None:
+    log = read(table(f"time,{name},wind dir", [str(v) for v in SPEEDS], [str(v) for v in DEGREES]))
+    np.testing.assert_allclose(log.series.channels["wind_speed"], SPEEDS)
+
+
+def test_a_speed_of_255_once_is_a_gust_in_a_small_unit(read: Read) -> None:
+    speeds = [str(round(v * 20)) for v in SPEEDS[:-1]] + ["255"]
+    log = read(table("time,wind speed [cm/s],wind direction [deg]", speeds, [str(v) for v in DEGREES]))
+    assert log.series.channels["wind_speed"][-1] == pytest.approx(2.55)
+
+
+def test_a_component_called_v_is_no_voltage(log_file: Write) -> None:
+    path = log_file(table("time,wind_u,wind_v", [str(v - 4) for v in SPEEDS], [str(v - 3) for v in SPEEDS]))
+    assert "not yet a speed" not in refusal(path).what
+    channels = read_log(path, WindOptions(unit="m/s")).series.channels
+    np.testing.assert_allclose(channels["wind_y"], np.array(SPEEDS) - 3)

@@ -214,3 +214,10 @@ def test_skies_observed_by_a_hub_are_winds(read: Read) -> None:
         for t, s, d in rows()
     ]
     check(read("\n".join(lines)), 1.0)
+
+
+def test_twelve_whole_numbers_after_a_date_need_not_be_isd_lite(log_file: Write) -> None:
+    lines = [f"{t:%Y %m %d %H} 12 8 3 {d} {s} 4 5 6" for t, s, d in rows()]
+    with pytest.raises(FlagdataError) as caught:
+        read_log(log_file("\n".join(lines)))
+    assert "--columns" in (caught.value.fix or "")
