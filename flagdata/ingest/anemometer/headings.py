@@ -94,8 +94,8 @@ _ABBREVIATED = {
 _NO_AIR = frozenset(
     {
         "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger",
-        "battery", "batt", "panel", "internal", "indoor", "case", "board", "cpu", "virtual", "surface", "water", "sea",
-        "heat",
+        "battery", "batt", "panel", "internal", "int", "indoor", "case", "board", "cpu", "virtual", "surface", "water",
+        "sea", "heat",
         "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
         "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
         "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",

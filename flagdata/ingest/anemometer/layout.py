@@ -15,6 +15,8 @@ from flagdata.units import UNITS, spelled
 
 TAIL = 200
 """Lines at the end of those looked at by which the delimiter is told; half of them where the file is short."""
+_LEAST = 3
+"""Lines at the end that may tell the delimiter where more of them do not."""
 _CANDIDATES = (";", "\t", ",", "|", " ")
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 _STAMP = re.compile(
@@ -98,6 +100,20 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     """
     filled = [(number, line) for number, line in enumerate(lines) if line.strip(" \t\x00\x1a")]
     tail = min(TAIL, max(1, len(filled) // 2))
+    found = _lay_out(lines, filled, tail, interest)
+    while found is None and _LEAST < tail < TAIL:
+        # A short log below a long preamble: fewer lines of its end may be rows alone. Their names must bear it out.
+        tail = max(_LEAST, tail // 2)
+        shorter = _lay_out(lines, filled, tail, interest)
+        if shorter is not None and shorter.by_name and sum(interest(name) > 0 for name in shorter.names) > 1:
+            found = shorter
+    return found
+
+
+def _lay_out(
+    lines: Sequence[str], filled: Sequence[tuple[int, str]], tail: int, interest: Callable[[str], int]
+) -> Layout | None:
+    """The table that `lines` hold, if any, as the last `tail` of its `filled` lines divide their cells."""
     delimiter = _delimiter([line for _, line in filled[-tail:]])
     if delimiter is None:
         return None
