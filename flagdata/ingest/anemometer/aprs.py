@@ -1,8 +1,8 @@
 """Weather reports of amateur radio (APRS), as receivers and servers write them down.
 
-    2024-05-17 22:00:09 UTC: FW0001>APRS,TCPIP*:@172200z4903.50N/07201.75W_220/004g005t077r000h50b09900
-    @092345z4903.50N/07201.75W_220/004g005t-07r000p000P000h50b09900wRSW
-    _10090556c220s004g005t077r000p000P000h50b09900wRSW
+    2024-05-17 22:00:09 UTC: FW0001>APRS,TCPIP*:@172200z5112.34N/00456.78E_231/009g014t058r000h71b10123
+    @172200z5112.34N/00456.78E_231/009g014t-04r000p000P000h71b10123
+    _05172200c231s009g014t058r000p000P000h71b10123
 
 Source: APRS Protocol Reference 1.0.1, chapter 12: direction in degrees with 000 unknown, sustained speed over a minute
 and gust of 5 minutes in mph, °F, humidity with 00 for 100 %, pressure in 0.1 hPa; dots or blanks for no value. A

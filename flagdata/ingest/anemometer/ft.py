@@ -1,4 +1,4 @@
-"""Sentences of FT Technologies' acoustic wind sensors: `$WI,WVP=020.0,045,0*73` behind a logger's stamp.
+"""Sentences of FT Technologies' acoustic wind sensors: `$WI,WVP=007.4,212,0*72` behind a logger's stamp.
 
 Source: FT Technologies, FT702LT manual, "WV Polar": speed in m/s, direction in degrees from the sensor's datum, and a
 status that is 0 where the reading is good; the checksum is that of NMEA 0183, or "//" for none.

@@ -1,15 +1,16 @@
 """Lines of fields without a heading, as weather services and station programs publish them, told by their form.
 
     2024 05 17 22   123    81 10123   230    42 -9999 -9999 -9999      NOAA's ISD-Lite
-    17/05/24 22:00:00 8.4 84 5.8 24.2 33.0 261 … 6 km/h C hPa mm …     Cumulus, realtime.txt
-    12345 5.7 8.5 232 12.3 77 1012.4 … 22 00 00 station … !!C10.37!!   Weather Display, clientraw.txt
+    17/05/24 22:00:00 14.1 71 8.9 17.3 25.6 231 … 3 km/h C hPa mm …    Cumulus, realtime.txt
+    12345 5.7 8.5 232 12.3 77 1012.4 … 22 00 00 station … !!C1!!       Weather Display, clientraw.txt
+    2024-05-17,22,12.3,8.1,77,0.0,,238,17.1,25.0,1012.3,,3             Meteostat, bulk data by the hour
     94846KORD ORD2024051716002200  0.113 D   229   8   229   12 …      NCEI DSI-6405, ASOS 1-minute
 
 Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
-Cumulus Wiki, "Realtime.txt" (fields 6 average and 7 latest speed, 8 bearing, 14 the unit of the speeds); Weather
-Display's list of the fields of clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to
-31 the clock, 35 and 36 day and month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots
-over 2 minutes and of 5 seconds).
+Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (fields 6
+average and 7 latest speed, 8 bearing, 14 the unit of the speeds); Weather Display's list of the fields of clientraw.txt
+(1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock, 35 and 36 day and month, 141
+the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes and of 5 seconds).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from flagdata.ingest.anemometer.source import TableText, TextFile
 _SHARE = 0.8
 _ISD = re.compile(r"\s*(\d{4})\s+(\d\d)\s+(\d\d)\s+(\d\d)((?:\s+-?\d{1,5}){8})\s*")
 _REALTIME = re.compile(r"\d{1,2}[-/.]\d{1,2}[-/.]\d{2}\s+\d{2}:\d{2}:\d{2}\s")
+_DAY = re.compile(r"\d{4}-\d\d-\d\d")
 _UNITS = {"m/s": "m/s", "mph": "mph", "km/h": "km/h", "kts": "kn", "knots": "kn"}
 _ASOS = re.compile(r"\s*\d{5}[A-Z0-9]{4}\s+[A-Z0-9]{3}(?P<day>\d{8})(?P<local>\d{4})(?P<utc>\d{4})(?P<rest>\s.*)")
 _FOUR = re.compile(r"(?:^|\s)[DN]\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})(?:\s|$)")
@@ -56,6 +58,20 @@ def _isd(line: str) -> list[str] | None:
 def _is(cell: str, low: int, high: int) -> bool:
     """Whether a number is missing or lies between."""
     return cell == "-9999" or low <= int(cell) <= high
+
+
+def _meteostat(line: str) -> list[str] | None:
+    cells = [cell.strip() for cell in line.rstrip("\r\n").split(",")]
+    if len(cells) != 13 or _DAY.fullmatch(cells[0]) is None or not cells[1].isdigit() or int(cells[1]) > 23:
+        return None
+    ranges = ((4, 0, 100), (7, 0, 360), (8, 0, 400), (10, 850, 1100), (12, 1, 27))
+    if not all(cells[at] == "" or _between(cells[at], low, high) for at, low, high in ranges):
+        return None
+    return [f"{cells[0]}T{int(cells[1]):02d}:00:00Z", cells[8], cells[7], cells[9], cells[2], cells[4]]
+
+
+def _between(cell: str, low: float, high: float) -> bool:
+    return re.fullmatch(r"\d+(?:\.\d+)?", cell) is not None and low <= float(cell) <= high
 
 
 def _realtime(line: str) -> list[str] | None:
@@ -99,6 +115,14 @@ _KINDS = (
     _Lines(
         about="NOAA's ISD-Lite",
         names=("time [UTC]", "wind speed [m/s]", "wind direction [deg]", "air temperature [degC]"), row=_isd,
+    ),
+    _Lines(
+        about="Meteostat's hourly data",
+        names=(
+            "time [UTC]", "wind speed [km/h]", "wind direction [deg]", "gust [km/h]", "air temperature [degC]",
+            "relative humidity [%]",
+        ),
+        row=_meteostat,
     ),
     _Lines(
         about="Cumulus' realtime.txt",

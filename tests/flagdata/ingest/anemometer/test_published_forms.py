@@ -111,6 +111,12 @@ def test_isd_lite_is_in_tenths_and_utc(read: Read) -> None:
     check(read("\n".join(lines)), 1.0, missing=3)
 
 
+def test_meteostats_lines_are_in_kilometres_an_hour_and_utc(read: Read) -> None:
+    lines = [f"{t:%Y-%m-%d},{t.hour},12.3,8.1,77,0.0,,{d},{3.6 * s:.1f},,1012.3,,3" for t, s, d in rows()]
+    lines[3] = f"{rows()[3][0]:%Y-%m-%d},{rows()[3][0].hour},12.3,8.1,77,0.0,,,,,1012.3,,3"
+    check(read("\n".join(lines)), 1.0, missing=3)
+
+
 def test_asos_of_one_minute_takes_its_utc_clock_past_midnight(read: Read) -> None:
     form = (
         "94846KORD ORD{l:%Y%m%d%H%M}{t:%H%M}   0.113 D                  {d:3d}   {s:3d}   {d:3d}   {g:3d}   28    60+"
@@ -128,7 +134,7 @@ def test_asos_of_five_minutes_is_a_report_of_the_next_day_in_utc(read: Read) -> 
 
 @pytest.mark.parametrize(("name", "factor"), [("km/h", 1 / 3.6), ("mph", MILE), ("kts", KNOT), ("m/s", 1.0)])
 def test_cumulus_realtime_names_its_unit_in_each_line(read: Read, name: str, factor: float) -> None:
-    form = "{t:%d/%m/%y %H:%M:%S} 8.4 84 5.8 {s}.0 {s}.9 {d} 0.0 1.0 999.7 W 6 {u} C hPa mm 146.6 +0.1 85.2 588.4 11.6"
+    form = "{t:%d/%m/%y %H:%M:%S} 14.1 71 8.9 {s}.0 {s}.9 {d} 0.0 0.2 1013.4 SW 3 {u} C hPa mm 88.1 -0.2 30.4 211.7 2.3"
     check(read("\n".join(form.format(t=t, s=s, d=d, u=name) for t, s, d in rows()), zone="UTC"), factor)
 
 
@@ -147,15 +153,15 @@ def test_lines_of_clientraw_are_in_knots(read: Read) -> None:
     check(read("\n".join(lines), zone="UTC"), KNOT)
 
 
-APRS = "g{g:03d}t077r000p000P000h50b09900wRSW"
+APRS = "g{g:03d}t058r000p000P000h71b10123"
 
 
 @pytest.mark.parametrize(
     ("form", "options"),
     [
-        ("{t:%Y-%m-%d %H:%M:%S} UTC: FW0001>APRS,TCPIP*:@{t:%d%H%M}z4903.50N/07201.75W_{d:03d}/{s:03d}", {}),
+        ("{t:%Y-%m-%d %H:%M:%S} UTC: FW0001>APRS,TCPIP*:@{t:%d%H%M}z5112.34N/00456.78E_{d:03d}/{s:03d}", {}),
         ("{t:%Y-%m-%d %H:%M:%S}: c{d:03d}s{s:03d}", {"zone": "UTC"}),
-        ("@{t:%d%H%M}z4903.50N/07201.75W_{d:03d}/{s:03d}", {"date": dt.date(2024, 5, 17)}),
+        ("@{t:%d%H%M}z5112.34N/00456.78E_{d:03d}/{s:03d}", {"date": dt.date(2024, 5, 17)}),
         ("_{t:%m%d%H%M}c{d:03d}s{s:03d}", {"date": dt.date(2024, 5, 17)}),
     ],
 )
@@ -165,7 +171,7 @@ def test_weather_reports_of_amateur_radio_are_read(read: Read, form: str, option
 
 
 def test_the_day_of_radio_reports_without_a_year_is_asked_for(log_file: Write) -> None:
-    path = log_file("\n".join(("@{t:%d%H%M}z4903.50N/07201.75W_220/004" + APRS).format(t=t, g=6) for t, _, _ in rows()))
+    path = log_file("\n".join(("@{t:%d%H%M}z5112.34N/00456.78E_220/004" + APRS).format(t=t, g=6) for t, _, _ in rows()))
     with pytest.raises(FlagdataError) as caught:
         read_log(path)
     assert "--date" in (caught.value.fix or "")
