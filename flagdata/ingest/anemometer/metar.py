@@ -72,7 +72,7 @@ def _date(line: str, day: str) -> str | None:
     asos = _OF_ASOS.match(line)
     if asos is not None:
         try:
-            local = dt.datetime.strptime(asos["day"], "%Y%m%d").date()
+            local = dt.date.fromisoformat(asos["day"])
         except ValueError:
             return None
         near = (local + dt.timedelta(days=days) for days in (0, 1, -1))

@@ -83,7 +83,7 @@ def _knmi(row: Row) -> str:
     if not re.fullmatch(r"\d{8}", day) or not hour.isdigit() or int(hour) > 24:
         return ""
     try:
-        instant = dt.datetime.strptime(day, "%Y%m%d") + dt.timedelta(hours=int(hour))
+        instant = dt.datetime.strptime(day, "%Y%m%d").replace(tzinfo=dt.UTC) + dt.timedelta(hours=int(hour))
     except ValueError:
         return ""
     return f"{instant:%Y-%m-%dT%H:%M:%S}Z"

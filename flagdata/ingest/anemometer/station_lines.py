@@ -98,7 +98,7 @@ def _asos(line: str) -> list[str] | None:
     if match is None or re.fullmatch(r"[01]\d[0-5]\d|2[0-3][0-5]\d", match["utc"]) is None:
         return None
     try:
-        local = dt.datetime.strptime(match["day"] + match["local"], "%Y%m%d%H%M")
+        local = dt.datetime.strptime(match["day"] + match["local"], "%Y%m%d%H%M").replace(tzinfo=dt.UTC)
     except ValueError:
         return None
     clock = dt.timedelta(hours=int(match["utc"][:2]), minutes=int(match["utc"][2:]))

@@ -12,6 +12,7 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from urllib.parse import parse_qsl
 
 from flagdata.ingest.anemometer.restated import rows_of, table
@@ -77,10 +78,8 @@ def _query(line: str) -> dict[str, str]:
     before = line[: match.start(1)]
     served, stamp = _SERVED.search(before), _STAMP.match(before)
     if served is not None:
-        try:
+        with suppress(ValueError):
             found["logged time"] = dt.datetime.strptime(served[1], "%d/%b/%Y:%H:%M:%S %z").isoformat()
-        except ValueError:
-            pass
     elif stamp is not None:
         found["logged time"] = stamp[1]
     found |= {

@@ -19,7 +19,7 @@ from flagdata.signals import WindLog
 Read = Callable[..., WindLog]
 Write = Callable[..., Path]
 KNOT, MILE = 1852 / 3600, 0.44704
-START = dt.datetime(2024, 5, 17, 22, 0)
+START = dt.datetime(2024, 5, 17, 22, 0, tzinfo=dt.UTC)
 SPEEDS = [3, 4, 5, 6, 7, 6, 5, 4, 3, 2, 3, 4, 5, 6]
 DEGREES = [220, 230, 240, 250, 260, 250, 240, 230, 220, 210, 200, 210, 220, 230]
 
@@ -94,8 +94,7 @@ def test_words_for_missing_of_a_service_are_none(read: Read) -> None:
 
 @pytest.mark.parametrize(("number", "factor"), [(1, MILE), (16, 1 / 3.6), (17, 1.0)])
 def test_a_station_archives_own_column_tells_its_units(read: Read, number: int, factor: float) -> None:
-    utc = dt.UTC
-    lines = [f"{int(t.replace(tzinfo=utc).timestamp())},{number},5,29.9,{s},{d}" for t, s, d in rows()]
+    lines = [f"{int(t.timestamp())},{number},5,29.9,{s},{d}" for t, s, d in rows()]
     check(read("dateTime,usUnits,interval,barometer,windSpeed,windDir\n" + "\n".join(lines)), factor)
 
 
@@ -191,8 +190,10 @@ def test_sentences_of_an_acoustic_sensor_are_in_metres_a_second(read: Read) -> N
     "form",
     [
         "PASSKEY=0123&dateutc={t:%Y-%m-%d+%H:%M:%S}&tempf=55.1&winddir={d}&windspeedmph={s}.0&windgustmph={s}.9",
-        '10.0.0.7 - - [{t:%d/%b/%Y:%H:%M:%S} +0000] "GET /up.php?ID=K1&PASSWORD=x&dateutc=now&winddir={d}'
-        '&windspeedmph={s}.0 HTTP/1.1" 200 7',
+        (
+            '10.0.0.7 - - [{t:%d/%b/%Y:%H:%M:%S} +0000] "GET /up.php?ID=K1&PASSWORD=x&dateutc=now&winddir={d}'
+            '&windspeedmph={s}.0 HTTP/1.1" 200 7'
+        ),
         "{t:%Y-%m-%dT%H:%M:%SZ} ID=K1&dateutc=now&winddir={d}&windspeedmph={s}.0",
     ],
 )
@@ -214,9 +215,7 @@ def test_a_list_of_observations_deep_in_an_object_is_a_table(log_file: Write) ->
 
 def test_skies_observed_by_a_hub_are_winds(read: Read) -> None:
     lines = [
-        json.dumps(
-            {"type": "obs_sky", "obs": [[int(t.replace(tzinfo=dt.UTC).timestamp()), 9000, 10, 0.0, 1.0, s, 9, d, 3.1]]}
-        )
+        json.dumps({"type": "obs_sky", "obs": [[int(t.timestamp()), 9000, 10, 0.0, 1.0, s, 9, d, 3.1]]})
         for t, s, d in rows()
     ]
     check(read("\n".join(lines)), 1.0)
