@@ -3,13 +3,13 @@
 Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
 optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
-for "AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read. %Q is the hour with its fraction,
-%J the day of the year with its own (1.5 is noon of 1 January). %E is the hour of the year since New Year, %G the
-minute and %K the second of the day, each with a fraction or none. %s is Unix time in seconds; %L, %U and %N are the
-milli-, micro- and nanoseconds of a second in a number of their own ("12:00:01 50" with %L is 01.050). %D is a day
-numbered from a start that the user gives. Numbers between blanks may end in ".0", as tables of floats have them.
-24:00 is the midnight that ends a day (ISO 8601:2004, 4.2.3). A blank stands for any run of blanks or a "T". Two-digit
-years are 1970 to 2069.
+for "AM", "p.m." or a bare "a" or "p" (with %H it may be left out: 13:05 beside 1:05 PM), %a for a day of the week,
+which is not read. %Q is the hour with its fraction, %J the day of the year with its own (1.5 is noon of 1 January).
+%E is the hour of the year since New Year, %G the minute and %K the second of the day, each with a fraction or none.
+%s is Unix time in seconds; %L, %U and %N are the milli-, micro- and nanoseconds of a second in a number of their own
+("12:00:01 50" with %L is 01.050). %D is a day numbered from a start that the user gives. Numbers between blanks may
+end in ".0", as tables of floats have them. 24:00 is the midnight that ends a day (ISO 8601:2004, 4.2.3). A blank
+stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -116,6 +116,11 @@ def pattern(form: str) -> str:
         letter = form[position]
         if letter == "%":
             directive = form[position + 1 : position + 2]
+            if directive == "p" and "%H" in form:
+                used.append("p")
+                out.append(rf"(?:\s*{_GROUPS['p']})?")
+                position += 2
+                continue
             if directive not in _GROUPS:
                 raise UsageError(
                     f"unknown directive %{directive}", where=f"time format {form!r}",
@@ -280,13 +285,19 @@ def _whole_year(values: NDArray[np.int64] | None) -> NDArray[np.int64] | None:
 
 def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     hour = part("H")
+    half = _field(found, "p")
+    if hour is not None and half is not None:
+        # 13:05 beside 1:05 PM, and 13:05 PM: what says its half of the day is of 12 hours where it can be.
+        after = pc.starts_with(pc.utf8_lower(pc.coalesce(half, "")), "p").to_numpy(zero_copy_only=False)
+        stated = pc.not_equal(pc.coalesce(half, ""), "").to_numpy(zero_copy_only=False).astype(bool)
+        twelve = stated & (hour >= 1) & (hour <= 12)
+        return np.where(twelve, hour % 12 + 12 * after.astype(np.int64), hour), np.ones(len(hour), dtype=bool)
     if hour is not None:
         return hour, np.ones(len(hour), dtype=bool)
     twelve = part("I")
     if twelve is None:
         return np.zeros(len(found), dtype=np.int64), np.ones(len(found), dtype=bool)
     ok = (twelve >= 1) & (twelve <= 12)
-    half = _field(found, "p")
     if half is None:
         return twelve, ok
     after = pc.starts_with(pc.utf8_lower(pc.coalesce(half, "")), "p").to_numpy(zero_copy_only=False)
