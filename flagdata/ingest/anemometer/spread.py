@@ -12,7 +12,10 @@ Three causes, told apart by the stamps themselves:
   rows are spread within the resolution.
 - Few rows share a stamp and their neighbours leave room: they waited in a buffer, or the clock stood for a moment. They
   are spread over that room. So are rows of a fast logger that leave none, within half a period.
-- Few rows of a slow logger share a stamp and there is no room: two rows claim one instant. The first is kept.
+- Rows come when something happens, and their stamps are coarse: stamps lie unevenly, or stand for more or fewer rows
+  than the time to the next one explains, and no period tells when a row came. Rows are spread within the resolution of
+  their own stamp.
+- Few rows of a slow, even logger share a stamp and there is no room: two rows claim one instant. The first is kept.
 
 All rows that are moved, and those of coarse or held stamps altogether, are flagged TIME_UNSURE.
 """
@@ -35,6 +38,8 @@ FAST = NANOSECONDS
 COARSE = NANOSECONDS
 """Stamps to a second or finer that stand for several rows are coarse; others are held [ns]."""
 BURST = 4.0
+_REGULAR = 0.7
+"""Share of the stamps that must follow a period for the rows to come at one."""
 ENOUGH = 10
 
 
@@ -61,10 +66,43 @@ def distinct(reading: Reading) -> Reading:
     again = np.concatenate(([False], np.diff(reading.time) == 0))
     if not again.any():
         return reading
+    if _irregular(reading):
+        return _without_rest(_within(reading))
     shared = again | np.concatenate((again[1:], [False]))
     if float(shared.mean()) < 0.5:
         return _few(reading, again)
     return _without_rest(_spread(reading, again))
+
+
+def _irregular(reading: Reading) -> bool:
+    """Whether neither the stamps of a slow logger nor the rows that they stand for come at any period."""
+    runs = _Runs.of(reading.time)
+    if len(runs.room) < ENOUGH or reading.step <= COARSE or int(np.median(runs.room)) < FAST:
+        return False
+    room, rows = runs.room[1:].astype(np.float64), runs.rows[1:-1]
+    period = float(np.median(room / rows))
+    held = np.abs(room / rows - period) <= period / 2
+    even = np.abs(room - np.median(room)) <= np.median(room) / 2
+    return float(held.mean()) < _REGULAR and float(even.mean()) < _REGULAR
+
+
+def _within(reading: Reading) -> Reading:
+    """The rows of each stamp spread within its resolution, or within what the next stamp leaves of it."""
+    runs = _Runs.of(reading.time)
+    room = np.append(np.minimum(runs.room, reading.step), reading.step)
+    time = reading.time + np.repeat(room, runs.rows) * _place(runs) // np.repeat(runs.rows, runs.rows)
+    moved = np.repeat(runs.rows > 1, runs.rows)
+    step, low, high = reading.step / NANOSECONDS, int(runs.room.min()), int(runs.room.max())
+    finding = Finding(
+        kind="uneven-stamps", severity=Severity.WARNING, count=int(moved.sum()), value=step,
+        where=f"line {reading.line[moved][0]}",
+        what=f"stamps to {step:g} s stand for 1 to {int(runs.rows.max())} rows each and lie {low / NANOSECONDS:g} to "
+        f"{high / NANOSECONDS:g} s apart, at no steady rate: {int(moved.sum())} rows that share theirs are spread "
+        f"within {step:g} s of it and unsure by as much",
+        fix="log a stamp to the second with every row",
+    )  # fmt: skip
+    flags = np.where(moved, reading.flags | SampleFlag.TIME_UNSURE, reading.flags).astype(np.uint16)
+    return replace(reading, time=time).with_findings((finding,), flags=flags)
 
 
 def _few(reading: Reading, again: NDArray[np.bool_]) -> Reading:
@@ -78,8 +116,9 @@ def _few(reading: Reading, again: NDArray[np.bool_]) -> Reading:
     for run in np.flatnonzero(runs.rows > 1).tolist():
         first, count = int(runs.start[run]), int(runs.rows[run])
         free = (count - 1) * period
-        after = int(runs.room[run]) if run < len(runs.room) else free + period
-        before = int(runs.stamp[run] - time[first - 1]) if first else free + period
+        beyond = free + period if period < FAST else 0  # what lies beyond the log's ends leaves a slow one no room
+        after = int(runs.room[run]) if run < len(runs.room) else beyond
+        before = int(runs.stamp[run] - time[first - 1]) if first else beyond
         place = np.arange(count)
         if after >= free + period // 2:
             step, start = min(period, after // count), int(runs.stamp[run])
@@ -138,7 +177,8 @@ def _spread(reading: Reading, again: NDArray[np.bool_]) -> Reading:
     time = reading.time + np.repeat(room, runs.rows) * _place(runs) // np.repeat(runs.rows, runs.rows)
     # The log may begin and end within a stamp: those rows keep the period, the first ones before the next stamp.
     if len(runs.room) and near[0]:
-        time[: runs.rows[0]] = runs.stamp[1] - np.round(period * np.arange(runs.rows[0], 0, -1)).astype(np.int64)
+        first = min(period, int(runs.room[0]) / int(runs.rows[0]))  # no row comes before its stamp
+        time[: runs.rows[0]] = runs.stamp[1] - np.round(first * np.arange(runs.rows[0], 0, -1)).astype(np.int64)
     last = int(runs.start[-1])
     time[last:] = runs.stamp[-1] + np.round(period * np.arange(int(runs.rows[-1]))).astype(np.int64)
     if not burst and hold <= 1.5 * reading.step and hold <= COARSE:

@@ -115,3 +115,30 @@ def test_a_single_long_renewal_of_a_stamp_moves_no_row_to_its_end() -> None:
     log = ordered(np.repeat([0, 13_800 * S], [5, 4]), smooth(9), step=60 * S)
     assert (log.time[:5] - T0).max() < 60 * S
     assert log.time[5] - T0 == 13_800 * S
+
+
+def test_rows_that_come_unevenly_stay_within_the_minute_of_their_stamp() -> None:
+    noise = stream(11, "spread")
+    minutes = np.unique(noise.integers(0, 2000, 150))
+    rows = noise.integers(1, 6, len(minutes))
+    log = ordered(np.repeat(minutes, rows) * 60 * S, smooth(int(rows.sum())), step=60 * S)
+    assert len(log.time) == int(rows.sum())
+    assert ((log.time - T0) // (60 * S)).tolist() == np.repeat(minutes, rows).tolist()
+    assert (log.flags > 0).tolist() == np.repeat(rows > 1, rows).tolist()
+    (finding,) = log.findings
+    assert (finding.kind, finding.severity) == ("uneven-stamps", Severity.WARNING)
+    assert "60 s" in finding.what
+
+
+def test_no_row_of_a_held_stamp_comes_before_it() -> None:
+    rows = stream(12, "spread").choice([1, 1, 2, 3], 60)
+    rows[0] = 4
+    log = ordered(np.repeat(np.arange(60) * 60 * S, rows), smooth(int(rows.sum())), step=60 * S)
+    assert int(log.time[0]) >= T0
+    assert len(log.time) == int(rows.sum())
+
+
+def test_two_first_records_of_a_slow_logger_do_not_begin_the_log_earlier() -> None:
+    log = ordered(np.array([0, 0, 1, 2, 3, 4, 5]) * 600 * S, smooth(7), step=60 * S)
+    assert int(log.time[0]) == T0
+    assert [(f.kind, f.severity) for f in log.findings] == [("duplicate-stamps", Severity.ERROR)]
