@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import counted, dateparts, yearless_columns
+from flagdata.ingest.anemometer import counted, dateparts, second_times, yearless_columns
 from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
@@ -55,11 +55,16 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     """
     best: TimeChoice | None = None
     choices = list(_choices(layout, order))
-    for choice in _without_false_epochs(layout, choices):
-        choice = replace(choice, score=choice.score - 2.0 * (1.0 - _filled(layout, choice)))
+    choices = [
+        replace(choice, score=choice.score - 2.0 * (1.0 - _filled(layout, choice)))
+        for choice in _without_false_epochs(layout, choices)
+    ]
+    for choice in choices:
         if best is None or choice.score > best.score + 1e-9:
             best = choice
-    return best
+    if best is None or best.form is None:
+        return best
+    return second_times.with_part_of_second(layout, second_times.settle(layout, best, choices), time_as)
 
 
 def _filled(layout: Layout, choice: TimeChoice) -> float:
