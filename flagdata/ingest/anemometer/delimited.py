@@ -11,13 +11,14 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import platform
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.draft import Draft, draft
-from flagdata.ingest.anemometer.headings import understand
-from flagdata.ingest.anemometer.layout import cut
+from flagdata.ingest.anemometer.headings import interest, understand
+from flagdata.ingest.anemometer.layout import cut, lay_out
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.rowclock import Given
 from flagdata.ingest.anemometer.rows import RowReader
+from flagdata.ingest.anemometer.sites import site_of_all
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.sonic import with_horizontal
 from flagdata.ingest.anemometer.source import TextFile
@@ -26,6 +27,8 @@ from flagdata.ingest.anemometer.table import read_table
 _DRAFTED = 0.55
 """Score of a draft without doubts: it is taken, but any format that knows the file goes before it."""
 _DOUBTED = 0.3
+_EVERY, _ROWS, _SITES = 10, 5, 50
+"""Of a table's later rows, one of so many is looked at, so many of each site, and so many sites at most."""
 _ASKED = frozenset({"unit", "date_order", "wind", "columns"})
 """Options that complete a draft; a recipe says these things itself."""
 
@@ -121,10 +124,29 @@ def guess(proposal: Draft) -> Guess:
 def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     """The draft of a file's recipe, completed by what the user says."""
     lines = tuple(source.head(HEAD_LINES))
+    lines = (*lines, *_of_later_sites(source, lines))
     return draft(
         lines, unit=options.unit, order=options.date_order, wind=options.wind, columns=options.columns,
         where=str(source.path),
     )  # fmt: skip
+
+
+def _of_later_sites(source: TextFile, lines: tuple[str, ...]) -> tuple[str, ...]:
+    """Rows of sites that follow the first lines, where a column has a site's heading and these hold one site alone."""
+    layout = lay_out(lines, interest=interest) if len(lines) == HEAD_LINES else None
+    one = site_of_all(layout, apart=()) if layout is not None else None
+    if layout is None or one is None or one[0] in layout.unit_columns:
+        return ()
+    at, width = one[0], layout.number_of_columns()
+    found: dict[str, list[str]] = {}
+    for first, block in source.blocks():
+        for line in block[HEAD_LINES if first == 1 else 0 :: _EVERY]:
+            cells = cut(line, layout.delimiter)
+            if len(cells) == width and cells[at] and cells[at] != one[1]:
+                found.setdefault(cells[at], []).append(line)
+    if not found or len(found) > _SITES:
+        return ()
+    return tuple(line for rows in found.values() for line in rows[:_ROWS])
 
 
 def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flagdata.errors import TimeError, UsageError
+from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import WindOptions, anemometers
 from flagdata.ingest.anemometer.clock import ClockChoice
 from flagdata.ingest.anemometer.disorder import longest_rise, sorting
 from flagdata.rng import stream
@@ -77,6 +79,21 @@ def test_the_rows_of_each_turbine_are_sorted_by_themselves(read: Read) -> None:
     found = read(text, zone="UTC", wind="T1")
     assert found.series.channels["wind_speed"].tolist() == SPEEDS[1::2].tolist()
     assert told(found, "rows-sorted").severity is Severity.WARNING
+
+
+def test_devices_that_follow_each_other_beyond_the_first_rows_are_told_apart(
+    read: Read, log_file: Callable[[str], Path]
+) -> None:
+    stamps = [f"{START + dt.timedelta(minutes=10 * row)}" for row in range(1200)]
+    text = "Turbine,Timestamp,Wind speed (m/s)\n" + "".join(
+        f"T{site},{stamp},{site + at % 2}.5\n" for site in (3, 5) for at, stamp in enumerate(stamps)
+    )
+    assert anemometers(log_file(text), WindOptions(zone="UTC")) == ("T3", "T5")
+    with pytest.raises(InputError, match="--wind T3"):
+        read(text, zone="UTC")
+    for site in (3, 5):
+        found = read(text, zone="UTC", wind=f"T{site}")
+        assert found.series.channels["wind_speed"].tolist() == [site + at % 2 + 0.5 for at in range(1200)]
 
 
 def test_wall_clock_rows_are_sorted_before_daylight_saving_is_told(read: Read) -> None:
