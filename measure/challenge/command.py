@@ -80,7 +80,7 @@ def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
     from measure.challenge.nulls import claim, null_batches
     from measure.challenge.recipe import load
-    from measure.loop import bank as banks
+    from measure.nulls import bank as banks
 
     loaded = load(recipe)
     batches = null_batches(loaded, seed=seed, kinds=kinds)

@@ -11,7 +11,7 @@ from typing import Any
 from flagdata.errors import ConflictError, CorruptError, RefusedError
 from flagdata.provenance import file_hash
 from measure.challenge.folder import ChallengeFolder, write_json
-from measure.loop.verdict import Verdict
+from measure.verdict.record import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)

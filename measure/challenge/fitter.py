@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from measure.loop.verdict import Verdict
 from measure.observe.trajectory import Experiment
+from measure.verdict.record import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +25,7 @@ class ClosingTheLoop:
         Raises:
             InputError: the data do not do.
         """
-        from measure.loop.close import Options, close_loop
+        from measure.closing.close import close_loop
+        from measure.loop.run import Options
 
         return close_loop(experiment, Options(seed=seed, bank=self.bank))

@@ -14,9 +14,9 @@ from flagdata.rng import child_seed, stream
 from measure.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
 from measure.challenge.meshes import layout
 from measure.challenge.recipe import ChallengeRecipe
-from measure.loop import bank as banks
-from measure.loop.forecast import Cut
-from measure.loop.nulls import NullBatch
+from measure.forecasting.segments import Cut
+from measure.nulls import bank as banks
+from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import Specimen
 from sim import handles
 from sim.material import named

@@ -11,7 +11,7 @@ from measure.challenge.classes import class_of
 from measure.challenge.filing import Filing
 from measure.challenge.key import Acting, Key
 from measure.challenge.recipe import Kind
-from measure.loop.verdict import Conclusion
+from measure.verdict.record import Conclusion
 
 FIELD = "corrective-field"
 """Name of the candidate that stands for what is not in the library: it names no effect."""

@@ -16,8 +16,8 @@ from flagdata.rng import child_seed
 from measure.challenge.filing import Filing, file, filed, verdict_json
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.workers import single_threaded
-from measure.loop.verdict import Verdict
 from measure.observe.trajectory import Experiment
+from measure.verdict.record import Verdict
 
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec

@@ -35,8 +35,8 @@ from measure.challenge.oracle import Oracle
 from measure.challenge.outcome import Outcome
 from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
-from measure.loop.verdict import Conclusion
 from measure.shares import Share
+from measure.verdict.record import Conclusion
 
 ENOUGH = 2.0
 """Times the half-detection strength, from where identification is graded."""

@@ -1,1 +1,4 @@
-"""Closing the loop: find what a model lacks, name it, add it, and say what that changed on data nobody has seen."""
+"""From an experiment to the numbers of a verdict: fits beyond the linear, selection of effects, validation.
+
+It may import `measure.nulls` and what that may import. What is said of the numbers is in `measure.report`.
+"""

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.loop.bank import columns, names
-from measure.loop.comparison import LeftOut, left_out
-from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, left_together
-from measure.loop.reference import Reference
-from measure.loop.refine import DivergedError, Refined, refine
-from measure.loop.whitened_misfit import WhitenedMisfit
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import columns, names
+from measure.forecasting.segments import Segments
+from measure.inference.evidence import Evidence, left_together
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop.gauss_newton import DivergedError, Refined, refine
+from measure.loop.validation import LeftOut, left_out
+from measure.nulls.reference import Reference
 
 Floats = NDArray[np.float64]
 

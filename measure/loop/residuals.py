@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from measure.loop.comparison import Predictions
-from measure.loop.forecast import Segments
-from measure.loop.verdict import Residual
+from measure.forecasting.segments import Segments
+from measure.loop.validation import Predictions
 from measure.observe.trajectory import Experiment
+from measure.verdict.record import Residual
 
 Floats = NDArray[np.float64]
 _SHOWN = 50

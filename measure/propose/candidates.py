@@ -8,7 +8,7 @@ from functools import cached_property
 from torch import Tensor
 
 from flagdata.errors import UnknownNameError
-from measure.loop.columns import EffectColumn, library
+from measure.forecasting.regressors import EffectColumn, library
 from sim.effects import Effect
 from sim.effects.files import load
 from sim.effects.parameter import Parameter

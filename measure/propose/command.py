@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from flagdata.console import document, json_option, say
-from flagdata.errors import UsageError
+from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars
 
 if TYPE_CHECKING:
     from measure.propose.outcome import Outcome
@@ -22,18 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "--known", multiple=True, metavar="EFFECT.STRENGTH", help="Effect that the model has already; may be repeated."
 )
-@click.option(
-    "--nulls", type=click.IntRange(min=1), help="Number of null recordings to simulate: 160 (the default) or more."
-)
-@click.option(
-    "--bank",
-    type=click.Path(path_type=Path, exists=True),
-    help="Folder of null recordings that were simulated before for such recordings.",
-)
-@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              help="Significance level of the test of every term; 0.05 by default.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls.")
-@click.option("--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core.")
+@null_options(level="Significance level of the test of every term; 0.05 by default.")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
@@ -66,7 +54,6 @@ def propose(
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
     from flagdata.lake import Lake
-    from measure.loop.command import refuse, stage_bars
     from measure.observe import recipe as recipes
     from measure.propose import candidates, ledger
     from measure.propose.effect_file import write
@@ -76,11 +63,8 @@ def propose(
     from measure.propose.words import words
 
     recipe = recipes.load(recipe_path)
-    if bank is not None and nulls is not None:
-        raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
-    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)))
-    level, nulls = level or recipe.level, nulls or recipe.nulls
-    options = replace(options, level=level or options.level, nulls=nulls or options.nulls)
+    said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
+    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
     tried, controls = (dictionary(), ()) if effect is None else (candidates.from_file(effect), dictionary())
     observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))
     refuse(observed.findings)

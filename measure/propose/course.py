@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from measure.loop.columns import EffectColumn
-from measure.loop.model import Model
-from measure.loop.setting import Setting
-from measure.loop.verdict import Estimate
+from measure.forecasting.model import Model
+from measure.forecasting.regressors import EffectColumn
+from measure.forecasting.setting import Setting
 from measure.propose.outcome import Course, Line
+from measure.verdict.record import Estimate
 from sim.effects import apply
 
 Floats = NDArray[np.float64]

@@ -13,10 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.loop.columns import THETA
-from measure.loop.inference import Evidence, Nulls
-from measure.loop.reference import left_out_groups
-from measure.loop.statistics import Statistics
+from measure.forecasting.regressors import THETA
+from measure.inference.evidence import Evidence
+from measure.inference.random_effect import Nulls
+from measure.nulls.reference import left_out_groups
+from measure.probes.statistics import Statistics
 from measure.propose.lens import evidence
 
 Floats = NDArray[np.float64]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.loop.columns import THETA, Calibration, EffectColumn
-from measure.loop.inference import NullModel
-from measure.loop.model import Model
-from measure.loop.refine import ROUNDS, STAYS, cut
+from measure.forecasting.model import Model
+from measure.forecasting.regressors import THETA, Calibration, EffectColumn
+from measure.inference.random_effect import NullModel
+from measure.loop.gauss_newton import ROUNDS, STAYS, cut
 from measure.propose.lens import Lens, evidence
 
 Floats = NDArray[np.float64]

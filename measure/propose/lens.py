@@ -1,7 +1,7 @@
 """Through which terms are seen: the directions along which nulls are known, those of the library and of smooth fields.
 
 A term's own statistic would want nulls of its own, for each of many terms. Instead the errors are projected onto the
-directions s_i that `measure.loop.bank` weighs, whose null distribution is known, and a term is what it does to those:
+directions s_i that `measure.nulls.bank` weighs, whose null distribution is known, and a term is what it does to those:
 
     E r_i = μ_i + Σ_j R_ij δ_j,   R_ij = Σ w s_i·c_j / √(Σ w s_i²)
 
@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.loop.columns import THETA, Calibration, Column
-from measure.loop.forecast import Forecaster, Segments
-from measure.loop.inference import Evidence, NullModel
-from measure.loop.model import Model, errors_of
-from measure.loop.statistics import Projection, Statistics, error_scale, reduced
-from measure.loop.whitened_misfit import WhitenedMisfit
+from measure.forecasting.model import Model, errors_of
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import THETA, Calibration, Column
+from measure.forecasting.segments import Segments
+from measure.inference.evidence import Evidence
+from measure.inference.random_effect import NullModel
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.probes.statistics import Projection, Statistics, error_scale, reduced
 from measure.propose.sensitivities import of_columns
 
 Floats = NDArray[np.float64]

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from measure.loop.verdict import Estimate
 from measure.propose.search import Step
+from measure.verdict.record import Estimate
 
 
 class Decision(StrEnum):

@@ -17,17 +17,16 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from measure.loop import bank as banks
-from measure.loop import supply
-from measure.loop.attribution import estimate
-from measure.loop.close import FEWEST_NULLS
-from measure.loop.columns import THETA, Column, EffectColumn
-from measure.loop.criteria import CRITERIA
-from measure.loop.inference import Evidence, NullModel, gains
-from measure.loop.reference import NullBank
-from measure.loop.setting import Setting, Stage
-from measure.loop.statistics import Statistics
+from measure.forecasting.regressors import THETA, Column, EffectColumn, columns
+from measure.forecasting.setting import Setting, Stage
+from measure.inference.evidence import Evidence, gains
+from measure.inference.random_effect import NullModel
+from measure.loop.run import FEWEST_NULLS
+from measure.loop.selection import estimate
+from measure.nulls import supply
+from measure.nulls.reference import NullBank
 from measure.observe.trajectory import Experiment
+from measure.probes.statistics import Statistics
 from measure.propose.course import course
 from measure.propose.family import Family
 from measure.propose.fit import Fitted, fit
@@ -37,6 +36,7 @@ from measure.propose.retest import retest
 from measure.propose.search import Step, search, wrong
 from measure.propose.split import data_hash, split
 from measure.propose.terms import MASS, TermColumn
+from measure.verdict.criteria import CRITERIA
 from sim.effects.field import Flat
 
 Floats = NDArray[np.float64]
@@ -105,15 +105,10 @@ def propose(
     torch.set_num_threads(1)
     tell = stage or (lambda what, done, total: None)
     setting = made_ready(experiment)
-    if options.bank is not None:
-        bank = supply.given(options.bank, setting)
-    else:
-        bank = supply.simulated(
-            setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
-        )  # fmt: skip
-    return weigh(
-        setting, candidates, bank, banks.columns(), known=known, controls=controls, options=options, stage=tell
+    bank = supply.supplied(
+        setting, bank=options.bank, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
     )
+    return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=tell)
 
 
 def made_ready(experiment: Experiment) -> Setting:

@@ -7,18 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.loop.comparison import LeftOut, a_segment, measured, paired, root
-from measure.loop.floor import numerical_floor
-from measure.loop.model import Model
-from measure.loop.setting import Setting
-from measure.loop.whitened_misfit import WhitenedMisfit
+from measure.forecasting.model import Model
+from measure.forecasting.setting import Setting
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop.validation import LeftOut, a_segment, measured, numerical_floor, paired, root, share_removed
 from measure.propose.outcome import Retest
 
 Floats = NDArray[np.float64]
 
 _FLOOR_COPIES = 2
-_ROOM = 0.02
-"""Share of the squared error before that must lie above the floor, for a reduction to be a share of it."""
 
 
 def retest(
@@ -52,12 +49,10 @@ def retest(
     _, floor = numerical_floor(
         setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed
     )  # fmt: skip
-    room = float(first.squared.mean()) - min(float(floor.mean()), float(first.squared.mean()))
-    gained = float(first.squared.mean() - second.squared.mean())
     return Retest(
         what=words, segments=int((~seen).sum()), before=root(first.squared), after=root(second.squared),
         reduction=paired(first.squared, second.squared), helped=a_segment(first.misfit - second.misfit, recording),
-        floor=root(floor), share=gained / room if room > _ROOM * float(first.squared.mean()) else None,
+        floor=root(floor), share=share_removed(first.squared, second.squared, floor),
         control=None if wrong is None else root(wrong.squared),
         apart=None if wrong is None else a_segment(wrong.misfit - second.misfit, recording),
         control_names=tuple(control_names),

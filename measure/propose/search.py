@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure.loop.columns import PRIOR, THETA
-from measure.loop.comparison import total_error
-from measure.loop.inference import Evidence, gains
+from measure.forecasting.regressors import PRIOR, THETA
+from measure.inference.evidence import Evidence, gains
+from measure.loop.validation import total_error
 from measure.propose.family import Family
 
 MOST = 3

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from measure.loop.forecast import Segments
+from measure.forecasting.segments import Segments
 
 _LEAST = 3
 """Segments on each side: an interval of a mean wants three."""

@@ -14,7 +14,7 @@ from typing import Annotated
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from measure.loop.columns import EffectColumn
+from measure.forecasting.regressors import EffectColumn
 from sim.cloth import Cloth
 from sim.effects import Effect
 from sim.effects.effect import ClothEffect

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from measure.loop.verdict import Estimate
 from measure.propose.outcome import Outcome, Retest
+from measure.verdict.record import Estimate
 
 _NEAREST = 4
 """Terms beside those looked at that are told."""

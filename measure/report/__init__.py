@@ -1,1 +1,4 @@
-"""Reports of closing the loop: a page that holds everything in itself, words for the terminal, and JSON."""
+"""The verdict in sentences, as a page, as words for a terminal and as JSON.
+
+It may import `measure.verdict`, and the outcomes of `measure.loop` and of the rooms before it.
+"""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from markupsafe import Markup, escape
 
-from measure.loop.quantity import number
+from measure.verdict.quantity import number
 
 _CHARACTER = 6.6  # width of a digit at the charts' 11-unit type
 _LINE = 18.0  # height of a line, with some air

@@ -15,10 +15,10 @@ from PIL import Image
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
-from measure.loop.quantity import Display, display
-from measure.loop.verdict import Residual
 from measure.pages.render import data_url
 from measure.report.chart import Chart, Linear, beside, drawing
+from measure.verdict.quantity import Display, display
+from measure.verdict.record import Residual
 
 _WIDTH = 300.0
 _LEFT, _TOP, _BOTTOM = 46.0, 26.0, 40.0

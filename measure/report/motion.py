@@ -17,9 +17,9 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
-from measure.loop.verdict import Residual
 from measure.report.chart import drawing
 from measure.report.cloth import on_a_line, triangles
+from measure.verdict.record import Residual
 
 MISSING = -32768
 _REACH = 32767

@@ -12,11 +12,11 @@ from typing import Any
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 
-from measure.loop import quantity
-from measure.loop.titles import readable
-from measure.loop.verdict import Conclusion, Estimate, Residual, Verdict
 from measure.pages.render import render
 from measure.report import cloth, figures, motion, rows, sentences
+from measure.report.sentences import readable
+from measure.verdict import quantity
+from measure.verdict.record import Conclusion, Estimate, Residual, Verdict
 
 _TONES = {
     Conclusion.UNTESTED: "open",

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 
 from markupsafe import Markup
 
-from measure.loop.quantity import estimate_text, known, with_error
-from measure.loop.verdict import Candidate, Comparison, Estimate
 from measure.report.chart import Linear, drawing
+from measure.verdict.quantity import estimate_text, known, with_error
+from measure.verdict.record import Candidate, Comparison, Estimate
 
 _WIDTH = 200.0
 _INSET = 8.0

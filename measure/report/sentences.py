@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from measure.loop.quantity import estimate_text, known, level_text, number, probability
-from measure.loop.titles import title, titles
-from measure.loop.verdict import Candidate, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict.quantity import estimate_text, known, level_text, number, probability
+from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Verdict
 
 
 def heading(verdict: Verdict) -> str:
@@ -138,3 +137,23 @@ def _begun(text: str) -> str:
 def common_level(estimates: Iterable[Estimate]) -> str:
     """The level of all intervals, or all that there are."""
     return ", ".join(level_text(level) for level in sorted({e.level for e in estimates if known(e)}))
+
+
+def titles(verdict: Verdict) -> tuple[str, ...]:
+    """What the verdict names, in its order; an effect of which several parameters were weighed with its parameter."""
+    found: list[str] = []
+    for name in verdict.named:
+        own = [c for c in verdict.ranking if c.effect == name]
+        acting = [c for c in own if not c.why_not]
+        found += [title(c.effect, c.parameter) for c in acting] if acting and len(own) > 1 else [name]
+    return tuple(found)
+
+
+def title(effect: str, parameter: str) -> str:
+    """An effect by one of its parameters."""
+    return f"{effect} ({readable(parameter)})"
+
+
+def readable(name: str) -> str:
+    """A parameter's name as it is written in a sentence."""
+    return name.replace("_", " ")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from measure.loop.quantity import (
+from measure.report import sentences
+from measure.report.sentences import readable
+from measure.verdict.quantity import (
     display,
     estimate_text,
     in_errors,
@@ -16,9 +18,7 @@ from measure.loop.quantity import (
     with_error,
     with_level,
 )
-from measure.loop.titles import readable
-from measure.loop.verdict import Candidate, Comparison, Verdict
-from measure.report import sentences
+from measure.verdict.record import Candidate, Comparison, Verdict
 
 _WIDTH = 100
 _RUNNERS_UP = 3

@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FITTING = ("sim", "models", "measure/loop", "measure/observe", "measure/propose", "measure/report", "measure/cases")
+FITTING = (
+    "sim", "models", "measure/observe", "measure/verdict", "measure/forecasting", "measure/probes", "measure/inference",
+    "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose", "measure/cases",
+)  # fmt: skip
 MODULES = sorted(path for part in FITTING for path in (ROOT / part).rglob("*.py"))
 
 

@@ -19,11 +19,11 @@ from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence
 from flagdata.schema import Kind
 from measure.demo.tracked import TrackedRecipe, make_tracks
-from measure.loop.verdict import Conclusion, Estimate, Parameter, Verdict
 from measure.observe.recipe import load
 from measure.observe.trajectory import Experiment
 from measure.propose.ledger import entries
 from measure.propose.outcome import Decision, Outcome
+from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
 from sim.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
 from tests.measure.observe.flags import HEIGHT, WIDTH, flutter
@@ -81,7 +81,7 @@ def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytes
         judged.append(experiment)
         return concluded()
 
-    monkeypatch.setattr("measure.loop.close.close_loop", instead)
+    monkeypatch.setattr("measure.closing.close.close_loop", instead)
     monkeypatch.chdir(folder)
     shell = Shell()
     for command in commands("closing-the-loop.md"):

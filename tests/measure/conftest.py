@@ -1,14 +1,23 @@
-"""A cloth small enough for every test."""
+"""A small flag and its recordings, cheap enough for every test."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import torch
 
-from measure.observe.trajectory import Specimen
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import Calibration
+from measure.forecasting.segments import Segments
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim import handles
+from sim.integrate.split import SplitEuler
 from sim.material import named
 from sim.mesh import grid
+
+RATE = 25.0
 
 
 @pytest.fixture(scope="session")
@@ -19,3 +28,28 @@ def specimen() -> Specimen:
         mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
         anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]),
     )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def forecaster(specimen: Specimen) -> Forecaster:
+    return Forecaster(specimen=specimen, markers=specimen.mesh.rest, integrator=SplitEuler(), dtype=torch.float64)
+
+
+@pytest.fixture(scope="session")
+def own_recording(specimen: Specimen, forecaster: Forecaster) -> Trajectory:
+    """2.6 s at 4 m/s of the fit's own model, mesh and steps, after 2 s."""
+    still = Trajectory(
+        name="still", markers=specimen.mesh.rest, positions=np.zeros((60, specimen.mesh.vertex_count, 3)), rate=RATE,
+        wind=WindTrack.constant((4.0, 0.0, 0.0)),
+    )  # fmt: skip
+    system, state = forecaster.system(Segments.of([still]).select([0]), [Calibration()])
+    bulge = 0.02 * np.sin(7 * specimen.mesh.rest[:, 0]) * np.cos(5 * specimen.mesh.rest[:, 1])
+    bent = state.position.clone()
+    bent[:, 1, 0] += torch.as_tensor(bulge)
+    state, frames = replace(state, position=bent), []
+    for frame in range(115):
+        # The wind is the same all the time, so that the time of the segment does not matter.
+        state = replace(forecaster.integrator.advance(system, replace(state, time=0.0), 1 / RATE))
+        if frame >= 50:
+            frames.append(state.position[..., 0].numpy().copy())
+    return replace(still, name="own", positions=np.stack(frames))

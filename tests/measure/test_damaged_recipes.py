@@ -22,8 +22,8 @@ from flagdata.ingest.anemometer.recipe import parse as parse_sensor
 from flagdata.recipes import NESTING_LIMIT, parsed
 from measure.cases.recipe import parse_case
 from measure.challenge.recipe import parse as parse_challenge
-from measure.loop import bank
-from measure.loop.toml import dumps
+from measure.closing.toml import dumps
+from measure.nulls import bank
 from measure.observe.recipe import load as load_experiment
 from sim.arcsim import read_material, read_scene
 from sim.datasets.reading import parse as parse_dataset

@@ -22,14 +22,15 @@ from typing import Any
 
 import numpy as np
 
-from measure.loop import bank as banks
-from measure.loop.close import Options, close_loop
-from measure.loop.criteria import CRITERIA
-from measure.loop.setting import Setting
-from measure.loop.supply import batches
-from measure.loop.verdict import Conclusion, Estimate, Verdict
+from measure.closing.close import close_loop
+from measure.forecasting.setting import Setting
+from measure.loop.run import Options
+from measure.nulls import bank as banks
+from measure.nulls.supply import batches
 from measure.observe import Hold, Observation, Setup, from_arrays, observe
 from measure.observe.trajectory import Experiment, WindTrack
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Conclusion, Estimate, Verdict
 from tests.validation.arcsim import RATE, folder
 from tests.validation.arcsim_jittered_draws import by_draws, page_of_all
 from tests.validation.flags_runs import CAMEL

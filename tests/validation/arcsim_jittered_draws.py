@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from flagdata.rng import stream
-from measure.loop.bank import names
-from measure.loop.close import fitted_base
-from measure.loop.criteria import CRITERIA
-from measure.loop.inference import Evidence
-from measure.loop.reference import NullBank, Reference
-from measure.loop.setting import Setting
-from measure.loop.whitened_misfit import WhitenedMisfit
+from measure.forecasting.regressors import names
+from measure.forecasting.setting import Setting
+from measure.inference.evidence import Evidence
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop.run import fitted_base
+from measure.nulls.reference import NullBank, Reference
 from measure.observe.trajectory import Experiment
+from measure.verdict.criteria import CRITERIA
 
 _DRAWS = 50
 _ENDS = (0.05, 0.95)

@@ -17,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from measure.loop.close import Options, close_loop
-from measure.loop.verdict import Candidate, Verdict
+from measure.closing.close import close_loop
+from measure.loop.run import Options
 from measure.observe import Hold, Observation, Setup, from_arrays, observe
 from measure.observe.trajectory import WindTrack
+from measure.verdict.record import Candidate, Verdict
 from sim.air import QuadraticNormal
 from tests.validation.arcsim import RATE, folder
 from tests.validation.flags_runs import CAMEL

@@ -23,13 +23,14 @@ import torch
 from flagdata.errors import InputError, NotFoundError
 from flagdata.rng import child_seed
 from measure.challenge.classes import class_of
-from measure.loop import bank as banks
-from measure.loop.close import Options, close_loop
-from measure.loop.forecast import Segments
-from measure.loop.verdict import Conclusion, Estimate
+from measure.closing.close import close_loop
+from measure.forecasting.segments import Segments
+from measure.loop.run import Options
+from measure.nulls import bank as banks
 from measure.observe import Observed
 from measure.observe.recipe import load, read
 from measure.shares import Share
+from measure.verdict.record import Conclusion, Estimate
 from tests.validation.mujoco import environment
 from tests.validation.mujoco.experiments import NOISE, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from measure.loop.verdict import Conclusion
 from measure.observe.recipe import parse
+from measure.verdict.record import Conclusion
 from sim.cloth import Cloth
 from sim.effects.hem_mass import HemMass
 from sim.material import named

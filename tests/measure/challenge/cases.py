@@ -7,7 +7,7 @@ from typing import Any
 from measure.challenge.filing import Filing, verdict_json
 from measure.challenge.key import Acting, Key
 from measure.challenge.recipe import Kind
-from measure.loop.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
 
 TINY = """
 title = "tiny"

@@ -13,7 +13,7 @@ from measure.challenge import history
 from measure.challenge.command import challenge
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.run import IN_THIS_PROCESS, run
-from measure.loop.verdict import Conclusion
+from measure.verdict.record import Conclusion
 from tests.measure.challenge import cases
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from flagdata.errors import ConflictError, CorruptError
 from measure.challenge import history
-from measure.loop.criteria import CRITERIA
+from measure.verdict.criteria import CRITERIA
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs" / "results"
 SHARES = {"top-1": {"hits": 3, "count": 4, "low": 0.249, "high": 0.987}, "of none": {"hits": 0, "count": 0}}

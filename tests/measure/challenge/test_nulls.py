@@ -15,9 +15,9 @@ from flagdata.errors import ConflictError, InputError
 from measure.challenge import nulls
 from measure.challenge.command import challenge
 from measure.challenge.recipe import ChallengeRecipe, parse
-from measure.loop import bank as banks
-from measure.loop.forecast import Cut
-from measure.loop.nulls import NullBatch
+from measure.forecasting.segments import Cut
+from measure.nulls import bank as banks
+from measure.nulls.simulation import NullBatch
 from tests.measure.challenge.cases import TINY
 
 TEN_SECONDS = TINY.replace("duration = 0.2", "duration = 10.0")

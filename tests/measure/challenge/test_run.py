@@ -17,8 +17,8 @@ from measure.challenge.key import Key
 from measure.challenge.recipe import Kind
 from measure.challenge.run import IN_THIS_PROCESS, run
 from measure.challenge.score import score
-from measure.loop.verdict import Conclusion, Verdict
 from measure.observe.trajectory import Experiment
+from measure.verdict.record import Conclusion, Verdict
 from tests.measure.challenge import cases
 
 

@@ -17,8 +17,8 @@ from measure.challenge.outcome import Outcome
 from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
 from measure.challenge.score import Sheet, graded
-from measure.loop.verdict import Conclusion, Verdict
 from measure.shares import Share
+from measure.verdict.record import Conclusion, Verdict
 from sim.effects import EFFECTS
 from tests.measure.challenge.cases import acting, candidate, comparison, estimate, filing, key, verdict
 

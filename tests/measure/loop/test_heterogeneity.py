@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import kstest, uniform
 
 from flagdata.rng import stream
-from measure.loop.attribution import estimate
-from measure.loop.heterogeneity import heterogeneity
+from measure.loop.selection import estimate, heterogeneity
 
 
 def test_of_two_it_is_the_test_of_their_difference() -> None:

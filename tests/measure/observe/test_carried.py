@@ -10,10 +10,12 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.loop.alignment import aligned
-from measure.loop.close import Options, close_loop
-from measure.loop.columns import Calibration
-from measure.loop.forecast import Forecaster, Segments
+from measure.closing.close import close_loop
+from measure.forecasting.alignment import aligned
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import Calibration
+from measure.forecasting.segments import Segments
+from measure.loop.run import Options
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.recipe import parse
 from measure.observe.trajectory import Experiment

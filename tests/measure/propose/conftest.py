@@ -12,11 +12,11 @@ import torch
 from torch import Tensor
 
 from flagdata.rng import stream
-from measure.loop.bank import evaluate
-from measure.loop.columns import THETA, Calibration, Column, EffectColumn, fields
-from measure.loop.inference import Nulls
-from measure.loop.nulls import NullBatch
-from measure.loop.reference import NullBank
+from measure.forecasting.regressors import THETA, Calibration, Column, EffectColumn, fields
+from measure.inference.random_effect import Nulls
+from measure.nulls.bank import evaluate
+from measure.nulls.reference import NullBank
+from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import Experiment, Specimen
 from measure.propose.terms import Term, columns_of
 from sim.cloth import Cloth

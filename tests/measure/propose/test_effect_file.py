@@ -12,11 +12,11 @@ import pytest
 import torch
 
 from flagdata.errors import NotFoundError, UsageError
-from measure.loop.verdict import Estimate
 from measure.propose.candidates import from_file
 from measure.propose.effect_file import write
 from measure.propose.outcome import Course, Decision, Outcome, Strength
 from measure.propose.terms import Term, TermEffect
+from measure.verdict.record import Estimate
 from sim.effects import apply
 from sim.effects.files import load
 from sim.material import named

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.loop.columns import PRIOR
-from measure.loop.inference import NullModel, Nulls
-from measure.loop.statistics import Statistics
+from measure.forecasting.regressors import PRIOR
+from measure.inference.random_effect import NullModel, Nulls
+from measure.probes.statistics import Statistics
 from measure.propose.family import Family
 from measure.propose.lens import evidence
 

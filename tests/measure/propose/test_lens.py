@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from measure.loop.columns import THETA, Calibration, Column
-from measure.loop.forecast import Forecaster, Segments
-from measure.loop.statistics import statistics
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import THETA, Calibration, Column
+from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
+from measure.probes.statistics import statistics
 from measure.propose.lens import Lens
 from measure.propose.propose import made_ready
 from measure.propose.sensitivities import of_columns

@@ -10,14 +10,14 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.loop.columns import Column, EffectColumn
-from measure.loop.reference import NullBank
-from measure.loop.verdict import Estimate
+from measure.forecasting.regressors import Column, EffectColumn
+from measure.nulls.reference import NullBank
 from measure.observe.trajectory import Experiment, Specimen, WindTrack
 from measure.propose.effect_file import write
 from measure.propose.outcome import Decision, Outcome, Retest
 from measure.propose.propose import Options, made_ready, weigh
 from measure.propose.words import words
+from measure.verdict.record import Estimate
 from sim.effects.field import FieldEffect, Seen
 from sim.effects.files import load
 from sim.scene import assemble, flag

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError, InputError
-from measure.loop.forecast import Segments
+from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory, WindTrack
 from measure.propose import ledger
 from measure.propose.outcome import Decision, Outcome

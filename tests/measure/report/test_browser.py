@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from measure.loop.verdict import Conclusion
 from measure.report.page import page
+from measure.verdict.record import Conclusion
 from tests.measure.report.verdicts import FULL, verdict, with_holes
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.loop.verdict import Residual
 from measure.report.motion import ELEVATION, FACTORS, MISSING, motion, still
+from measure.verdict.record import Residual
 from tests.measure.report.verdicts import FULL, Size, residual
 
 STEPS = 32767

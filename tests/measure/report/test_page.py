@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from measure.loop.verdict import Conclusion, Estimate, Verdict
 from measure.report.page import page, write_page
+from measure.verdict.record import Conclusion, Estimate, Verdict
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import Size, residual, verdict, with_holes
 

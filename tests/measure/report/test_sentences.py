@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from measure.loop.titles import titles
-from measure.loop.verdict import Conclusion, NullTest
 from measure.report import sentences
 from measure.report.page import page
+from measure.report.sentences import titles
 from measure.report.words import words
+from measure.verdict.record import Conclusion, NullTest
 from tests.measure.report.verdicts import about, verdict
 
 

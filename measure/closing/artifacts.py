@@ -1,0 +1,196 @@
+"""A verdict and its models in the lake, in one commit: what was concluded, from which recordings, by which nulls.
+
+The identity of a verdict is a hash of all that went in (recordings, wind, cloth, options), not of the files it came in.
+A measurement's object is a Zarr folder with the verdict's JSON, its report and the nulls' statistics.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.errors import CorruptError
+from flagdata.findings import Finding, quality_flags
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical, digest, file_hash
+from flagdata.schema import Kind
+from measure.closing.models import NamedModel, acting
+from measure.loop.run import Options
+from measure.nulls.bank import files
+from measure.observe import Experiment
+from measure.report.document import as_document, from_document
+from measure.report.page import page
+from measure.verdict.record import Verdict
+
+_FORMAT = 1
+_HEAD = "flagdata_measurement"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """What a commit holds: ids of the measurement and of its models, and whether they were there already."""
+
+    measurement: str
+    models: tuple[str, ...]
+    existing: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Closed:
+    """A loop that was closed.
+
+    Attributes:
+        name: what the measurement is called.
+        experiment: on which.
+        findings: on the recordings.
+        options: how.
+        verdict: what came out.
+        models: of the verdict.
+    """
+
+    name: str
+    experiment: Experiment
+    findings: tuple[Finding, ...]
+    options: Options
+    verdict: Verdict
+    models: tuple[NamedModel, ...]
+
+
+def keep(lake: Lake, closed: Closed, *, branch: str = "main") -> Kept:
+    """Publish a verdict and its models in one commit; what is there already is not published again.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    measurement = _measurement(closed)
+    models = [_model(closed, model, measurement) for model in closed.models]
+    with lake.transaction(f"close loop: {closed.name}", branch=branch) as transaction:
+        if transaction.find(measurement.id) is not None:
+            return Kept(measurement=measurement.id, models=_models_of(lake, measurement.id, branch), existing=True)
+        staged = transaction.staging(".zarr")
+        write(staged, closed.verdict)
+        transaction.add(_measurement(closed, stored=transaction.put(staged)))
+        for model in models:
+            transaction.add(model)
+    return Kept(measurement=measurement.id, models=tuple(m.id for m in models), existing=False)
+
+
+def _models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
+    rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "parents"]).to_pylist()
+    return tuple(row["artifact"] for row in rows if measurement in row["parents"])
+
+
+def write(path: Path, verdict: Verdict) -> None:
+    """A new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
+    import zarr
+    from zarr.codecs import BloscCodec
+
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    group.update_attributes({
+        _HEAD: {"format": _FORMAT}, "conclusion": verdict.conclusion.value, "named": list(verdict.named),
+        "words": verdict.words,
+    })  # fmt: skip
+    texts = {"verdict": json.dumps(as_document(verdict), allow_nan=False), "report": page(verdict)}
+    arrays = {name: np.frombuffer(text.encode(), dtype=np.uint8) for name, text in texts.items()}
+    for name, values in (*arrays.items(), ("nulls", np.array(verdict.test.null, dtype=np.float64))):
+        array = group.create_array(
+            name, shape=values.shape, dtype=values.dtype, chunks=(max(1, len(values)),),
+            compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
+        )  # fmt: skip
+        array[...] = values
+
+
+def read(path: Path) -> tuple[Verdict, str]:
+    """The verdict and the report of a measurement's object.
+
+    Raises:
+        CorruptError: not such a folder, or damaged.
+    """
+    import zarr
+
+    try:
+        group = zarr.open_group(path, mode="r", zarr_format=3)
+        head: Any = group.attrs.get(_HEAD)
+        if not isinstance(head, Mapping) or head["format"] != _FORMAT:
+            raise CorruptError("not a measurement of this version", where=str(path), fix="open it with zarr")
+        verdict, report = (np.asarray(group[name][...]).tobytes().decode() for name in ("verdict", "report"))  # type: ignore[index]
+        return from_document(json.loads(verdict)), report
+    except (KeyError, ValueError, TypeError, OSError) as error:
+        raise CorruptError(
+            f"the measurement is damaged: {error}", where=str(path), fix="run flagdata verify; close the loop again"
+        ) from error
+
+
+def fingerprint(experiment: Experiment) -> str:
+    """SHA-256 of all that is known of an experiment: cloth, pins, recordings and wind; not of names and files."""
+    specimen = experiment.specimen
+    material = specimen.material
+    total = hashlib.sha256()
+    total.update(canonical({
+        "held": list(specimen.held), "stiffness": repr(specimen.stiffness),
+        "anchors-told": specimen.anchors_told, "gravity": list(specimen.gravity),
+        "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
+        "material": [material.density, material.damping],
+        "recordings": [[r.rate, r.noise] for r in experiment.recordings],
+    }).encode())  # fmt: skip
+    arrays: list[Any] = [
+        specimen.mesh.rest, specimen.mesh.faces, specimen.anchors, material.stretching, material.bending,
+    ]  # fmt: skip
+    for recording in experiment.recordings:
+        arrays += [recording.markers, recording.positions, recording.wind.times, recording.wind.velocity]
+    for values in arrays:
+        array = np.ascontiguousarray(values)
+        total.update(f"{array.dtype.str}{array.shape}".encode())
+        total.update(array.tobytes())
+    return total.hexdigest()
+
+
+def _recipe(closed: Closed) -> dict[str, Any]:
+    options = closed.options
+    bank = None
+    if options.bank is not None:
+        bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
+    return {
+        "close-loop": 1, "experiment": fingerprint(closed.experiment), "level": options.level,
+        "nulls": None if options.bank is not None else options.nulls, "bank": bank,
+    }  # fmt: skip
+
+
+def _parents(closed: Closed) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(r.source for r in closed.experiment.recordings if r.source))
+
+
+def _measurement(closed: Closed, stored: str | None = None) -> Artifact:
+    verdict = closed.verdict
+    report = {
+        "schema": "flagdata.close-loop-report/1", "conclusion": verdict.conclusion.value, "named": list(verdict.named),
+        "words": verdict.words, "p_value": verdict.test.p_value.value, "separating": verdict.separating,
+        "findings": [finding.as_dict() for finding in closed.findings],
+    }  # fmt: skip
+    return Artifact(
+        kind=Kind.MEASUREMENT, name=closed.name, object=stored, parents=_parents(closed), recipe=_recipe(closed),
+        seed=closed.options.seed, parameters=canonical(_found(verdict)), quality=quality_flags(closed.findings),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )  # fmt: skip
+
+
+def _found(verdict: Verdict) -> dict[str, float]:
+    """What was fitted, by name: of the larger model where effects act."""
+    fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
+    return {**fitted, **{f"{c.effect}.{c.parameter}": c.strength.value for c in acting(verdict)}}
+
+
+def _model(closed: Closed, model: NamedModel, measurement: Artifact) -> Artifact:
+    effects: Sequence[str] = list(model.content.get("effects", {}))
+    report = {"schema": "flagdata.model-report/1", "words": closed.verdict.words, "findings": []}
+    return Artifact(
+        kind=Kind.MODEL, name=model.name, parents=(measurement.id, *_parents(closed)), seed=closed.options.seed,
+        recipe={**_recipe(closed), "effects": effects}, parameters=canonical(model.content),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )  # fmt: skip

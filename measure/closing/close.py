@@ -1,0 +1,22 @@
+"""Closing the loop: an experiment in, a verdict in numbers and sentences out."""
+
+from __future__ import annotations
+
+from measure.forecasting.setting import Stage
+from measure.loop.run import Options, solve
+from measure.observe.trajectory import Experiment
+from measure.report.statement import stated
+from measure.verdict.record import Verdict
+
+
+def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Verdict:
+    """The verdict on an experiment.
+
+    Args:
+        stage: told of progress.
+
+    Raises:
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose
+            attachments move.
+    """
+    return stated(solve(experiment, options, stage=stage))

@@ -1,0 +1,293 @@
+"""`flagdata close-loop`: recordings in; a verdict, its report and the models out."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.core import ParameterSource
+
+from flagdata.console import document, json_option, say
+from flagdata.errors import UnknownNameError, UsageError
+from flagdata.findings import Finding
+from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars, told
+
+if TYPE_CHECKING:
+    from measure.closing.artifacts import Closed, Kept
+    from measure.observe import Setup, Up
+    from measure.observe.recipe import ExperimentRecipe
+    from measure.verdict.record import Verdict
+
+_OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "rate", "unit", "noise", "up")
+"""Options that say how sources of the command line are read."""
+
+
+_DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
+"""Kinds of findings that look like an effect."""
+
+
+@click.command("close-loop")
+@click.argument("sources", metavar="SOURCE...", nargs=-1)
+@click.option("--recipe", "recipe_path", type=click.Path(path_type=Path), metavar="FILE.toml",
+              help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.")  # fmt: skip
+@click.option(
+    "--wind",
+    "winds",
+    multiple=True,
+    metavar="M/S|LOG|ID",
+    help="Wind beside the recordings: one for all of them, or one for each.",
+)
+@click.option(
+    "--axis",
+    default="1,0,0",
+    show_default=True,
+    metavar="X,Y,Z",
+    help="Direction towards which a wind given as a speed blows.",
+)
+@click.option(
+    "--north",
+    type=float,
+    metavar="DEG",
+    help="Where north lies, as an angle from +x towards +y, for a log that has directions.",
+)
+@click.option("--offset", type=float, help="Time from the first sample of the log to the first frame [s].")
+@click.option(
+    "--sensor", metavar="NAME|FILE.toml", help="Recipe that says how to read a log that does not say so itself."
+)
+@click.option("--zone", help="Time zone of the stamps of a log: +02:00, or an IANA name.")
+@click.option("--material", help="Nominal material, a name of the catalog; by default the one that the source states.")
+@click.option("--size", metavar="WxH", help="Size of the flat cloth [m]; by default the outline of the markers.")
+@click.option(
+    "--pins",
+    help="Where it is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
+)
+@click.option(
+    "--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second, if the source does not state them."
+)
+@click.option("--unit", default="m", show_default=True, help="Unit of the positions.")
+@click.option(
+    "--up", default="z", show_default=True, help="Axis of the recordings that points up: z, y, x, -z, -y or -x."
+)
+@click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
+)
+@null_options(level="Significance level of the global test; 0.05 by default.")
+@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+              help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
+@click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
+              help="Folder that report.html, verdict.json and the models are written to.")  # fmt: skip
+@json_option
+@click.pass_context
+def close_loop(
+    context: click.Context,
+    sources: tuple[str, ...],
+    recipe_path: Path | None,
+    winds: tuple[str, ...],
+    axis: str,
+    north: float | None,
+    offset: float | None,
+    sensor: str | None,
+    zone: str | None,
+    material: str | None,
+    size: str | None,
+    pins: str | None,
+    rate: float | None,
+    unit: str,
+    up: str,
+    noise: float | None,
+    nulls: int | None,
+    bank: Path | None,
+    level: float | None,
+    seed: int,
+    workers: int | None,
+    lake_path: Path | None,
+    branch: str,
+    name: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Find what the model of a cloth lacks, name it, and say what adding it changes on unseen data.
+
+    SOURCE is the output folder of an ArcSim run, a table of tracked markers (CSV or Parquet with the columns frame or
+    time, marker, u, v, x, y, z, and recording if there are several), or a mesh sequence or markers of --lake by id.
+    Several are recordings of one cloth, best in different winds. With --lake the verdict and both models become
+    artifacts; `flagdata simulate` runs a model by its name.
+
+    \b
+      flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
+      flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --pins hoist-corners
+      flagdata close-loop --recipe flag.toml --lake lake
+    """
+    from flagdata.lake import Lake
+    from measure.closing.artifacts import Closed, keep
+    from measure.closing.close import close_loop as close
+    from measure.closing.models import models
+    from measure.closing.sources import Reading, read
+    from measure.loop.run import Options
+    from measure.observe import Setup, observe
+    from measure.observe import recipe as recipes
+
+    recipe = None if recipe_path is None else recipes.parse(recipe_path)
+    if recipe is not None and recipe.recordings:
+        _refuse_beside(context, sources)
+    elif not sources:
+        raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
+    lake = None if lake_path is None else Lake.open(lake_path)
+    said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
+    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
+    setup = _setup(Setup() if recipe is None else recipe.setup, material, size, pins)
+    if recipe is not None and recipe.recordings:
+        observed = recipes.read(replace(recipe, setup=setup), lake)
+    else:
+        reading = Reading(
+            rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
+            sensor=sensor, zone=zone, axis=_axis(context, axis, north),
+            north=None if north is None else math.radians(north),
+        )  # fmt: skip
+        observed = observe(read(sources, winds, reading, lake), setup)
+    refuse(observed.findings)
+    verdict = close(observed.experiment, options, stage=stage_bars())
+    verdict = doubted(verdict, observed.findings)
+    called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
+    closed = Closed(
+        name=called, experiment=observed.experiment, findings=observed.findings, options=options, verdict=verdict,
+        models=models(verdict, observed.experiment, name=called, seed=seed),
+    )  # fmt: skip
+    _write(out, closed)
+    kept = None if lake is None else keep(lake, closed, branch=branch)
+    _tell(closed, kept, out, as_json=as_json)
+
+
+def _write(out: Path, closed: Closed) -> None:
+    from measure.closing import toml
+    from measure.report.document import as_document
+    from measure.report.page import write_page
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_page(closed.verdict, out / "report.html")
+    content = json.dumps(as_document(closed.verdict), indent=1, allow_nan=False)
+    (out / "verdict.json").write_text(content + "\n", encoding="utf-8")
+    for file, model in zip(("base.toml", "model.toml"), closed.models, strict=False):
+        (out / file).write_text(toml.dumps(model.content), encoding="utf-8")
+
+
+def _tell(closed: Closed, kept: Kept | None, out: Path, *, as_json: bool) -> None:
+    from measure.report.document import as_document
+    from measure.report.words import words
+
+    if as_json:
+        content = as_document(closed.verdict)
+        content.pop("schema")
+        if kept is not None:
+            content["artifacts"] = {
+                "measurement": kept.measurement, "models": list(kept.models), "existing": kept.existing
+            }  # fmt: skip
+        document("verdict", content)
+    else:
+        click.echo(words(closed.verdict))
+    if kept is not None and kept.existing:
+        say(f"the lake has this measurement already: {kept.measurement}")
+    elif kept is not None:
+        say(f"measurement {kept.measurement}")
+        for model, identity in zip(closed.models, kept.models, strict=True):
+            say(f"model {identity} {model.name}")
+    files = ["report.html", "verdict.json", "base.toml", "model.toml"][: 2 + len(closed.models)]
+    say(f"wrote {', '.join(str(out / file) for file in files)}")
+
+
+def _refuse_beside(context: click.Context, sources: tuple[str, ...]) -> None:
+    """Options that would be ignored beside a recipe that names its recordings."""
+    if sources:
+        raise UsageError("the recipe names its recordings", where="SOURCE", fix="leave SOURCE or [[recording]] out")
+    for option in _OF_SOURCES:
+        if context.get_parameter_source(option) is ParameterSource.COMMANDLINE:
+            spelled = "wind" if option == "winds" else option
+            raise UsageError(
+                "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
+            )
+
+
+def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:
+    """The name of the first source that is a file, of the recipe, or of the first recording."""
+    if sources and Path(sources[0]).exists():
+        return Path(sources[0]).resolve().stem
+    return recording if recipe is None or sources else recipe.title
+
+
+def _axis(context: click.Context, text: str, north: float | None) -> tuple[float, float, float] | None:
+    """Where the air goes; None where north is given."""
+    if north is not None:
+        if context.get_parameter_source("axis") is ParameterSource.COMMANDLINE:
+            raise UsageError("both --axis and --north are given", where="--north", fix="keep one of them")
+        return None
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise UsageError(f"{text!r} is not three numbers", where="--axis", fix="give x,y,z") from error
+    if not 0 < math.hypot(x, y, z) < math.inf:
+        raise UsageError(f"{text!r} has no direction", where="--axis", fix="give x,y,z, not all of them 0")
+    return x, y, z
+
+
+def _up(context: click.Context, text: str, recipe: ExperimentRecipe | None) -> Up:
+    from measure.observe import Up
+
+    if recipe is not None and context.get_parameter_source("up") is not ParameterSource.COMMANDLINE:
+        return recipe.up
+    if text not in list(Up):
+        raise UnknownNameError.of("axis", text, list(Up), where="--up")
+    return Up(text)
+
+
+def _setup(setup: Setup, material: str | None, size: str | None, pins: str | None) -> Setup:
+    """A setup with what the command line says instead."""
+    from measure.observe import Hold, sheet
+    from sim.material import MATERIALS, named
+
+    if material is not None:
+        if material not in MATERIALS.names():
+            raise UnknownNameError.of("material", material, MATERIALS.names(), where="--material")
+        setup = replace(setup, material=named(material))
+    if size is not None:
+        try:
+            width, height = (float(part) for part in size.lower().split("x"))
+        except ValueError as error:
+            raise UsageError(f"{size!r} is not a size", where="--size", fix="give 1.5x1.0, in metres") from error
+        setup = replace(setup, outline=sheet(width, height))
+    if pins is not None:
+        held: Hold | tuple[tuple[float, float], ...]
+        held = Hold(pins) if pins in {h.value for h in Hold} else _places(pins)
+        setup = replace(setup, pins=held)
+    return setup
+
+
+def _places(text: str) -> tuple[tuple[float, float], ...]:
+    places: list[tuple[float, float]] = []
+    for part in text.split(";"):
+        try:
+            u, v = (float(value) for value in part.split(","))
+        except ValueError as error:
+            raise UsageError(
+                f"{part!r} is no place on the cloth", where="--pins", fix="give hoist-corners, or u,v;u,v in metres"
+            ) from error
+        places.append((u, v))
+    return tuple(places)
+
+
+def doubted(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
+    """The verdict with the remarks on its data; with those in its words that may themselves be what was found."""
+    doubts = [told(finding) for finding in findings if finding.kind in _DOUBTFUL]
+    beware = (
+        f" The data themselves may be wrong, which would look like an effect: {'; '.join(doubts)}." if doubts else ""
+    )
+    return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, told(f)) for f in findings))

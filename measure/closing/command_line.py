@@ -1,0 +1,101 @@
+"""What commands that test against nulls share: their options, what findings end them, and bars of progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.console import say
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
+
+if TYPE_CHECKING:
+    from measure.forecasting.setting import Stage
+    from measure.observe.recipe import ExperimentRecipe
+
+_Command = Callable[..., Any]
+
+
+def null_options(*, level: str) -> Callable[[_Command], _Command]:
+    """The options `--nulls`, `--bank`, `--level`, `--seed` and `--workers` of a command.
+
+    Args:
+        level: help of `--level`.
+    """
+    options = (
+        click.option(
+            "--nulls", type=click.IntRange(min=1),
+            help="Number of null recordings to simulate: 160 (the default) or more.",
+        ),
+        click.option(
+            "--bank", type=click.Path(path_type=Path, exists=True),
+            help="Folder of null recordings that were simulated before for such recordings.",
+        ),
+        click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), help=level),
+        click.option(
+            "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls."
+        ),
+        click.option(
+            "--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core."
+        ),
+    )  # fmt: skip
+
+    def decorated(command: _Command) -> _Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorated
+
+
+def said_of_nulls(
+    recipe: ExperimentRecipe | None, *, level: float | None, nulls: int | None, bank: Path | None
+) -> dict[str, Any]:
+    """`level` and `nulls` of options, as the command line or else the recipe says them; without what neither does.
+
+    Raises:
+        UsageError: a bank, and a number of nulls to simulate.
+    """
+    if bank is not None and nulls is not None:
+        raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
+    said = {"level": level, "nulls": nulls}
+    if recipe is not None:
+        said = {name: getattr(recipe, name) if value is None else value for name, value in said.items()}
+    return {name: value for name, value in said.items() if value is not None}
+
+
+def refuse(findings: Iterable[Finding]) -> None:
+    """Errors end it here: what is wrong with the data must not come out as an effect."""
+    for finding in findings:
+        if finding.severity is Severity.ERROR:
+            raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
+        say(f"{finding.severity.value}: {told(finding)}")
+
+
+def told(finding: Finding) -> str:
+    """Where it was found, and what; a warning with what to do."""
+    where = f"{finding.where}: " if finding.where else ""
+    fix = f" ({finding.fix})" if finding.fix and finding.severity is Severity.WARNING else ""
+    return f"{where}{finding.what}{fix}"
+
+
+def stage_bars() -> Stage:
+    """A bar for each stage; the nulls take most of the time."""
+    import sys
+
+    from tqdm import tqdm
+
+    bars: dict[str, tqdm] = {}
+    interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
+
+    def tell(what: str, done: int, total: int) -> None:
+        if what not in bars:
+            bars[what] = tqdm(total=total, desc=what, unit="part", ncols=100, mininterval=interval, file=sys.stderr)
+        bars[what].update(done - bars[what].n)
+        if done >= total:
+            bars[what].close()
+
+    return tell

@@ -1,0 +1,166 @@
+"""The models of a verdict as recipes that `flagdata simulate` runs at once: the base model, and that with the effects.
+
+They run with the fit's own mesh and steps, whose damping is part of what was calibrated, in the frame of the fit: pole
+base at the origin, wind along +x.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from measure.forecasting.alignment import aligned
+from measure.observe.trajectory import Experiment, Specimen
+from measure.verdict.record import Candidate, Conclusion, Verdict
+from sim import handles
+from sim.air import AIR_FORCES, AirForce
+from sim.effects import EFFECTS
+from sim.handles import ARCSIM_STIFFNESS
+from sim.integrate.split import SplitEuler
+from sim.material import MATERIALS, Material, named
+from sim.mesh import grid
+from sim.scene import upright
+
+_SETTLE = 3.0  # s, as of the nulls
+_FRAMES = 100
+_ROUGH = 2e-3  # m; a start that is flat to the last bit may stay so
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NamedModel:
+    """A model with a name.
+
+    Attributes:
+        name: what it is called.
+        content: of its recipe, as `sim.run.reading` says.
+    """
+
+    name: str
+    content: Mapping[str, Any]
+
+
+def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) -> tuple[NamedModel, ...]:
+    """The base model as calibrated and, where effects act, the larger one.
+
+    Args:
+        name: that theirs begin with.
+        seed: of their starts.
+    """
+    turned = aligned(experiment)
+    common = _common(turned, seed)
+    made = [_model(f"{name}-base", verdict, common, turned.specimen, ())]
+    if effects := acting(verdict):
+        made.append(
+            _model(
+                "-".join(dict.fromkeys([name, *(c.effect for c in effects)])), verdict, common, turned.specimen, effects
+            )
+        )
+    return tuple(made)
+
+
+def acting(verdict: Verdict) -> tuple[Candidate, ...]:
+    """The effects of the larger model: all that are named as acting, or the first of those that may be."""
+    if not verdict.named:
+        return ()
+    found = tuple(candidate for candidate in verdict.ranking if not candidate.why_not)
+    return found if verdict.conclusion is Conclusion.EFFECT else found[:1]
+
+
+def _model(
+    name: str, verdict: Verdict, common: Mapping[str, Any], specimen: Specimen, effects: Sequence[Candidate]
+) -> NamedModel:
+    fitted = {
+        p.name: (p.after if effects and p.after is not None else p.before).value for p in verdict.parameters
+    }  # fmt: skip
+    material = _material(specimen.material)
+    material |= {
+        "density": specimen.material.density * fitted["density"], "bending-factor": fitted["bending"],
+        "damping": fitted["damping"],
+    }  # fmt: skip
+    content = {"title": name, **common, "material": material}
+    if effects:
+        strengths: dict[str, dict[str, float]] = {}
+        for candidate in effects:
+            strengths.setdefault(candidate.effect, {})[candidate.parameter.replace("_", "-")] = _admissible(candidate)
+        content["effects"] = strengths
+    return NamedModel(name=name, content=content)
+
+
+def _admissible(candidate: Candidate) -> float:
+    least, most = EFFECTS[candidate.effect].parameters()[candidate.parameter].admissible
+    return float(np.clip(candidate.strength.value, least, most))
+
+
+def _common(experiment: Experiment, seed: int) -> dict[str, Any]:
+    speeds = [recording.wind.speed for recording in experiment.recordings]
+    speed: Any = speeds[0]
+    if min(speeds) < max(speeds):
+        speed = {"low": min(speeds), "high": max(speeds)}
+    specimen = experiment.specimen
+    return {
+        "seed": seed,
+        "batch": 1,
+        "scene": _scene(specimen),
+        "wind": {"speed": speed, **_force(specimen.air)},
+        "integrator": {"name": "implicit", "step": SplitEuler().base.step},
+        "time": {"settle": _SETTLE, "frames": _FRAMES, "rate": experiment.recordings[0].rate},
+    }
+
+
+def _scene(specimen: Specimen) -> dict[str, Any]:
+    held: dict[str, Any] = {"start-noise": _ROUGH, "gravity": -specimen.gravity[2]}
+    if math.isinf(specimen.stiffness):
+        held["rigid"] = True
+    elif specimen.stiffness != ARCSIM_STIFFNESS:
+        held["stiffness"] = specimen.stiffness
+    return {**(_flag(specimen) or _mesh(specimen)), **held}
+
+
+def _flag(specimen: Specimen) -> dict[str, Any] | None:
+    """The scene of a plain flag; None for any other cloth."""
+    rest = specimen.mesh.rest - specimen.mesh.rest.min(axis=0)
+    width, height = (float(side) for side in rest.max(axis=0))
+    columns = len(np.unique(rest[:, 0])) - 1
+    rows = max(1, round(columns * height / width))
+    flat = grid(width=width, height=height, columns=columns, rows=rows)
+    if (
+        flat.rest.shape != rest.shape
+        or not np.allclose(flat.rest, rest)
+        or not np.array_equal(flat.faces, specimen.mesh.faces)
+    ):
+        return None  # fmt: skip
+    if not np.allclose(specimen.anchors, upright(flat)[list(specimen.held)], atol=1e-3 * width):
+        return None
+    for attachment, vertices in (("corners", handles.corners(flat.rest)), ("hoist", handles.full_hoist(flat.rest))):
+        if specimen.held == vertices:
+            return {"shape": "flag", "width": width, "height": height, "columns": columns, "attachment": attachment}
+    return None
+
+
+def _mesh(specimen: Specimen) -> dict[str, Any]:
+    return {
+        "shape": "mesh", "rest": specimen.mesh.rest.tolist(), "faces": specimen.mesh.faces.tolist(),
+        "held": list(specimen.held), "anchors": specimen.anchors.tolist(),
+    }  # fmt: skip
+
+
+def _material(nominal: Material) -> dict[str, Any]:
+    """By its name, where the catalog's tables are its; else with its tables."""
+    if nominal.name in MATERIALS.names():
+        known = named(nominal.name)
+        if np.array_equal(known.stretching, nominal.stretching) and np.array_equal(known.bending, nominal.bending):
+            return {"name": nominal.name}
+    table = {
+        "title": nominal.name, "source": nominal.source, "density": nominal.density,
+        "stretching": nominal.stretching.tolist(), "bending": nominal.bending.tolist(), "damping": nominal.damping,
+    }  # fmt: skip
+    return {"table": table}
+
+
+def _force(air: AirForce) -> dict[str, Any]:
+    name = next(known for known in AIR_FORCES if isinstance(air, AIR_FORCES[known]))
+    return {"force": name, **vars(air)}

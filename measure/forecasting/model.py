@@ -1,0 +1,86 @@
+"""A model of one cloth: the base model's calibration, and effects of the library at some strengths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from measure.forecasting.observer import WIDEST, Forecaster
+from measure.forecasting.regressors import Calibration, EffectColumn
+from measure.forecasting.segments import Segments
+from sim.effects import Effect, apply
+from sim.state import State
+from sim.system import System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """Base model and effects.
+
+    Attributes:
+        calibration: of the base model.
+        effects: columns with their coefficients beyond null.
+    """
+
+    calibration: Calibration
+    effects: tuple[tuple[EffectColumn, float], ...] = ()
+
+    @property
+    def acting(self) -> tuple[Effect, ...]:
+        """The effects, their strengths clipped to what is admissible."""
+        return tuple(column.at(_admissible(column, coefficient)) for column, coefficient in self.effects)
+
+    def system(self, forecaster: Forecaster, segments: Segments) -> tuple[System, State]:
+        """The batch of segments by this model."""
+        return apply(self.acting, *forecaster.system(segments, [self.calibration] * len(segments)))
+
+    def moved(self, steps: tuple[float, ...]) -> Model:
+        """After steps along the calibrated parameters, then along each effect's strength."""
+        own = len(steps) - len(self.effects)
+        effects = tuple(
+            (column, _admissible(column, value + step))
+            for (column, value), step in zip(self.effects, steps[own:], strict=True)
+        )
+        return replace(self, calibration=self.calibration.moved(steps[:own]), effects=effects)
+
+    def steps_from(self, other: Model) -> tuple[float, ...]:
+        """Steps of `moved` that lead here from another model of the same effects."""
+        strengths = (b - a for (_, a), (_, b) in zip(other.effects, self.effects, strict=True))
+        return (*self.calibration.steps_from(other.calibration), *strengths)
+
+    def halved(self) -> Model:
+        """Halfway from here to the nominal base model."""
+        nominal = Calibration()
+        density, bending, damping = (step / 2 for step in self.calibration.steps_from(nominal))
+        return Model(
+            calibration=nominal.moved((density, bending, damping)),
+            effects=tuple((column, coefficient / 2) for column, coefficient in self.effects),
+        )
+
+
+def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segments) -> list[Tensor]:
+    """What each model of the same effects leaves of segments: (frame, marker, 3, segment) errors [m].
+
+    They are members of one batch: small batches cost nearly as much as larger ones.
+    """
+    count, found = len(segments), []
+    for chosen in np.array_split(np.arange(len(models)), math.ceil(len(models) * count / WIDEST)):
+        own = [models[place] for place in chosen]
+        copies = segments.select(list(range(count)) * len(own))
+        batch = forecaster.system(copies, [model.calibration for model in own for _ in range(count)])
+        strengths = torch.tensor([[value for _, value in model.effects] for model in own], dtype=torch.float64)
+        acting = [
+            column.at(strengths[:, place].repeat_interleave(count)) for place, (column, _) in enumerate(own[0].effects)
+        ]
+        found += forecaster.errors(*apply(acting, *batch), segments).split(count, dim=-1)
+    return found
+
+
+def _admissible(column: EffectColumn, coefficient: float) -> float:
+    null, (least, most) = column.described.null, column.described.admissible
+    return float(np.clip(null + coefficient, least, most)) - null

@@ -1,0 +1,279 @@
+"""Predictions one short horizon ahead, along a recording: the model is put where the cloth was seen, and runs.
+
+At every frame the model is moved onto the observed markers, and its velocity by what the prediction was off, per
+horizon T: x ← x + L e, v ← v + L e/T, with e the markers' prediction error and L its interpolation onto the vertices.
+This is the deadbeat observer of a point that moves evenly, with the simulator as its model of motion: what the model
+gets right costs no error, what it lacks returns in every e. The prediction-error method of system identification
+(Ljung, System Identification, 1999, chapter 7) then works on e and its sensitivities.
+
+Recordings are cut into segments that run side by side as members of a batch; a segment starts some frames early, so
+that its state has forgotten how it was started. Where a marker was not tracked there is no error e: nothing is
+corrected by it, and nothing is compared with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from measure.forecasting.regressors import DOUBLE, THETA, Calibration, Column, StepColumn, WrittenColumn
+from measure.forecasting.segments import Segments
+from measure.observe.interpolation import onto
+from measure.observe.trajectory import Specimen
+from sim.anchors import AnchorTracks
+from sim.handles import Handles
+from sim.integrate.joint_batch import JointBatch
+from sim.integrate.split import SplitEuler
+from sim.scene import Scene, assemble
+from sim.state import State
+from sim.system import System
+
+Floats = NDArray[np.float64]
+
+WIDEST = 400
+"""Members of a batch: beyond, a member costs as much as before. Steps of a flag of 176 vertices side by side in 40
+segments take 34 s by 72 members at a time, 20 s by 400 (with 486 vertices 54 and 41 s)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentWind:
+    """The logged wind of every member at its own time.
+
+    Attributes:
+        period: of the samples [s].
+        samples: (n, 3, batch) [m/s].
+    """
+
+    period: float
+    samples: Tensor
+
+    @classmethod
+    def of(cls, segments: Segments, *, dtype: torch.dtype, device: torch.device | str) -> SegmentWind:
+        """Sampled at the frames of each segment."""
+        count = len(segments.items[0].positions) + 1
+        own = np.asarray(np.arange(count) * segments.period, dtype=np.float64)
+        samples = np.stack([s.wind.at(s.start + own) for s in segments.items], axis=-1)
+        return cls(period=segments.period, samples=torch.as_tensor(samples, dtype=dtype, device=device))
+
+    def velocity(self, time: float) -> Tensor:
+        """(3, batch) [m/s], linear between samples, `time` [s] since the start of the segment."""
+        place = min(max(time / self.period, 0.0), len(self.samples) - 1.001)
+        index = int(place)
+        return torch.lerp(self.samples[index], self.samples[index + 1], place - index)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Forecaster:
+    """Predicts the markers of segments by a model of one specimen.
+
+    Attributes:
+        specimen: the cloth.
+        markers: (marker, 2) [m].
+        integrator: of the model.
+        dtype, device: of the tensors.
+        workers: threads among which batches that run jointly are shared out; members do not depend on it.
+    """
+
+    specimen: Specimen
+    markers: Floats
+    integrator: SplitEuler
+    dtype: torch.dtype = torch.float32
+    device: torch.device | str = "cpu"
+    workers: int = 1
+
+    @cached_property
+    def _seen(self) -> Tensor:
+        """(marker, vertex): vertices onto markers."""
+        return self._real(onto(self.specimen.mesh.rest, self.markers))
+
+    @cached_property
+    def _lifted(self) -> Tensor:
+        """(vertex, marker): markers onto vertices."""
+        return self._real(onto(self.markers, self.specimen.mesh.rest))
+
+    @cached_property
+    def double(self) -> Forecaster:
+        """The same in double precision."""
+        return replace(self, dtype=torch.float64)
+
+    def _real(self, values: Floats) -> Tensor:
+        return torch.tensor(values, dtype=self.dtype, device=self.device)
+
+    def system(self, segments: Segments, calibrations: Sequence[Calibration]) -> tuple[System, State]:
+        """The base model of every segment, each with its own calibration, and a start at rest."""
+        specimen = self.specimen
+        start = np.zeros((specimen.mesh.vertex_count, 3))
+        start[:, 0] = specimen.mesh.rest[:, 0] - specimen.mesh.rest[list(specimen.held), 0].min()
+        start[:, 2] = specimen.mesh.rest[:, 1] - specimen.mesh.rest[list(specimen.held), 1].min()
+        start += specimen.anchors[np.argmin(specimen.anchors[:, 2])]
+        handles = Handles(vertices=specimen.held, stiffness=specimen.stiffness)
+        materials = {c: c.material(specimen.material) for c in set(calibrations)}
+        scenes = [
+            Scene(
+                mesh=specimen.mesh, material=materials[c], handles=handles, gravity=specimen.gravity, air=specimen.air,
+                position=_held(start, specimen.held, specimen.anchors if own.anchors is None else own.anchors),
+            )
+            for own, c in zip(segments.items, calibrations, strict=True)
+        ]  # fmt: skip
+        system, state = assemble(scenes, dtype=self.dtype, device=self.device)
+        wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
+        return replace(system, wind=wind, motion=self._motion(segments)), state
+
+    def _motion(self, segments: Segments) -> AnchorTracks | None:
+        """Motion of every segment's attachments, from their places in its first frame; None where they stand still."""
+        tracks = [item.attachments for item in segments.items if item.attachments is not None]
+        if not tracks:
+            return None
+        moved = np.stack([own - own[0] for own in tracks], axis=-1)
+        return AnchorTracks(start=0.0, period=segments.period, samples=self._real(moved))
+
+    def errors(self, system: System, state: State, segments: Segments) -> Tensor:
+        """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker
+        was not tracked.
+
+        Args:
+            system, state: a member for each of the segments, once or several times over.
+        """
+        errors, _ = self._run(partial(self.integrator.advance, system, duration=segments.period), state, segments)
+        return torch.stack(errors)
+
+    def run(self, system: System, state: State, segments: Segments) -> tuple[Tensor, Tensor]:
+        """Errors, and the predictions themselves: (frame, marker, 3, batch) each [m], after the warm-up."""
+        advance = partial(self.integrator.advance, system, duration=segments.period)
+        errors, predictions = self._run(advance, state, segments)
+        return torch.stack(errors), torch.stack(predictions)
+
+    def _run(
+        self, advance: Callable[[State], State], state: State, segments: Segments
+    ) -> tuple[list[Tensor], list[Tensor]]:
+        """The same of what advances a state by a period, frame by frame."""
+        period, copies = segments.period, state.position.shape[-1] // len(segments)
+        seen = self._real(segments.positions)
+        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64)).repeat(1, 1, copies)
+        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1]).repeat(1, 1, copies)
+        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]).repeat(1, 1, copies) / (2 * period)
+        state = replace(state, position=x, velocity=v, time=period)
+        errors: list[Tensor] = []
+        predictions: list[Tensor] = []
+        with torch.no_grad():
+            for k in range(2, len(seen)):
+                state = advance(state)
+                predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
+                error = (seen[k][:, :, None] - predicted.unflatten(-1, (copies, -1))).flatten(2)
+                if mask is not None:
+                    error = error * mask[k][:, None]
+                if k >= segments.first:
+                    errors.append(error)
+                    predictions.append(predicted)
+                lifted = torch.einsum("vm,mcb->vcb", self._lifted, error)
+                state = replace(
+                    state, position=state.position + lifted, velocity=state.velocity + lifted / period, time=k * period
+                )
+        return errors, predictions
+
+    def sensitivity(
+        self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+    ) -> Tensor:
+        """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
+        return self._changes([column], segments, calibrations, base)[0]
+
+    def sensitivities(
+        self, columns: Sequence[Column], segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+    ) -> list[Tensor]:
+        """The same of each parameter of `THETA`, then of each column."""
+        return self._changes([*range(len(THETA)), *columns], segments, calibrations, base)
+
+    def _changes(
+        self,
+        wanted: Sequence[Column | int],
+        segments: Segments,
+        calibrations: Sequence[Calibration],
+        base: Tensor,
+    ) -> list[Tensor]:
+        """The same of columns and of places in `THETA`: steps in one joint batch, those of `DOUBLE` in one of their own
+        in double precision."""
+        steps = [place for place, one in enumerate(wanted) if not isinstance(one, WrittenColumn)]
+        exact = [place for place in steps if self.dtype != torch.float64 and _name(wanted[place]) in DOUBLE]
+        plain = [place for place in steps if place not in exact]
+        found = dict(zip(plain, self._stepped([wanted[p] for p in plain], segments, calibrations, base), strict=True))
+        if exact:
+            found |= zip(
+                exact, self.double._stepped([wanted[p] for p in exact], segments, calibrations, None), strict=True
+            )
+        return [
+            self._written(one, segments) if isinstance(one, WrittenColumn) else found[place].to(base)
+            for place, one in enumerate(wanted)
+        ]
+
+    def _stepped(
+        self,
+        wanted: Sequence[Column | int],
+        segments: Segments,
+        calibrations: Sequence[Calibration],
+        base: Tensor | None,
+    ) -> list[Tensor]:
+        """The same of steps; the base's errors are found beside theirs where they are not given."""
+        nominal = self.system(segments, calibrations)
+        sizes: list[float] = []
+        batches: list[tuple[System, State]] = [] if base is not None else [nominal]
+        for one in wanted:
+            if isinstance(one, int):
+                sizes.append(THETA[one][2])
+                batches.append(self.system(segments, _moved(calibrations, one, sizes[-1])))
+            elif isinstance(one, StepColumn):
+                sizes.append(one.step)
+                batches.append(one.system(*nominal))
+            else:
+                raise UsageError(f"{one.name} has no sensitivity", where="columns", fix="give a StepColumn")
+        errors = self.errors_jointly(batches, segments)
+        start = errors.pop(0) if base is None else base
+        return [(start - own) / size for own, size in zip(errors, sizes, strict=True)]
+
+    def _written(self, column: WrittenColumn, segments: Segments) -> Tensor:
+        seen, rest = self._real(segments.positions), self.specimen.mesh.rest
+        moved = column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
+        if segments.counted is None:
+            return moved
+        return moved * self._real(segments.counted.astype(np.float64))[:, :, None]
+
+    def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
+        """`errors` of each of some batches of the same segments.
+
+        They run in one joint batch, or one for each worker: small batches cost nearly as much as larger ones.
+        """
+
+        def run(chosen: NDArray[np.int64]) -> Sequence[Tensor]:
+            joint, start = JointBatch.of([batches[place] for place in chosen])
+            errors, _ = self._run(
+                partial(self.integrator.advance_jointly, joint, duration=segments.period), start, segments
+            )
+            return torch.stack(errors).split(len(segments), dim=-1)
+
+        together = max(math.ceil(len(batches) * len(segments) / WIDEST), min(self.workers, len(batches)))
+        shares = [np.arange(len(batches))[place::together] for place in range(together)]
+        with ThreadPoolExecutor(self.workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            done = list(pool.map(run, shares))
+        return [done[place % together][place // together] for place in range(len(batches))]
+
+
+def _name(one: Column | int) -> str:
+    return THETA[one][0] if isinstance(one, int) else one.name
+
+
+def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
+    position = start.copy()
+    position[list(vertices)] = anchors
+    return position
+
+
+def _moved(calibrations: Sequence[Calibration], place: int, size: float) -> list[Calibration]:
+    return [c.moved([size if k == place else 0.0 for k in range(len(THETA))]) for c in calibrations]

@@ -1,0 +1,386 @@
+"""What is varied about the model, one column each: calibrated parameters, effects of the library, forces.
+
+A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
+of parameters, of effects, of the corrective field and of the wind are found by simulation: `StepColumn.system` gives
+the batch with a small step taken. Forces along the motion and across it, which are only looked along, are written down.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from sim.cloth import Cloth
+from sim.effects import EFFECTS, Effect, apply
+from sim.effects.effect import ForceEffect
+from sim.effects.geometry import left_of
+from sim.effects.gusts import Gusts
+from sim.effects.parameter import Parameter
+from sim.material import Material
+from sim.state import State
+from sim.system import System
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """The base model's parameters, as factors on the nominal material; damping as it is [s]."""
+
+    density: float = 1.0
+    bending: float = 1.0
+    damping: float = 2.5e-3
+
+    def material(self, nominal: Material) -> Material:
+        """The material they make of the nominal one."""
+        scaled = nominal.scaled(density=self.density, bending=self.bending)
+        return replace(scaled, damping=self.damping)
+
+    def moved(self, steps: Sequence[float]) -> Calibration:
+        """After steps along `THETA`, in its units, kept within its bounds."""
+        density, bending, damping = steps
+        return Calibration(
+            density=float(np.clip(self.density * math.exp(density), *_DENSITY)),
+            bending=float(np.clip(self.bending * math.exp(bending), *_BENDING)),
+            damping=float(np.clip(self.damping * math.exp(damping), *_DAMPING)),
+        )
+
+    def steps_from(self, other: Calibration) -> tuple[float, float, float]:
+        """Steps along `THETA` that lead here from another."""
+        return (
+            math.log(self.density / other.density),
+            math.log(self.bending / other.bending),
+            math.log(self.damping / other.damping),
+        )
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Names of the parameters that are as small or as large as the model holds: their data want to go beyond."""
+        bounds = {"density": _DENSITY, "bending": _BENDING, "damping": _DAMPING}
+        return tuple(name for name, span in bounds.items() if not span[0] < getattr(self, name) < span[1])
+
+
+_DENSITY = (0.2, 5.0)
+_BENDING = (0.02, 50.0)
+_DAMPING = (0.25e-3, 0.2)  # s; with less, the motion of a flag does not converge in the mesh
+
+THETA: tuple[tuple[str, str, float], ...] = (("density", "ln", 0.1), ("bending", "ln", 0.7), ("damping", "ln", 0.7))
+"""Name, unit and step of the calibrated parameters: natural logarithms of factors, and of the damping's time."""
+
+PRIOR = np.array([0.3, 1.0, 1.5])
+"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
+30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever
+measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard deviations."""
+
+PRIOR_WITHOUT_MASS = np.array([1.0, 1.0, 1.5])
+"""The same of a cloth that was not weighed and whose material is a guess: its density within a factor of e."""
+
+
+class Column(ABC):
+    """One direction.
+
+    Attributes:
+        name: "lift.coefficient", "field.x.10", "wind.left", "motion.1.20", "across.00".
+        unit: of the coefficient.
+    """
+
+    name: str
+    unit: str
+
+
+class StepColumn(Column):
+    """One whose sensitivity is that of a small step.
+
+    Attributes:
+        step: its size.
+    """
+
+    step: float
+
+    @abstractmethod
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        """The batch with this step taken, and its start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectColumn(StepColumn):
+    """A strength of an effect of the library, from its null value.
+
+    Attributes:
+        effect: its name.
+        parameter: the strength.
+    """
+
+    effect: str
+    parameter: str
+    step: float
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"{self.effect}.{self.parameter}"
+
+    @cached_property
+    def described(self) -> Parameter:
+        return EFFECTS[self.effect].parameters()[self.parameter]
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.described.unit
+
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        return self.strengthened(self.step, system, state)
+
+    def strengthened(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
+        """The batch with the effect at a strength `coefficient` beyond its null value."""
+        return apply([self.at(coefficient)], system, state)
+
+    def at(self, coefficient: float | Tensor) -> Effect:
+        """The effect at a strength `coefficient` beyond its null value, or one for each member (batch,)."""
+        return EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SteadyField(ForceEffect):
+    """A steady force per mass: part of a low-rank corrective field.
+
+    Attributes:
+        acceleration: (vertex, 3, batch) or (vertex, 3, 1) [m/s²].
+    """
+
+    acceleration: Tensor
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        return self.acceleration.to(dtype=cloth.dtype, device=cloth.device) * cloth.mass[:, None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldColumn(StepColumn):
+    """A mode b cos(π i u/W) cos(π j v/H) of the corrective field, a force per mass along an axis of the world.
+
+    Attributes:
+        axis: 0, 1 or 2.
+        mode: (i, j).
+    """
+
+    axis: int
+    mode: tuple[int, int]
+    step: float = 0.5
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"field.{'xyz'[self.axis]}.{self.mode[0]}{self.mode[1]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return "m/s²"
+
+    def acceleration(self, rest: Floats) -> Tensor:
+        """(vertex, 3, 1) of a step, at rest coordinates (vertex, 2) [m/s²]."""
+        made = torch.zeros((len(rest), 3, 1), dtype=torch.float64)
+        made[:, self.axis, 0] = self.step * torch.as_tensor(cosine(self.mode, rest, rest))
+        return made
+
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindColumn(StepColumn):
+    """A wind that is a share of its mean stronger, turned to its left, or rising.
+
+    Attributes:
+        part: 0, 1 or 2.
+    """
+
+    part: int
+    step: float = 0.05
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"wind.{('along', 'left', 'up')[self.part]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return "1"
+
+    @property
+    def share(self) -> Tensor:
+        """(part,) of a step."""
+        return self.step * torch.eye(3, dtype=torch.float64)[self.part]
+
+    def system(self, system: System, state: State) -> tuple[System, State]:
+        return blown(self.share[:, None], system, state)
+
+
+def blown(shares: Tensor, system: System, state: State) -> tuple[System, State]:
+    """The batch in a wind that is stronger, turned and rising by (part, batch) or (part, 1) shares of its mean."""
+    samples = shares[:, None].expand(-1, 2, -1)
+    return apply([Gusts(intensity=1.0, lateral=1.0, vertical=1.0, samples=samples)], system, state)
+
+
+class WrittenColumn(Column):
+    """A force per mass b f cos(π i u/W) cos(π j v/H), f seen in the motion.
+
+    Its change of the predictions is written down, not simulated: T² times the force, T their horizon, what it does to a
+    point that is free. As a direction to look along, where only nulls say what is usual, it need not be what cloth
+    does.
+
+    Attributes:
+        mode: (i, j).
+    """
+
+    mode: tuple[int, int]
+
+    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
+        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
+
+        Args:
+            markers: (marker, 2) [m].
+            rest: (vertex, 2) of the cloth [m].
+            period: between the frames [s].
+        """
+        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
+        return self._moved(seen, period) * shape[None, :, None, None]
+
+    @abstractmethod
+    def _moved(self, seen: Tensor, period: float) -> Tensor:
+        """(frame − 2, marker, 3, segment) T² f [m per unit]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionColumn(WrittenColumn):
+    """Along the observed motion: its velocity, or its acceleration.
+
+    Attributes:
+        derivative: 1 for velocity, 2 for acceleration.
+    """
+
+    derivative: int
+    mode: tuple[int, int]
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"motion.{self.derivative}.{self.mode[0]}{self.mode[1]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return ("1/s", "1")[self.derivative - 1]
+
+    def _moved(self, seen: Tensor, period: float) -> Tensor:
+        return _travelled(seen) * period if self.derivative == 1 else seen[2:] - 2 * seen[1:-1] + seen[:-2]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AcrossColumn(WrittenColumn):
+    """Across the observed velocity v, horizontally: z × v, as of a frame that turns about the vertical.
+
+    Mirrored in the plane of wind and gravity it changes its sign, and what the base model does hardly changes (ArcSim's
+    bending alone knows the faces of a cloth).
+    """
+
+    mode: tuple[int, int]
+
+    @property
+    def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"across.{self.mode[0]}{self.mode[1]}"
+
+    @property
+    def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return "1/s"
+
+    def _moved(self, seen: Tensor, period: float) -> Tensor:
+        return left_of(_travelled(seen), axis=2) * period
+
+
+def _travelled(seen: Tensor) -> Tensor:
+    """(frame − 2, …) what the velocity makes of a period between frames, by central differences of (frame, …) [m]."""
+    return (seen[2:] - seen[:-2]) / 2
+
+
+def cosine(mode: tuple[int, int], places: Floats, rest: Floats) -> Floats:
+    """(place,) cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m]."""
+    low = rest.min(axis=0)
+    share = (places - low) / (rest.max(axis=0) - low)
+    return np.cos(np.pi * mode[0] * share[:, 0]) * np.cos(np.pi * mode[1] * share[:, 1])
+
+
+# Step of every strength that is weighed: some tenths of its expected range, where predictions are near linear.
+_STEPS: tuple[tuple[str, str, float], ...] = (
+    ("power-law-drag", "exponent", 0.2),
+    ("tangential-linear-drag", "coefficient", 0.05),
+    ("tangential-quadratic-drag", "coefficient", 0.02),
+    ("lift", "coefficient", 0.3),
+    ("added-mass", "mass", 0.05),
+    ("reactive-loading", "mass", 0.03),
+    ("air-density", "change", 0.1),
+    ("permeability", "permeability", 0.005),
+    ("hem-mass", "line_density", 0.005),
+    ("hem-stiffness", "ratio", 5.0),
+    ("vertical-wind", "inclination", 0.05),
+    ("shear", "exponent", 0.15),
+    ("pole-wake", "share", 0.4),
+    ("hysteresis", "couple", 1e-4),
+    ("rest-curvature", "curvature", 1.0),
+    ("full-hoist", "stiffness", 20.0),
+    ("tilted-pole", "lean", 0.02),
+    ("tilted-pole", "sway", 0.02),
+)
+DOUBLE = frozenset({"bending", "hem-stiffness.ratio", "hysteresis.couple", "rest-curvature.curvature"})
+"""Directions whose steps are simulated in double precision: those of how cloth bends. In single precision a prediction
+of 40 ms rounds to 0.2 to 1.6 µm, and these move predictions by 3 to 80 µm a step, less where cloth is soft, heavy or
+damped: their sensitivities were rounding to 1, 0.3, 4 and 36 %, all others' to 0.4 % or less (ArcSim's flag with 0.5 ms
+of damping). Longer steps are no way out: where rounding is below 0.5 %, what is not linear in the step is above."""
+
+_MODES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
+_MOTIONS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2))
+
+
+def library() -> tuple[EffectColumn, ...]:
+    """The strengths that are weighed.
+
+    Raises:
+        UsageError: an entry that the registry of effects does not have.
+    """
+    columns = tuple(EffectColumn(effect=effect, parameter=name, step=step) for effect, name, step in _STEPS)
+    for column in columns:
+        if column.parameter not in EFFECTS[column.effect].strengths():
+            raise UsageError(
+                f"{column.effect} has no strength {column.parameter!r}", where="columns", fix="correct the table"
+            )
+    return columns
+
+
+def fields() -> tuple[FieldColumn, ...]:
+    """The corrective field's modes: steady forces."""
+    return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
+
+
+def winds() -> tuple[WindColumn, ...]:
+    """The parts of the wind, by which its course is told."""
+    return tuple(WindColumn(part=part) for part in range(3))
+
+
+def motions() -> tuple[WrittenColumn, ...]:
+    """Forces along the observed motion, and across it."""
+    along = (MotionColumn(derivative=derivative, mode=mode) for derivative in (1, 2) for mode in _MOTIONS)
+    return (*along, AcrossColumn(mode=(0, 0)))
+
+
+def columns() -> tuple[Column, ...]:
+    """What is weighed beside the calibrated parameters: the library's strengths, then forces along and across the
+    motion."""
+    return (*library(), *motions())
+
+
+def names() -> tuple[str, ...]:
+    """Names of all columns of the statistics, the calibrated parameters first."""
+    return (*(name for name, _, _ in THETA), *(column.name for column in columns()))

@@ -1,0 +1,219 @@
+"""Recordings cut into segments, which run side by side as members of a batch.
+
+A segment starts some frames early, so that its state has forgotten how it was started.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from measure.observe.trajectory import Trajectory, WindTrack
+
+Floats = NDArray[np.float64]
+
+HORIZON = 0.04
+"""About this long a prediction is [s]: 25 frames a second, the paper's rate."""
+_SEGMENT = 2.0  # s
+_SHORTEST = 0.8  # s: a segment of recordings too short for two of the usual length
+_WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cut:
+    """How recordings are cut into segments.
+
+    Attributes:
+        stride: recorded frames from one that is used to the next.
+        period: between those [s].
+        warm: how many of them a segment begins with that do not count.
+        length: how many count.
+    """
+
+    stride: int
+    period: float
+    warm: int
+    length: int
+
+    @classmethod
+    def of(cls, rate: float, frames: int) -> Cut:
+        """How recordings of so many frames or more are cut: frames about a horizon apart, segments of 2 s, or half of
+        what there is.
+
+        Args:
+            rate: [Hz].
+        """
+        stride = max(1, round(rate * HORIZON))
+        period = stride / rate
+        warm = round(_WARM_UP / period)
+        length = min(round(_SEGMENT / period), (math.ceil(frames / stride) - warm - 2) // 2)
+        return cls(stride=stride, period=period, warm=warm, length=length)
+
+    @property
+    def enough(self) -> bool:
+        """Whether a segment is long enough to say anything."""
+        return self.length * self.period >= _SHORTEST
+
+    def segments(self, frames: int) -> int:
+        """How many a recording holds; a remainder is left out."""
+        return (math.ceil(frames / self.stride) - self.warm - 2) // self.length
+
+    def lasting(self, segments: int) -> float:
+        """How long a recording is that holds so many [s]."""
+        return (segments * self.length + self.warm + 3) * self.period
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Segment:
+    """A stretch of a recording.
+
+    Attributes:
+        recording: its index in the experiment.
+        start: of the first frame, since the recording's first [s].
+        positions: (frame, marker, 3), warm-up included [m].
+        wind: of the recording.
+        noise: of a coordinate [m].
+        anchors: (held, 3) where its cloth is tied [m]; None where the specimen says it.
+        seen: (frame, marker) whether each position was tracked; None where all were.
+        attachments: (frame, held, 3) where its cloth is held, if that moves [m].
+    """
+
+    recording: int
+    start: float
+    positions: Floats
+    wind: WindTrack
+    noise: float
+    anchors: Floats | None = None
+    seen: NDArray[np.bool_] | None = None
+    attachments: Floats | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Segments:
+    """Segments of equal length of recordings with the same markers and rate.
+
+    Attributes:
+        items: the segments.
+        markers: (marker, 2) [m].
+        cut: how the recordings were cut.
+    """
+
+    items: tuple[Segment, ...]
+    markers: Floats
+    cut: Cut
+
+    @classmethod
+    def of(cls, recordings: Sequence[Trajectory]) -> Segments:
+        """Cut recordings; frames beyond a horizon of about 40 ms are used every so many, a remainder is left out.
+
+        Segments last 2 s, or half of what the shortest recording allows.
+
+        Raises:
+            InputError: recordings of different markers or rates, untracked points, or shorter than a segment.
+        """
+        first = recordings[0]
+        cut = Cut.of(first.rate, min(len(r.positions) for r in recordings))
+        period, span = cut.period, cut.warm + 2 + cut.length
+        items: list[Segment] = []
+        for index, recording in enumerate(recordings):
+            if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
+                raise InputError(
+                    "its markers or its rate differ from the first recording's",
+                    where=f"recording {recording.name!r}", fix="close the loop on such recordings one by one",
+                )  # fmt: skip
+            if np.isnan(recording.positions).any():
+                raise InputError(
+                    "a marker was lost in some frames", where=f"recording {recording.name!r}",
+                    fix="fill its gaps (measure.observe.fill)",
+                )  # fmt: skip
+            frames = recording.positions[:: cut.stride]
+            seen = None if recording.seen is None else recording.seen[:: cut.stride]
+            held = None if recording.attachments is None else recording.attachments[:: cut.stride]
+            if not cut.enough:
+                needed = 2 * _SHORTEST + (cut.warm + 2) * period
+                raise InputError(
+                    f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
+                    where=f"recording {recording.name!r}", fix="record for 10 s or more",
+                )  # fmt: skip
+            for place in range(cut.segments(len(recording.positions))):
+                begin = place * cut.length
+                items.append(
+                    Segment(
+                        recording=index, start=begin * period, wind=recording.wind, noise=recording.noise,
+                        positions=frames[begin : begin + span],
+                        seen=None if seen is None else seen[begin : begin + span],
+                        attachments=None if held is None else held[begin : begin + span],
+                        anchors=None if held is None else held[begin],
+                    )
+                )  # fmt: skip
+        return cls(items=tuple(items), markers=first.markers, cut=cut)
+
+    def tied(self, anchors: Sequence[Floats]) -> Segments:
+        """With cloths tied where each recording's (held, 3) are [m]."""
+        return replace(self, items=tuple(replace(item, anchors=anchors[item.recording]) for item in self.items))
+
+    def select(self, indices: Iterable[int]) -> Segments:
+        """Some of them."""
+        return replace(self, items=tuple(self.items[i] for i in indices))
+
+    @cached_property
+    def recording(self) -> NDArray[np.int64]:
+        """(segment,) index of each one's recording."""
+        return np.array([item.recording for item in self.items])
+
+    @cached_property
+    def noise(self) -> Floats:
+        """(segment,) of a coordinate [m]."""
+        return np.array([item.noise for item in self.items])
+
+    @cached_property
+    def positions(self) -> Floats:
+        """(frame, marker, 3, segment), warm-up included [m]."""
+        return np.stack([item.positions for item in self.items], axis=-1)
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_] | None:
+        """(frame, marker, segment) whether each position was tracked, warm-up included; None where all were."""
+        if all(item.seen is None for item in self.items):
+            return None
+        whole = np.ones(self.items[0].positions.shape[:2], dtype=bool)
+        return np.stack([whole if item.seen is None else item.seen for item in self.items], axis=-1)
+
+    @property
+    def counted(self) -> NDArray[np.bool_] | None:
+        """The same of the frames that count."""
+        return None if self.seen is None else self.seen[self.first :]
+
+    @cached_property
+    def tracked(self) -> Floats:
+        """(segment,) share of the positions that were tracked, in the frames that count."""
+        return np.ones(len(self)) if self.counted is None else self.counted.mean(axis=(0, 1))
+
+    @property
+    def period(self) -> float:
+        """Between the frames used [s]."""
+        return self.cut.period
+
+    @property
+    def warm(self) -> int:
+        """How many frames of each are warm-up."""
+        return self.cut.warm
+
+    @property
+    def first(self) -> int:
+        """The first frame of a segment that counts."""
+        return self.warm + 2
+
+    @property
+    def duration(self) -> float:
+        """Duration of what counts of a segment [s]."""
+        return self.cut.length * self.period
+
+    def __len__(self) -> int:
+        return len(self.items)

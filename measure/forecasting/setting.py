@@ -1,0 +1,100 @@
+"""An experiment made ready for the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.forecasting.alignment import aligned
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import PRIOR, PRIOR_WITHOUT_MASS, Calibration
+from measure.forecasting.segments import Segments
+from measure.observe.trajectory import Experiment
+from sim.integrate.split import SplitEuler
+
+Floats = NDArray[np.float64]
+Stage = Callable[[str, int, int], object]
+"""Called with what is under way, how much is done, and of how much."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """What is seen, and how, which moves the mean of what numerics leave.
+
+    Attributes:
+        noise: of a marker's coordinate [m].
+        period: between the frames that are used [s].
+        cloth: `Material.fingerprint` of the nominal one.
+        damping: of the base model that the statistics are taken at [s].
+    """
+
+    noise: float
+    period: float
+    cloth: str
+    damping: float = Calibration().damping
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setting:
+    """An experiment made ready: in one frame, cut into segments, with the model that predicts them.
+
+    Attributes:
+        calibration: of the base model that statistics are taken at: the nominal one, then the fitted one.
+    """
+
+    experiment: Experiment
+    segments: Segments
+    forecaster: Forecaster
+    calibration: Calibration
+
+    @classmethod
+    def of(cls, experiment: Experiment, *, workers: int = 1) -> Setting:
+        """With a model that uses so many threads.
+
+        Raises:
+            InputError: recordings that cannot be used together, or are too short.
+        """
+        turned = aligned(experiment)
+        segments = Segments.of(turned.recordings)
+        forecaster = Forecaster(
+            specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler(), workers=workers
+        )
+        return cls(experiment=turned, segments=segments, forecaster=forecaster, calibration=Calibration())
+
+    @property
+    def speeds(self) -> Floats:
+        """(recording,) mean logged wind [m/s]."""
+        return np.array([r.wind.speed for r in self.experiment.recordings])
+
+    @property
+    def design(self) -> Design:
+        """Its markers are as noisy as in the noisiest recording."""
+        return Design(
+            noise=float(self.segments.noise.max()), period=self.segments.period,
+            cloth=self.experiment.specimen.material.fingerprint, damping=self.calibration.damping,
+        )  # fmt: skip
+
+    def moved(self, lags: Sequence[float]) -> Setting:
+        """With each recording's log moved by what it lags [s]."""
+        recordings = tuple(
+            replace(recording, wind=recording.wind.later(lag))
+            for recording, lag in zip(self.experiment.recordings, lags, strict=True)
+        )
+        items = tuple(replace(item, wind=recordings[item.recording].wind) for item in self.segments.items)
+        return replace(
+            self, experiment=replace(self.experiment, recordings=recordings),
+            segments=replace(self.segments, items=items),
+        )  # fmt: skip
+
+    @property
+    def prior(self) -> Floats:
+        """(theta,) standard deviations of the calibrated parameters."""
+        return PRIOR if self.experiment.specimen.mass_known else PRIOR_WITHOUT_MASS
+
+    @property
+    def recording(self) -> NDArray[np.int64]:
+        """(segment,) index of each one's recording."""
+        return self.segments.recording

@@ -1,0 +1,238 @@
+"""What the statistics of segments say beside a null model: coefficients, drops, comparison on held-out segments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError
+from measure.forecasting.regressors import PRIOR, THETA
+from measure.inference.random_effect import NullModel
+from measure.probes.course import Course
+from measure.probes.rows import Rows
+from measure.probes.statistics import Statistics
+from measure.probes.wind_log import by_recording
+
+Floats = NDArray[np.float64]
+Chosen = Sequence[int]
+
+_HERE = (0.0,) * len(THETA)
+_TINY = np.finfo(np.float64).tiny
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence(Rows):
+    """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
+
+    Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
+    by.
+
+    Attributes:
+        recording: (segment,) index of each one's recording.
+        curvature: (segment, column, column) H = Rᵀ Σ⁻¹ R.
+        score: (segment, column) g = Rᵀ Σ⁻¹ (r − μ).
+        energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
+        columns: how many are the statistics' and those given beside; the nuisances follow.
+        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
+        turning: the same of moments about the pole; None where they are not looked at.
+        course: of the wind, as the errors tell it; None where not looked at.
+        prior: of the calibrated parameters, see `NullModel`.
+    """
+
+    _WHOLE: ClassVar = frozenset({"columns", "prior"})
+
+    recording: NDArray[np.int64]
+    curvature: Floats
+    score: Floats
+    energy: Floats
+    columns: int
+    lines: Floats | None = None
+    turning: Evidence | None = None
+    course: Course | None = None
+    prior: Floats = field(default_factory=PRIOR.copy)
+
+    @classmethod
+    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
+        """The evidence of segments with their wind's speed (segment,) [m/s].
+
+        Args:
+            beside: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
+                columns after the statistics', and moments are not looked at.
+
+        Raises:
+            UsageError: moments of the statistics or of the nulls alone.
+        """
+        if beside is not None:
+            response = np.concatenate([statistics.response, beside], axis=2)
+            statistics = replace(statistics, response=response)
+        own = cls._of(statistics.r, statistics, speeds, null)
+        if beside is not None or (statistics.turning is None and null.turning is None):
+            return own
+        if statistics.turning is None or null.turning is None:
+            raise UsageError("moments of nulls or data alone", where="evidence", fix="look at them in both or in none")
+        return replace(own, turning=cls.of(statistics.turning, speeds, null.turning))
+
+    @classmethod
+    def _of(cls, r: Floats, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+        left = r - null.mean(speeds)
+        shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
+        response = np.concatenate([statistics.response, shifts], axis=2)
+        if statistics.log is not None:
+            response = np.concatenate([response, by_recording(statistics.log, statistics.recording)], axis=2)
+        precision = np.linalg.inv(null.covariance)
+        weighted = np.einsum("sia,ij->saj", response, precision)
+        return cls(
+            recording=statistics.recording, curvature=weighted @ response,
+            score=np.einsum("saj,sj->sa", weighted, left),
+            energy=np.einsum("si,ij,sj->s", left, precision, left), columns=statistics.response.shape[2],
+            lines=statistics.lines, course=statistics.course, prior=null.prior,
+        )  # fmt: skip
+
+    @property
+    def nuisance(self) -> list[int]:
+        """Columns that are always fitted: the calibrated parameters, the shifts of the numerics, and what the logs of
+        the wind may be off by."""
+        return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
+
+    @property
+    def swing(self) -> Floats | None:
+        """(part,) of the wind's course; None where it is not looked at."""
+        return None if self.course is None else self.course.swing(self.recording)
+
+    def _total(self) -> tuple[Floats, Floats, float]:
+        """Sums over the segments, with the priors of the nuisance columns."""
+        curvature = self.curvature.sum(axis=0)
+        prior = np.concatenate([self.prior**-2, np.ones(self.score.shape[1] - self.columns)])
+        curvature[self.nuisance, self.nuisance] += prior
+        return curvature, self.score.sum(axis=0), float(self.energy.sum())
+
+    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> Fit:
+        """Generalised least squares of the nuisance columns, under their priors, and the chosen ones.
+
+        Args:
+            centre: of the calibrated parameters' prior, in steps from where the statistics were taken.
+        """
+        active = [*self.nuisance, *chosen]
+        curvature, score, energy = self._total()
+        pull = self.prior**-2 * np.asarray(centre)
+        score[: len(THETA)] += pull
+        energy += float(pull @ np.asarray(centre))
+        covariance = np.asarray(np.linalg.inv(curvature[np.ix_(active, active)]), dtype=np.float64)
+        value = covariance @ score[active]
+        return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))
+
+    def freed(self, column: int) -> Evidence:
+        """With a coefficient of a column that is free in every segment: what is left across it.
+
+        Moments about the pole and the wind's course are not looked at: what fluctuates within a segment moves them all
+        the same.
+        """
+        own = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
+        along, slope = self.curvature[:, column], self.score[:, column]
+        curvature = self.curvature - along[:, :, None] * along[:, None, :] / own[:, None, None]
+        score = self.score - along * (slope / own)[:, None]
+        # Nothing is left of the column itself: it stays as one of which nothing is known.
+        curvature[:, column, :] = curvature[:, :, column] = score[:, column] = 0.0
+        curvature[:, column, column] = 1.0
+        return Evidence(
+            recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
+            columns=self.columns, lines=self.lines, prior=self.prior,
+        )  # fmt: skip
+
+    def drops(self, beside: Chosen = ()) -> Floats:
+        """(column,) how much each column, added to the nuisances and to some more, lowers the squared distance."""
+        active = [*self.nuisance, *beside]
+        curvature, score, _ = self._total()
+        solved = np.linalg.solve(curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]])
+        own = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
+        slope = score - curvature[active].T @ solved[:, -1]
+        drops = slope**2 / np.maximum(own, np.maximum(1e-9 * np.diag(curvature), np.finfo(np.float64).tiny))
+        drops[active] = 0.0
+        return drops[: self.columns]
+
+    def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[Floats, Floats, Floats]:
+        """How a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all, column)
+        how all coefficients go with it, (all,) those of the fit without."""
+        curvature, score, _ = self._total()
+        chosen, others = list(active), list(columns)
+        across = curvature[np.ix_(chosen, others)]
+        solved = np.linalg.solve(curvature[np.ix_(chosen, chosen)], np.c_[across, score[chosen]])
+        moved, fitted = np.zeros((len(score), len(others))), np.zeros(len(score))
+        moved[chosen], moved[others, range(len(others))], fitted[chosen] = -solved[:, :-1], 1.0, solved[:, -1]
+        whole = np.diag(curvature)[others]
+        own = whole - np.einsum("ai,ai->i", across, solved[:, :-1])
+        step = (score[others] - across.T @ solved[:, -1]) / np.maximum(own, np.maximum(1e-9 * whole, _TINY))
+        return step, moved, fitted
+
+    def left_out(self, outside: NDArray[np.bool_], chosen: Chosen = ()) -> Floats:
+        """(segment,) half misfits of some segments, when the nuisances and chosen columns are fitted to the others."""
+        fit = self.select(~outside).fit(chosen)
+        return self.select(outside).misfit(fit.active, fit.value) / 2
+
+    def misfit(self, active: Chosen, value: Floats) -> Floats:
+        """(segment,) what coefficients leave of each segment."""
+        places = list(active)
+        quadratic = np.einsum("a,sab,b->s", value, self.curvature[:, places][:, :, places], value)
+        return self.energy - 2 * self.score[:, places] @ value + quadratic
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """Coefficients of some columns, with their covariance, and the squared distance they leave, prior included."""
+
+    active: tuple[int, ...]
+    value: Floats
+    covariance: Floats
+    left: float
+
+    def in_errors(self, columns: Sequence[int]) -> Floats:
+        """(column,) some coefficients in their standard errors."""
+        return np.array([value / error for value, error in map(self.of, columns)])
+
+    def of(self, column: int) -> tuple[float, float]:
+        """Coefficient and standard error."""
+        place = self.active.index(column)
+        return float(self.value[place]), float(np.sqrt(self.covariance[place, place]))
+
+
+def left_together(recording: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(segment,) what is left out together: a recording, or each half of a single one."""
+    if len(np.unique(recording)) > 1:
+        return recording
+    return (np.arange(len(recording)) >= len(recording) / 2).astype(np.int64)
+
+
+def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
+    """How much better each choice of columns predicts segments it was not fitted to: (choice, segment).
+
+    Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the
+    left-out segments' half misfits are compared with the base model's, fitted to the same.
+    """
+    folds = left_together(evidence.recording)
+    result = np.zeros((len(choices), len(folds)))
+    for index in np.unique(folds):
+        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
+        base = inside.fit(())
+        before = outside.misfit(base.active, base.value)
+        for place, chosen in enumerate(choices):
+            fit = inside.fit(chosen)
+            result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
+    return result
+
+
+def best_gain(evidence: Evidence, beside: Chosen = ()) -> float:
+    """The largest held-out gain that one more column brings, over that of some columns alone: see `gains`."""
+    folds, active = left_together(evidence.recording), [*evidence.nuisance, *beside]
+    columns = [column for column in range(evidence.columns) if column not in active]
+    total = np.zeros(len(columns))
+    for index in np.unique(folds):
+        inside, outside = evidence.select(folds != index), evidence.select(folds == index)
+        step, moved, fitted = inside.with_one_more(active, columns)
+        curvature = outside.curvature.sum(axis=0)
+        slope = (outside.score.sum(axis=0) - curvature @ fitted) @ moved
+        total += step * slope - step**2 * np.einsum("pc,pq,qc->c", moved, curvature, moved) / 2
+    return float(total.max())

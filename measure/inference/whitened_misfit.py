@@ -1,0 +1,57 @@
+"""Measures models by the directions of the statistics, with what the fit's numerics leave taken out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from measure.forecasting.regressors import Calibration
+from measure.inference.evidence import Evidence
+from measure.inference.random_effect import NullModel
+from measure.probes.statistics import Projection, Statistics
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WhitenedMisfit:
+    """A squared distance of markers is mostly what the fit's mesh cannot show, and its bias by the mesh is larger than
+    what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
+
+    Attributes:
+        found: statistics of the base model.
+        projection: their directions.
+        null: the null model.
+        speeds: (segment,) of the wind [m/s].
+        origin: calibration of the base model that the statistics are taken at.
+    """
+
+    found: Statistics
+    projection: Projection
+    null: NullModel
+    speeds: Floats
+    origin: Calibration = field(default_factory=Calibration)
+
+    def of(self, errors: Tensor) -> Evidence:
+        """The evidence of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
+        lines, turned = self.projection.lines(errors), self.projection.turned(errors)
+        known = self.found.turning
+        turning = None if known is None or turned is None else replace(known, r=turned)
+        course, whole = self.projection.course(errors), self.found.course
+        if course is not None and whole is not None:
+            course = replace(course, log=whole.log)
+        found = replace(
+            self.found,
+            r=self.projection.of(errors),
+            lines=lines,
+            turning=turning,
+            course=course,
+        )
+        return self.evidence(found)
+
+    def evidence(self, statistics: Statistics) -> Evidence:
+        """The evidence of all segments."""
+        return Evidence.of(statistics, self.speeds, self.null)

@@ -1,0 +1,200 @@
+"""Models fitted beyond the linear: linearised again where the last fit led, until they stay (Gauss–Newton)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import FlagdataError
+from measure.forecasting.model import Model, errors_of
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import DOUBLE, PRIOR, THETA, Calibration, Column, EffectColumn
+from measure.forecasting.segments import Segments
+from measure.inference.evidence import Evidence
+from measure.inference.random_effect import NullModel
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.probes.statistics import Statistics, reduced
+
+Floats = NDArray[np.float64]
+
+ROUNDS = 3
+_FEW = 8
+"""Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the columns' place."""
+_HALVINGS = 4
+STAYS = 0.3
+"""Standard errors below which a step is not worth another round."""
+_LONGEST = 1.5
+"""A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
+
+
+class DivergedError(FlagdataError):
+    """A model whose predictions are not finite."""
+
+    kind = "diverged"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refined:
+    """A model where Gauss–Newton led, linearised there.
+
+    Attributes:
+        model: fitted to all segments.
+        chosen: its columns beside the calibrated parameters.
+        errors: standard errors of its calibrated parameters and strengths, as Σ has them along all directions.
+        statistics: at the model before the last step, `origin`, of all segments.
+        origin: that model.
+        anchor: calibration by all directions, about which the prior of the null model is.
+        null: the null model of its columns.
+        speeds: (segment,) of the wind [m/s].
+        stays: whether another round would hardly move it.
+    """
+
+    model: Model
+    chosen: tuple[int, ...]
+    errors: tuple[float, ...]
+    statistics: Statistics
+    origin: Model
+    anchor: Calibration
+    null: NullModel
+    speeds: Floats
+    stays: bool
+
+    def without(self, outside: NDArray[np.bool_]) -> Model:
+        """The same model fitted to the other segments alone, one step from `origin`."""
+        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin, self.anchor)
+        return self.origin.moved(cut(step))
+
+
+def refine(
+    forecaster: Forecaster,
+    segments: Segments,
+    whitened: WhitenedMisfit,
+    chosen: Sequence[int],
+    *,
+    weighed: Sequence[Column],
+) -> Refined:
+    """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on.
+
+    Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would
+    lead the calibrated parameters astray by what numerics leave, so that their prior is there what all directions told
+    before.
+
+    Args:
+        weighed: the columns of the statistics, but for the calibrated parameters.
+
+    Raises:
+        DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.
+    """
+    fit = whitened.evidence(whitened.found).fit(chosen, centre=Calibration().steps_from(whitened.origin))
+    own = [weighed[c - len(THETA)] for c in chosen]
+    effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
+    values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
+    model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
+    told = np.array([fit.of(place)[1] for place in range(len(THETA))])
+    part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=told)
+    anchor = model.calibration
+    reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen), anchor=anchor)
+    for _ in range(ROUNDS - 1):
+        if reached.stays:
+            break
+        reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen), anchor=anchor)
+    every = np.ones(len(segments), dtype=bool)
+    ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
+    return replace(reached, model=model, errors=errors)
+
+
+def finished(
+    forecaster: Forecaster,
+    segments: Segments,
+    whitened: WhitenedMisfit,
+    models: Sequence[Model],
+    chosen: Sequence[int],
+    insides: Sequence[NDArray[np.bool_]],
+) -> list[tuple[Model, tuple[float, ...]]]:
+    """Models of the same columns after one linear step by all directions of the whitened misfit, each fitted to
+    some segments, with the standard errors of that step.
+
+    By its own few directions a fit follows effects far from where they are linear, but cannot tell some of them from
+    what numerics leave; by all, it can.
+    """
+    every = errors_of(models, forecaster, segments)
+    made: list[tuple[Model, tuple[float, ...]]] = []
+    for model, errors, inside in zip(models, every, insides, strict=True):
+        fit = whitened.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
+        step, spread = np.array([fit.of(column) for column in (*range(len(THETA)), *chosen)]).T
+        moved = model.moved(cut(step)) if np.isfinite(step).all() else model
+        made.append((moved, tuple(float(error) for error in spread)))
+    return made
+
+
+def _round(
+    forecaster: Forecaster,
+    segments: Segments,
+    origin: Model,
+    null: NullModel,
+    speeds: Floats,
+    chosen: tuple[int, ...],
+    *,
+    anchor: Calibration,
+) -> Refined:
+    for _ in range(_HALVINGS):
+        found = _linearised(forecaster, segments, origin)
+        if np.isfinite(found.r).all() and np.isfinite(found.response).all():
+            break
+        origin = origin.halved()
+    else:
+        raise DivergedError(
+            "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
+            fix="look at the recordings' residuals: no model of the library is near them",
+        )  # fmt: skip
+    step, errors = _step(found, null, speeds, origin, anchor)
+    return Refined(
+        model=origin.moved(cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
+        origin=origin, anchor=anchor, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < STAYS),
+    )  # fmt: skip
+
+
+def cut(step: Floats) -> tuple[float, ...]:
+    """A step along the calibrated parameters and strengths, no further than the linear model reaches."""
+    longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
+    return tuple(float(v) for v in np.clip(step, -longest, longest))
+
+
+def _part(null: NullModel, places: list[int]) -> NullModel:
+    return NullModel(
+        coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
+        shifts=null.shifts[:_FEW, places], prior=null.prior,
+    )  # fmt: skip
+
+
+def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
+    if any(column.name in DOUBLE for column, _ in model.effects):
+        forecaster = forecaster.double
+    sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
+    steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
+    base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
+    changes = [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
+    return reduced(base, changes, segments.recording, segments.noise, segments.counted)
+
+
+def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:
+    """A model after a step along one of its parameters, with the step: back, where bounds cut the one ahead shorter."""
+    count = len(THETA) + len(model.effects)
+    ways = [model.moved(tuple(way if k == place else 0.0 for k in range(count))) for way in (size, -size)]
+    taken = [moved.steps_from(model)[place] for moved in ways]
+    longer = int(abs(taken[1]) > abs(taken[0]) + 1e-9 * size)
+    return ways[longer], taken[longer]
+
+
+def _step(
+    found: Statistics, null: NullModel, speeds: Floats, model: Model, anchor: Calibration
+) -> tuple[Floats, Floats]:
+    """One step of generalised least squares from here, under the prior about a calibration; with standard errors."""
+    count = found.r.shape[1]
+    chosen = range(len(THETA), count)
+    fit = Evidence.of(found, speeds, null).fit(chosen, centre=anchor.steps_from(model.calibration))
+    value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
+    return np.array(value), np.array(error)

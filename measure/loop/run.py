@@ -1,0 +1,405 @@
+"""Closing the loop on trajectories: from recordings to the numbers of a verdict about what the base model lacks.
+
+The steps are those of the method: align, predict one horizon ahead, fit the base model, compare with nulls of other
+numerics, weigh the library's effects, judge, and run the refitted model on what it was not fitted to.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.provenance import code_version
+from measure.forecasting.regressors import THETA, Calibration, columns
+from measure.forecasting.setting import Setting, Stage
+from measure.inference.evidence import Evidence, Fit
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop.corrective_field import Mode, corrective_field
+from measure.loop.gauss_newton import Refined, cut
+from measure.loop.refit import Fits, Refit, refit
+from measure.loop.residuals import residuals
+from measure.loop.selection import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, finalists, judge, strength
+from measure.loop.validation import LeftOut, Predictions, Trial, compare, folds, numerical_floor, predict
+from measure.nulls import bank as banks
+from measure.nulls import supply
+from measure.nulls.conformal import kinds_needed
+from measure.nulls.reference import NullBank, Reference
+from measure.observe.trajectory import Experiment
+from measure.probes.course import Variation
+from measure.probes.lines import Line
+from measure.probes.statistics import Projection, Statistics, projected
+from measure.probes.wind_log import lags
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
+
+Floats = NDArray[np.float64]
+_FLOOR_COPIES = 4
+_LOOKS = 4
+"""At most: a damping of 30 ms is reached from 2.5 ms in two or three."""
+FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
+"""So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How to close the loop.
+
+    Attributes:
+        seed: of the nulls.
+        level: of the global test.
+        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
+        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
+            and winds, over the same priors.
+        workers: processes for the nulls, then threads for sensitivities and for the models that are refitted.
+
+    Raises:
+        UsageError: a level or counts that make no sense.
+    """
+
+    seed: int = 0
+    level: float = CRITERIA.level
+    nulls: int = FEWEST_NULLS
+    bank: Path | None = None
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0 < self.level < 1:
+            raise UsageError(f"a level of {self.level!r}", where="close-loop", fix="give one between 0 and 1")
+        if self.nulls < FEWEST_NULLS or self.workers < 1:
+            raise UsageError(
+                f"{self.nulls} nulls by {self.workers} workers",
+                where="close-loop",
+                fix=f"give {FEWEST_NULLS} or more, and 1 or more",
+            )
+        needed = banks.WINDS * kinds_needed(self.level)
+        if self.bank is None and self.nulls < needed:
+            raise UsageError(
+                f"{self.nulls} nulls cannot test at a level of {self.level:g}", where="close-loop",
+                fix=f"give {needed} nulls or more, or a higher level",
+            )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What an experiment came to, before anything is said of it in sentences.
+
+    Attributes:
+        verdict: all numbers of the verdict; what is told in sentences is empty.
+        experiment: in the frame of the fit, with the logs of the wind moved by what they lag.
+        lags: (recording,) by how much they were moved [s].
+        at_bounds: names of the calibrated parameters that are as small or as large as the model holds.
+        field: modes of the corrective field; empty where the library has the whole answer.
+        whole: whether the field stands for all that the base model lacks, and not for what a larger model leaves.
+        line: of the errors' spectra that remains beside the field.
+        course: of the wind that remains beside the field, and is not turbulence.
+    """
+
+    verdict: Verdict
+    experiment: Experiment
+    lags: tuple[float, ...]
+    at_bounds: tuple[str, ...]
+    field: tuple[Mode, ...] = ()
+    whole: bool = True
+    line: Line | None = None
+    course: Variation | None = None
+
+
+def solve(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Outcome:
+    """What an experiment came to.
+
+    Args:
+        stage: told of progress.
+
+    Raises:
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose
+            attachments move.
+    """
+    began = time.perf_counter()
+    torch.set_num_threads(1)
+    tell = stage or (lambda what, done, total: None)
+    if experiment.carried:
+        raise InputError(
+            "a verdict on a cloth whose attachments move: null experiments of such cloths are not simulated",
+            where="close-loop", fix="hold the cloth still, or compare its forecasts (measure.forecasting.observer)",
+        )  # fmt: skip
+    setting = Setting.of(experiment, workers=options.workers)
+    tell("sensitivities", 0, 1)
+    found, projection = _looked_at(setting)
+    late = (0.0,) * len(setting.speeds) if found.course is None else lags(found.course, setting.segments)
+    if any(late):
+        setting = setting.moved(late)
+        found, projection = _looked_at(setting)
+    tell("sensitivities", 1, 1)
+    bank = supply.supplied(
+        setting, bank=options.bank, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
+    )
+    reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
+    tell("base model", 0, 1)
+    setting, fits = _calibrated(setting, _fits(setting, found, projection, bank), bank)
+    tell("base model", 1, 1)
+    reference = reference.at(setting.calibration)
+    evidence = fits.whitened.evidence(fits.whitened.found)
+    judgement, refits = judge(evidence, reference, level=options.level), dict[int, Refit | None]()
+    if judgement.conclusion not in (Conclusion.SUFFICIENT, Conclusion.UNTESTED):
+        tell("before and after", 0, 1)
+        while new := [column for column in finalists(judgement) if column not in refits]:
+            refits |= refit(fits, reference, new, workers=options.workers)
+            judgement = judge(evidence, reference, level=options.level, refits=refits)
+    solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
+    trial = _trial(solved, options)
+    tell("before and after", 1, 1)
+    return _outcome(solved, bank, trial, options, began, late)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solved:
+    """A judged experiment, with the models fitted to it beyond the linear."""
+
+    setting: Setting
+    fits: Fits
+    reference: Reference
+    judgement: Judgement
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """The evidence against the base model."""
+        return self.fits.whitened.evidence(self.fits.whitened.found)
+
+    @property
+    def base(self) -> Refined:
+        """The base model."""
+        return self.fits.base
+
+    @property
+    def larger(self) -> Refined | None:
+        """With the effects that act; None where none does, its course is unknown (gusts), or its cloth diverges."""
+        named = self.acting
+        return None if not named or GUST_COLUMN in named else self.fits.of(named)
+
+    @property
+    def acting(self) -> tuple[int, ...]:
+        """Columns of the larger model: all effects named as acting, or the first of those that may be; none where its
+        cloth diverges."""
+        named = self.judgement.named
+        return named if self.judgement.conclusion is Conclusion.EFFECT else named[:1]
+
+    def strength(self, weighed: Weighed, larger: Refined) -> Estimate:
+        """The strength of an acting effect beyond the linear: its error exceeds what Σ says as where it is linear."""
+        place = self.acting.index(weighed.column)
+        column, coefficient = larger.model.effects[place]
+        linear = self.evidence.fit([weighed.column]).of(weighed.column)[1]
+        error = larger.errors[len(THETA) + place] * weighed.error / linear
+        return strength(column.described.null, coefficient, error, column.unit)
+
+    @cached_property
+    def control(self) -> tuple[Weighed, Refined] | None:
+        """The best effect that was not named, and the model with it."""
+        taken = (*self.judgement.named, GUST_COLUMN)
+        for wrong in self.judgement.ranking:
+            if wrong.column not in taken and wrong.admissible:
+                fitted = self.fits.of((wrong.column,))
+                if fitted is not None:
+                    return wrong, fitted
+        return None
+
+
+def fitted_base(setting: Setting, bank: NullBank) -> tuple[Setting, Fits]:
+    """The base model fitted by all directions: the setting at its calibration, and the models that begin there."""
+    return _calibrated(setting, _fits(setting, *_looked_at(setting), bank), bank)
+
+
+def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
+    """Errors of the base model along all columns, and the directions."""
+    starts = [setting.calibration] * len(setting.segments)
+    return projected(setting.forecaster, setting.segments, starts, columns())
+
+
+def _fits(setting: Setting, found: Statistics, projection: Projection, bank: NullBank) -> Fits:
+    """Models of the experiment, which begin at the one that statistics were taken at."""
+    whitened = WhitenedMisfit(
+        found=found, projection=projection, null=bank.model(setting.design).under(setting.prior),
+        speeds=setting.speeds[setting.recording], origin=setting.calibration,
+    )  # fmt: skip
+    return Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
+
+
+def _calibrated(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
+    """Statistics at the base model that all directions lead to, taken anew until a step is within its errors, or leaves
+    more than there was before it: beyond that, directions follow what numerics do."""
+    for _ in range(_LOOKS):
+        fit = _base_fit(setting, fits)
+        step, errors = np.array([fit.of(place) for place in range(len(THETA))]).T
+        if (np.abs(step) < errors).all():
+            break
+        moved = replace(setting, calibration=setting.calibration.moved(cut(step)))
+        there = _fits(moved, *_looked_at(moved), bank)
+        if _base_fit(moved, there).left > fit.left:
+            break
+        setting, fits = moved, there
+    return setting, fits
+
+
+def _base_fit(setting: Setting, fits: Fits) -> Fit:
+    """The base model, linear where statistics were taken."""
+    evidence = fits.whitened.evidence(fits.whitened.found)
+    return evidence.fit((), centre=Calibration().steps_from(setting.calibration))
+
+
+def _trial(solved: Solved, options: Options) -> Trial:
+    """Before and after on what was left out, where an effect is named."""
+    setting, larger = solved.setting, solved.larger
+    if larger is None:
+        return Trial()
+    control = solved.control
+    fitted = [solved.base, larger, *([] if control is None else [control[1]])]
+    every = folds(setting.segments, [float(u) for u in setting.speeds])
+
+    def left(model: Refined) -> list[LeftOut]:
+        return solved.fits.left_out(model, [fold.outside for fold in every])
+
+    with ThreadPoolExecutor(max_workers=options.workers) as pool:
+        simulated = pool.submit(
+            numerical_floor, setting, np.arange(len(setting.speeds)), larger.model, copies=_FLOOR_COPIES,
+            seed=options.seed,
+        )  # fmt: skip
+        tried = list(pool.map(left, fitted))
+        of_recording, floor = simulated.result()
+    made: list[Comparison] = []
+    apart: list[Floats] = []
+    places: list[NDArray[np.int64]] = []
+    frames = len(setting.segments.items[0].positions) - setting.segments.first
+    for place, (fold, (before, after, *wrong)) in enumerate(zip(every, zip(*tried, strict=True), strict=True)):
+        near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
+        made.append(
+            compare(
+                fold, recording=setting.recording[fold.outside], frames=int(fold.outside.sum()) * frames,
+                before=before, after=after,
+                control=wrong[0] if wrong else None, floor=floor[near],
+                control_name="" if control is None else control[0].candidate.effect,
+            )
+        )  # fmt: skip
+        if len(every) == 1 or place < len(setting.speeds):  # the late parts are in the recordings as well
+            places.append(np.full(len(after.misfit), place))
+            apart += [own.misfit - after.misfit for own in wrong]
+    return Trial(
+        comparisons=tuple(made), apart=np.concatenate(apart) if apart else None, recording=np.concatenate(places),
+    )  # fmt: skip
+
+
+def _outcome(
+    solved: Solved, bank: NullBank, trial: Trial, options: Options, began: float, late: tuple[float, ...]
+) -> Outcome:
+    setting, larger, judgement = solved.setting, solved.larger, solved.judgement
+    before = _unseen(setting, solved.base)
+    after = None if larger is None else _unseen(setting, larger)
+    verdict = Verdict(
+        conclusion=judgement.conclusion, named=_named(judgement), words="", test=_test(solved, bank, options),
+        parameters=_parameters(solved.base, larger, solved.reference.reach), ranking=_ranking(solved, larger),
+        comparisons=trial.comparisons, apart=trial.control,
+        residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
+        provenance={
+            "seed": options.seed, "code": code_version(),
+            "criteria": replace(CRITERIA, level=options.level).as_dict(),
+            "parents": [r.source for r in setting.experiment.recordings if r.source],
+        },
+    )  # fmt: skip
+    beyond = judgement.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
+    field = _field(solved) if beyond else ()
+    fitted = solved.base if larger is None else larger
+    return Outcome(
+        verdict=replace(verdict, seconds=time.perf_counter() - began), experiment=setting.experiment, lags=late,
+        at_bounds=fitted.model.calibration.at_bounds, field=field, whole=larger is None,
+        line=judgement.line if beyond else None,
+        course=judgement.course if beyond else None,
+    )  # fmt: skip
+
+
+def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
+    """The global test of the base model, and whether other nulls could decide it otherwise."""
+    conformal, judgement = solved.reference.conformal, solved.judgement
+    low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
+    undecided = low <= options.level <= high and conformal.tests(options.level)
+    more = conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
+    return NullTest(
+        statistic=judgement.statistic, null=[float(v) for v in conformal.null], kinds=conformal.count,
+        p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+        level=options.level, critical=conformal.critical(options.level), nulls=bank.words, open=undecided,
+        settling=more,
+    )  # fmt: skip
+
+
+def _field(solved: Solved) -> tuple[Mode, ...]:
+    """The corrective field, of what the larger model leaves where there is one."""
+    larger = solved.larger
+    left = None if larger is None else solved.fits.errors(larger)
+    return corrective_field(
+        solved.setting, solved.fits.whitened, left=left, beside=() if larger is None else larger.chosen
+    )
+
+
+def _unseen(setting: Setting, refined: Refined) -> Predictions:
+    """Predictions of all segments by the model fitted to the other recordings; of a single recording by its own."""
+    if len(setting.speeds) < 2:
+        return predict(setting.forecaster, setting.segments, refined.model)
+    parts: list[Predictions] = []
+    for index in range(len(setting.speeds)):
+        own = setting.recording == index
+        parts.append(predict(setting.forecaster, setting.segments.select(np.flatnonzero(own)), refined.without(own)))
+    # Segments are in the order of their recordings.
+    return Predictions(
+        errors=np.concatenate([p.errors for p in parts], axis=-1),
+        predicted=np.concatenate([p.predicted for p in parts], axis=-1),
+    )
+
+
+def _ranking(solved: Solved, larger: Refined | None) -> tuple[Candidate, ...]:
+    """The candidates; those of the larger model with their strengths beyond the linear."""
+    made: list[Candidate] = []
+    for weighed in solved.judgement.ranking:
+        candidate = weighed.candidate
+        if larger is not None and weighed.column in solved.acting:
+            candidate = replace(candidate, strength=solved.strength(weighed, larger))
+        made.append(candidate)
+    return tuple(made)
+
+
+def _named(judgement: Judgement) -> tuple[str, ...]:
+    names: list[str] = []
+    for weighed in judgement.ranking:
+        if weighed.column in judgement.named:
+            names += [weighed.candidate.effect, *EQUIVALENT.get(weighed.candidate.effect, ())]
+    return tuple(dict.fromkeys(names))
+
+
+def _parameters(base: Refined, larger: Refined | None, reach: Floats) -> tuple[Parameter, ...]:
+    """Density, bending and damping, which are estimated by their logarithms, with the intervals that hold those of null
+    experiments: `reach` (theta,) standard errors to either side."""
+    made: list[Parameter] = []
+    for place, (name, _, _) in enumerate(THETA):
+        before = _shown(name, base.model.calibration, float(reach[place]) * base.errors[place])
+        if larger is None:
+            made.append(Parameter(name=name, before=before, after=None, shift=None))
+            continue
+        steps = larger.model.calibration.steps_from(base.model.calibration)
+        after = _shown(name, larger.model.calibration, float(reach[place]) * larger.errors[place])
+        made.append(Parameter(name=name, before=before, after=after, shift=steps[place] / base.errors[place]))
+    return tuple(made)
+
+
+def _shown(name: str, calibration: Calibration, half: float) -> Estimate:
+    """A calibrated parameter as a reader knows it, with half the width of its logarithm's interval."""
+    value, unit = {
+        "density": (calibration.density, "of nominal"), "bending": (calibration.bending, "of nominal"),
+        "damping": (calibration.damping, "s"),
+    }[name]  # fmt: skip
+    low, high = value * math.exp(-half), value * math.exp(half)
+    return Estimate(value=value, low=low, high=high, unit=unit, level=CRITERIA.interval)

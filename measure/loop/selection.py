@@ -1,0 +1,389 @@
+"""Which effect it is: models of the library compared by what they predict on recordings they were not fitted to.
+
+Detection is by the calibrated statistic. Attribution is one rule. Models that held-out scores do not tell from the best
+are the confidence set (after Hansen, Lunde and Nason, Econometrica 79:453, 2011), and of these the ones that pass their
+own predictive test are the verdict. The base model and forces that are none of the library compete like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+from measure.forecasting.regressors import THETA, EffectColumn, columns, names
+from measure.inference.evidence import Evidence, gains
+from measure.inference.fluctuation import fluctuation, fluctuation_gains
+from measure.loop.refit import Refit
+from measure.loop.validation import total_error
+from measure.nulls.reference import GUSTS, Reference
+from measure.probes.course import Variation
+from measure.probes.lines import Line
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.quantity import number
+from measure.verdict.record import Candidate, Conclusion, Estimate
+from sim.effects import EFFECTS
+from sim.effects.parameter import Parameter
+
+Floats = NDArray[np.float64]
+
+GUST_COLUMN = -1
+"""Stands for gusts, which are no column: only their size can be found, not their course."""
+_FIRST = len(THETA)
+
+EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
+"""Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Weighed:
+    """A candidate with what the decision needs.
+
+    Attributes:
+        column: place among the evidence's columns.
+        candidate: as reported.
+        error: standard error of the strength.
+        gains: (segment,) held-out gain.
+        recording: (segment,) of each.
+        admissible: whether the model exists: its strength is one that the effect may have, its cloth stays one, and a
+            wind that fluctuates does it as turbulence does.
+        unlike: how the wind's course differs from that of turbulence, for gusts; empty where it does not.
+    """
+
+    column: int
+    candidate: Candidate
+    error: float
+    gains: Floats
+    recording: NDArray[np.int64]
+    admissible: bool
+    unlike: str = ""
+
+    def passes(self, level: float) -> bool:
+        """Whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is the
+        same in all recordings."""
+        return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judgement:
+    """What was decided.
+
+    Attributes:
+        conclusion: see `Conclusion`.
+        named: columns of the effects named.
+        ranking: candidates, best first, each with the reason why it was not named.
+        confident: columns of the models of the library in the confidence set, best first; empty where the base model or
+            none of the library is as good as they are.
+        statistic, p_value: of the global test.
+        line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
+        course: how the wind varies, as what the first leaves tells it, where that alone would and it is not turbulence.
+    """
+
+    conclusion: Conclusion
+    named: tuple[int, ...]
+    ranking: tuple[Weighed, ...]
+    confident: tuple[int, ...]
+    statistic: float
+    p_value: float
+    line: Line | None = None
+    course: Variation | None = None
+
+
+def judge(
+    evidence: Evidence, reference: Reference, *, level: float, refits: Mapping[int, Refit | None] | None = None
+) -> Judgement:
+    """Weigh the library against the evidence of all recordings.
+
+    Args:
+        level: of the global test.
+        refits: of columns whose models were refitted, which count in place of the linear evidence; None for a cloth
+            that diverged.
+    """
+    known = refits or {}
+    statistics = reference.statistics(evidence, names())
+    statistic = reference.farthest(evidence, names())
+    p_value = reference.conformal.p(statistic)
+    effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
+    held_out = gains(evidence, [[i] for i, _ in effects])
+    weighed = [
+        _weigh(
+            evidence, reference, column, effect, own, statistics, known.get(column), lost=known.get(column, 0) is None
+        )
+        for (column, effect), own in zip(effects, held_out, strict=True)
+    ]
+    ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
+    confident = _confidence_set(ranking, evidence)
+    first = known.get(ranking[0].column)
+    left = evidence if first is None else first.evidence
+
+    def judgement(conclusion: Conclusion, named: Sequence[Weighed], why: str = "") -> Judgement:
+        taken = {w.column for w in named}
+        told = [
+            replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
+            for w in ranking
+        ]
+        return Judgement(
+            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told),
+            confident=tuple(w.column for w in confident), statistic=statistic, p_value=p_value,
+            line=_swinging(left, reference, level), course=_blown(left, reference, level),
+        )  # fmt: skip
+
+    if not reference.conformal.tests(level):
+        return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
+    if p_value > level:
+        return judgement(Conclusion.SUFFICIENT, (), "the base model is not rejected")
+    if not confident:
+        return judgement(Conclusion.OUTSIDE, ())
+    passing = [w for w in confident if w.passes(level)]
+    if passing:
+        return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
+    second = _second(left, reference, confident[0], ranking, level)
+    if second is not None:
+        return judgement(Conclusion.EFFECT, (confident[0], second))
+    return judgement(Conclusion.PARTLY, confident[:1])
+
+
+def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
+    """Models of the library that held-out scores do not tell from the best, best first; none where the base model,
+    which gains nothing, is among them, or where a force that is none of the library leads them all."""
+    able = [w for w in ranking if w.admissible]
+    forces = gains(evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)])
+    scores = [*(w.gains for w in able), *forces]
+    best = max(scores, key=lambda own: own.sum())
+    if not _leads(best, np.zeros_like(best), evidence.recording):
+        return []
+    return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
+
+
+def _leads(one: Floats, other: Floats, recording: NDArray[np.int64]) -> bool:
+    """Whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the difference."""
+    return bool((one - other).sum() > CRITERIA.lead * total_error(one - other, recording))
+
+
+def _swinging(left: Evidence, reference: Reference, level: float) -> Line | None:
+    """The line of the spectra of what is left, where it alone would reject a model."""
+    line = reference.line(left)
+    return line if line is not None and reference.conformal.p(line.far) <= level else None
+
+
+def _varying(evidence: Evidence) -> Variation | None:
+    """How the wind varies, as the errors tell it; None where its course is not looked at."""
+    return None if evidence.course is None else evidence.course.variation(evidence.recording)
+
+
+def _blown(left: Evidence, reference: Reference, level: float) -> Variation | None:
+    """How the wind varies as what is left tells it, where that alone would reject a model and is not turbulence."""
+    swing, variation = reference.swing(left), _varying(left)
+    if swing is None or variation is None or variation.turbulent:
+        return None
+    return variation if reference.conformal.p(swing) <= level else None
+
+
+def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
+    """p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer than two.
+
+    A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as one that rises by
+    an angle, has a larger angle in lighter winds.
+
+    Args:
+        strengths: of each recording alone, with normal intervals.
+    """
+    if len(strengths) < 2:
+        return None
+    values = np.array([s.value for s in strengths])
+    errors = np.array([(s.high - s.low) / 2 / norm.ppf(0.5 + s.level / 2) for s in strengths])
+    weights = errors**-2.0
+    common = (weights * values).sum() / weights.sum()
+    return float(chi2.sf((weights * (values - common) ** 2).sum(), len(strengths) - 1))
+
+
+def heterogeneous(candidate: Candidate, level: float) -> bool:
+    """Whether its strength is another in every recording: another law in the wind would be a better one."""
+    return candidate.heterogeneity is not None and candidate.heterogeneity <= level
+
+
+def finalists(judgement: Judgement) -> tuple[int, ...]:
+    """Columns that are refitted: the confidence set, the first by held-out gains, and the largest statistics."""
+    able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
+    strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
+    first = (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])
+    chosen = dict.fromkeys([*(w.column for w in first), *judgement.confident])
+    return tuple(column for column in chosen if column != GUST_COLUMN)
+
+
+def _second(
+    evidence: Evidence, reference: Reference, first: Weighed, ranking: Sequence[Weighed], level: float
+) -> Weighed | None:
+    """An effect with which the first passes its predictive test, and predicts better than alone. Beside gusts, the
+    pressure is free in every segment.
+
+    Args:
+        evidence: of what the first leaves, if it was refitted.
+    """
+    pressure = names().index(GUSTS)
+    known = [first.column]
+    if first.column == GUST_COLUMN:
+        evidence, reference, known = evidence.freed(pressure), reference.beside(), []
+    skipped = {GUST_COLUMN, first.column, *([] if known else [pressure])}
+    others = [w for w in ranking if w.column not in skipped]
+    pairs = gains(evidence, [known, *([*known, w.column] for w in others)])
+    for place in np.argsort(-pairs[1:].sum(axis=1)):
+        second, both = others[place], [*known, others[place].column]
+        if not _leads(pairs[1 + place], pairs[0], evidence.recording):
+            return None
+        value, _ = evidence.fit(both).of(second.column)
+        constant = all(_homogeneous_beside(evidence, both, w, level) for w in (first, second) if w.column in both)
+        if _physical(_described(second), value) and constant and reference.p_left_by(evidence, names(), both) > level:
+            return second
+    return None
+
+
+def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed, level: float) -> bool:
+    """Whether a strength is the same in all recordings, where some columns are fitted to each."""
+    found = heterogeneity(
+        _each(evidence, chosen, weighed.column, about=0.0, larger=_larger(evidence, weighed), unit="1")
+    )
+    return found is None or found > level
+
+
+def _larger(evidence: Evidence, weighed: Weighed) -> float:
+    """By how much a strength's standard error is larger than Σ says when it is fitted alone."""
+    return weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
+
+
+def _each(
+    evidence: Evidence, chosen: Sequence[int], column: int, *, about: float, larger: float, unit: str
+) -> tuple[Estimate, ...]:
+    """The strength of a column in each recording alone, where some columns are fitted to it.
+
+    Args:
+        about: the strength in the model that the evidence is of.
+        larger: by how much its standard errors are larger than Σ says.
+    """
+    made: list[Estimate] = []
+    for index in np.unique(evidence.recording):
+        value, claimed = evidence.select(evidence.recording == index).fit(chosen).of(column)
+        made.append(estimate(about + value, larger * claimed, unit))
+    return tuple(made)
+
+
+def _described(weighed: Weighed) -> Parameter:
+    return EFFECTS[weighed.candidate.effect].parameters()[weighed.candidate.parameter]
+
+
+def _physical(described: Parameter, coefficient: float) -> bool:
+    """Whether a strength beyond null is one that the effect may have."""
+    least, most = described.admissible
+    return least <= described.null + coefficient <= most
+
+
+def _weigh(
+    evidence: Evidence,
+    reference: Reference,
+    column: int,
+    effect: EffectColumn,
+    linear: Floats,
+    statistics: Floats,
+    refitted: Refit | None,
+    *,
+    lost: bool,
+) -> Weighed:
+    fit = evidence.fit([column])
+    value, _ = fit.of(column)
+    # The standard error is that which makes the nulls' mean squared z 1.
+    statistic = float(statistics[column])
+    error = abs(value) / math.sqrt(max(statistic, 1e-12))
+    z = value / error if error > 0 else 0.0
+    gained, leftover = linear, refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column])
+    left, null = evidence, effect.described.null
+    if refitted is not None:
+        gained, value, left = refitted.gains, refitted.coefficient, refitted.evidence
+    about = null + (value if refitted else 0.0)
+    by_recording = _each(left, [column], column, about=about, larger=error / fit.of(column)[1], unit=effect.unit)
+    return Weighed(
+        column=column, error=error, gains=gained, recording=evidence.recording,
+        admissible=_physical(effect.described, value) and not lost,
+        candidate=Candidate(
+            effect=effect.effect, parameter=effect.parameter, null=null,
+            strength=strength(null, value, error, effect.unit),
+            z=z, p_value=reference.p_alone(statistic, column),
+            p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
+            gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
+            by_recording=by_recording, heterogeneity=heterogeneity(by_recording),
+        ),
+    )  # fmt: skip
+
+
+def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
+    """Gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by twice their intensity."""
+    place = names().index(GUSTS)
+    found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
+    described = EFFECTS["gusts"].parameters()["intensity"]
+    variation = _varying(evidence)
+    unlike = "" if variation is None or variation.turbulent else variation.words
+    by_recording = []
+    for index in np.unique(evidence.recording):
+        own = fluctuation(evidence.select(evidence.recording == index), place)
+        by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
+    return Weighed(
+        column=GUST_COLUMN, gains=gained, recording=evidence.recording, error=found.error / 2,
+        admissible=bool(found.deviation > CRITERIA.reach * found.error) and not unlike, unlike=unlike,
+        candidate=Candidate(
+            effect="gusts", parameter="intensity", null=described.null,
+            strength=strength(described.null, found.deviation / 2, found.error / 2, described.unit),
+            z=math.sqrt(statistic), p_value=reference.p_alone(statistic, len(names())),
+            p_family=reference.p_family(statistic, len(names())),
+            gain=float(gained.sum()), gain_error=total_error(gained, evidence.recording), behind=0.0,
+            leftover=reference.beside().p_left_by(evidence.freed(place), names(), ()), by_recording=tuple(by_recording),
+        ),
+    )  # fmt: skip
+
+
+def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
+    """The strength of an effect, by its coefficient beyond null and the standard error that nulls leave."""
+    return estimate(null + coefficient, math.hypot(error, CRITERIA.response * coefficient), unit)
+
+
+def estimate(value: float, error: float, unit: str) -> Estimate:
+    """A normal interval at the level of all intervals."""
+    return Estimate(
+        value=value, low=value - CRITERIA.reach * error, high=value + CRITERIA.reach * error, unit=unit,
+        level=CRITERIA.interval,
+    )  # fmt: skip
+
+
+def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """By held-out gain, those first that are admissible."""
+    ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
+    return [replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered]
+
+
+def _behind(best: Weighed, other: Weighed) -> float:
+    """Standard errors of the paired difference."""
+    if other is best:
+        return 0.0
+    difference = best.gains - other.gains
+    error = total_error(difference, best.recording)
+    return float(difference.sum() / error) if error > 0 else 0.0
+
+
+def _reason(best: Weighed, other: Weighed, why: str) -> str:
+    if why:
+        return why
+    if not other.admissible and other.unlike:
+        return other.unlike
+    if not other.admissible and other.column == GUST_COLUMN:
+        return "their intensity cannot be told from zero"
+    if not other.admissible:
+        strength = other.candidate.strength
+        unit = "" if strength.unit == "1" else f" {strength.unit}"
+        return f"no cloth has it at the strength that fits, {number(strength.value)}{unit}"
+    if not _leads(other.gains, 0 * other.gains, other.recording):
+        return "it predicts unseen recordings no better than the base model"
+    if _leads(best.gains, other.gains, other.recording):
+        return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
+    return "the errors that remain are larger than those of nulls, or a force outside the library predicts better"

@@ -1,0 +1,270 @@
+"""Models run on recordings and times that they were not fitted to, beside the numerical floor.
+
+The floor is what numerics leave: the error at which a model predicts recordings of itself that others simulated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from flagdata.rng import child_seed
+from measure.forecasting.model import Model, errors_of
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.segments import Segments
+from measure.forecasting.setting import Setting
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop.gauss_newton import Refined, finished
+from measure.nulls.simulation import NullBatch
+from measure.observe.anchors import as_seen
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Comparison, Estimate
+
+Floats = NDArray[np.float64]
+_DURATION = 4.5  # s: two segments of each recording
+_ENOUGH = 3
+"""Segments of a recording beyond which two may be left out."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fold:
+    """Segments that are left out of a fit, and what is left out in words."""
+
+    words: str
+    outside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """Refitted models run on what they were not fitted to.
+
+    Attributes:
+        comparisons: one a fold.
+        apart: (segment,) half misfit (see `whitened_misfit`) of the control less that of the effect, each segment of
+            the recordings left out in turn (of a single recording: of its last part); None without a control.
+        recording: (segment,) what was left out together with each.
+    """
+
+    comparisons: tuple[Comparison, ...] = ()
+    apart: Floats | None = None
+    recording: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def control(self) -> Estimate | None:
+        """Control less after, a segment [nat]; None without a control."""
+        return None if self.apart is None else a_segment(self.apart, self.recording)
+
+
+def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
+    """Standard error of a sum over segments (segment,) that are drawn within recordings.
+
+    Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
+    single segment, segments are taken to be drawn from all.
+    """
+    if len(values) < 2:
+        return math.inf
+    return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in _strata(values, recording)))
+
+
+def _strata(values: Floats, recording: NDArray[np.int64]) -> list[Floats]:
+    own = [values[recording == index] for index in np.unique(recording)]
+    return own if min(len(part) for part in own) > 1 else [values]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Predictions:
+    """What one model says of segments: errors and predicted markers (frame, marker, 3, segment) [m]."""
+
+    errors: Floats
+    predicted: Floats
+
+    @property
+    def squared(self) -> Floats:
+        """(segment,) mean squared distance [m²]."""
+        return _squared(self.errors)
+
+
+def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
+    """Each recording left out in turn, where there are two or more, and the last part of every recording: a third, but
+    two segments of four or more, so that chance within a recording shows."""
+    recording = segments.recording
+    result: list[Fold] = []
+    if len(np.unique(recording)) > 1:
+        result += [
+            Fold(words=f"recording at {speeds[index]:.1f} m/s, unseen", outside=recording == index)
+            for index in np.unique(recording)
+        ]
+    late = np.zeros(len(recording), dtype=bool)
+    for index in np.unique(recording):
+        own = np.flatnonzero(recording == index)
+        late[own[-max(2 if len(own) > _ENOUGH else 1, len(own) // 3) :]] = True
+    if not late.all():
+        result.append(Fold(words="last part of each recording, unseen", outside=late))
+    return tuple(result)
+
+
+def predict(
+    forecaster: Forecaster,
+    segments: Segments,
+    model: Model,
+) -> Predictions:
+    """Predictions of segments by a model."""
+    errors, predicted = forecaster.run(*model.system(forecaster, segments), segments)
+    return Predictions(errors=_array(errors), predicted=_array(predicted))
+
+
+def _array(values: torch.Tensor) -> Floats:
+    return values.double().cpu().numpy()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeftOut:
+    """What a model leaves of segments it was not fitted to: (segment,) mean squared distances [m²], half misfits."""
+
+    squared: Floats
+    misfit: Floats
+
+
+def left_out(
+    forecaster: Forecaster,
+    segments: Segments,
+    fitted: Refined,
+    whitened: WhitenedMisfit,
+    outsides: Sequence[NDArray[np.bool_]],
+) -> list[LeftOut]:
+    """What a model leaves, each time fitted to the other segments alone."""
+    begun = [fitted.without(outside) for outside in outsides]
+    ended = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
+    models = [model for model, _ in ended]
+    return measured(forecaster, segments, models, whitened, outsides, fitted.chosen)
+
+
+def measured(
+    forecaster: Forecaster,
+    segments: Segments,
+    models: Sequence[Model],
+    whitened: WhitenedMisfit,
+    outsides: Sequence[NDArray[np.bool_]],
+    chosen: Sequence[int] = (),
+) -> list[LeftOut]:
+    """What models leave as they are; what each leaves along the nuisances and chosen columns is fitted to the other
+    segments."""
+    every = errors_of(models, forecaster, segments)
+    return [
+        LeftOut(
+            squared=_squared(_array(errors))[outside] / segments.tracked[outside],
+            misfit=whitened.of(errors).left_out(outside, chosen),
+        )
+        for errors, outside in zip(every, outsides, strict=True)
+    ]
+
+
+def _squared(errors: Floats) -> Floats:
+    """(segment,) mean squared distance [m²]."""
+    return (errors**2).sum(axis=2).mean(axis=(0, 1))
+
+
+def compare(
+    fold: Fold,
+    *,
+    recording: NDArray[np.int64],
+    frames: int,
+    before: LeftOut,
+    after: LeftOut,
+    control: LeftOut | None,
+    control_name: str,
+    floor: Floats,
+) -> Comparison:
+    """Errors of the segments left out.
+
+    Args:
+        recording: (segment,) of those left out.
+        floor: (segment,) mean squared distances of data simulated from the larger model, which it predicts with other
+            numerics [m²].
+    """
+    old, new = before.squared, after.squared
+    return Comparison(
+        what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
+        floor=root(floor), oracle=None, share=share_removed(old, new, floor),
+        control=None if control is None else root(control.squared), control_name=control_name,
+        apart=None if control is None else a_segment(control.misfit - after.misfit, recording),
+    )  # fmt: skip
+
+
+def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
+    """Share of the mean square above the floor that is gone after; None where there is hardly anything above it.
+
+    Args:
+        before, after, floor: (segment,) mean squared distances [m²].
+    """
+    most = float(before.mean())
+    room = most - min(float(floor.mean()), most)
+    return float(before.mean() - after.mean()) / room if room > CRITERIA.room * most else None
+
+
+def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:
+    """Mean of misfits over segments, drawn within recordings, with Student's interval [nat]."""
+    value, reach = float(values.mean()), math.inf
+    if len(values) > 1:
+        free = len(values) - len(_strata(values, recording))
+        quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, free))
+        reach = quantile * total_error(values, recording) / len(values)
+    return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=CRITERIA.interval)
+
+
+def root(squared: Floats) -> Estimate:
+    """Root of the mean over segments, with Student's interval of the mean, through the root [m]."""
+    mean = float(squared.mean())
+    reach = _reach(squared)
+    return Estimate(
+        value=math.sqrt(mean), low=math.sqrt(max(mean - reach, 0.0)), high=math.sqrt(mean + reach), unit="m",
+        level=CRITERIA.interval,
+    )  # fmt: skip
+
+
+def paired(before: Floats, after: Floats) -> Estimate:
+    """Difference of roots of means, paired by segment: linear in the squares, for which Student's interval holds."""
+    slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
+    value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
+    return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)
+
+
+def _reach(values: Floats) -> float:
+    if len(values) < 2:
+        return math.inf
+    quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, len(values) - 1))
+    return quantile * float(values.std(ddof=1)) / math.sqrt(len(values))
+
+
+def numerical_floor(
+    setting: Setting, recordings: NDArray[np.int64], model: Model, *, copies: int, seed: int
+) -> tuple[NDArray[np.int64], Floats]:
+    """Errors of segments simulated from a model by other numerics and predicted by it.
+
+    Args:
+        recordings: of the experiment, in whose winds is simulated.
+        copies: simulations of each.
+
+    Returns:
+        (segment,) the recording in whose wind it is, and its mean squared distance [m²].
+    """
+    first = setting.experiment.recordings[0]
+    simulated = np.tile(recordings, copies)
+    batch = NullBatch(
+        specimen=setting.experiment.specimen, markers=first.markers, rate=1 / setting.segments.period,
+        duration=_DURATION,
+        noise=first.noise, calibrations=(model.calibration,) * len(simulated),
+        speeds=tuple(float(u) for u in setting.speeds[simulated]),
+        seed=child_seed(seed, "floor"), effects=model.acting,
+    )  # fmt: skip
+    made = batch.simulate()
+    segments = Segments.of(made)
+    forecaster = replace(setting.forecaster, specimen=as_seen(batch.specimen, made))
+    squared = predict(forecaster, segments, model).squared
+    return simulated[segments.recording], squared

@@ -1,0 +1,257 @@
+"""Banks of null recordings, built batch by batch into a folder: a build that was stopped goes on where it was.
+
+A bank about one posterior is a parametric bootstrap by brute force. A bank over priors serves every recording of such
+a design: an amortised null.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from io import BytesIO
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from flagdata.errors import CorruptError, LimitError, NotFoundError, UsageError
+from flagdata.lake.durable import put_if_absent
+from flagdata.rng import child_seed, stream
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import Calibration, Column, columns, names
+from measure.forecasting.segments import Segments
+from measure.inference.random_effect import Nulls
+from measure.nulls.reference import NullBank
+from measure.nulls.simulation import NullBatch
+from measure.observe.anchors import as_seen
+from measure.observe.trajectory import Floats, Specimen, Trajectory
+from measure.probes.course import Course
+from measure.probes.statistics import Statistics, statistics
+from sim.integrate.split import SplitEuler
+
+WINDS = 4
+"""Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
+differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
+_VERSION = 3
+"""Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
+3: sensitivities of how cloth bends in double precision."""
+_SEGMENTS = (
+    "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
+    "turned", "turning", "moment", "course", "course_curvature",
+)  # fmt: skip
+"""Arrays with a row for each segment."""
+FILE_LIMIT = 4 << 30
+"""Largest batch that is read, unpacked [B]."""
+_DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
+_STRETCHING = (0.5, 2.0)
+Progress = Callable[[int], object]
+
+
+def each(segments: int) -> int:
+    """Segments of each recording of a null experiment, for data of so many in all."""
+    return max(2, math.ceil(segments / WINDS))
+
+
+def around(slowest: float, fastest: float) -> tuple[float, float]:
+    """The winds of nulls for data of such winds [m/s]: somewhat beyond them."""
+    return 0.9 * slowest, 1.1 * fastest
+
+
+def prior_batch(
+    specimen: Specimen,
+    *,
+    markers: Floats,
+    rate: float,
+    duration: float,
+    noise: float,
+    speeds: tuple[float, float],
+    seed: int,
+) -> NullBatch:
+    """A null experiment over the priors: one cloth in four winds, one from each quarter of `speeds`.
+
+    Density and bending are log-uniform about the nominal ones, damping and the factor on the tables of stretching
+    log-uniform.
+    """
+    rng = stream(seed, "null", "prior")
+    cloth = Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
+    shares = (np.arange(WINDS) + rng.random(WINDS)) / WINDS
+    return NullBatch(
+        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=(cloth,) * WINDS,
+        stretching=_log(rng, _STRETCHING),
+        speeds=tuple(float(u) for u in speeds[0] + (speeds[1] - speeds[0]) * shares),
+        seed=child_seed(seed, "null", "batch"),
+    )  # fmt: skip
+
+
+def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
+    return float(np.exp(rng.uniform(math.log(span[0]), math.log(span[1]))))
+
+
+def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tuple[Nulls, float]:
+    """Simulate a batch and take its statistics along columns, each recording's at the calibration that it was simulated
+    with, as those of data are taken at the fitted one; with the duration of a segment [s]."""
+    recordings = batch.simulate()
+    segments = Segments.of(recordings).tied(_anchors(batch, recordings))
+    forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
+    own = [batch.calibrations[recording] for recording in segments.recording]
+    found = statistics(forecaster, segments, own, weighed)
+    cloths = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
+    nulls = Nulls(
+        statistics=found, speeds=np.array(batch.speeds)[found.recording], calibration=cloths[found.recording],
+        numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
+        period=np.full(len(found.recording), segments.period),
+        cloth=np.full(len(found.recording), batch.specimen.material.fingerprint),
+    )  # fmt: skip
+    return nulls, segments.duration
+
+
+def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
+    """(held, 3) for each recording [m]; where they are not told, taken from all recordings of its cloth."""
+    cloths: dict[Calibration, list[Trajectory]] = {}
+    for cloth, recording in zip(batch.calibrations, recordings, strict=True):
+        cloths.setdefault(cloth, []).append(recording)
+    known = {cloth: as_seen(batch.specimen, own).anchors for cloth, own in cloths.items()}
+    return [known[cloth] for cloth in batch.calibrations]
+
+
+def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
+    """Evaluate the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
+    left alone with one.
+
+    Args:
+        progress: called with the number of batches done.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = [index for index in range(len(batches)) if not _file(folder, index).exists()]
+    missing.sort(key=lambda index: -batches[index].effort)
+    if progress is not None:
+        progress(len(batches) - len(missing))
+    context = get_context("spawn")
+    with ProcessPoolExecutor(
+        max_workers=workers, mp_context=context, initializer=torch.set_num_threads, initargs=(1,)
+    ) as pool:
+        running = [pool.submit(_cache, folder, batches[index], index) for index in missing]
+        for done in as_completed(running):
+            done.result()
+            if progress is not None:
+                progress(1)
+
+
+def _cache(folder: Path, batch: NullBatch, index: int) -> None:
+    nulls, duration = evaluate(batch, index, columns())
+    own = nulls.statistics
+    if own.lines is None or own.turning is None or own.course is None:
+        raise UsageError("no spectra, moments or courses", where="null bank", fix="take statistics by `statistics`")
+    buffer = BytesIO()
+    np.savez(
+        buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
+        response=own.response, error=own.error, marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds,
+        calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
+        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told), turned=own.turning.r,
+        turning=own.turning.response, moment=own.turning.error, course=own.course.score,
+        course_curvature=own.course.curvature,
+    )  # fmt: skip
+    put_if_absent(_file(folder, index), buffer.getvalue())
+
+
+def _file(folder: Path, index: int) -> Path:
+    return folder / f"nulls-{index:04d}.npz"
+
+
+def _content(path: Path) -> Mapping[str, np.ndarray]:
+    """What a file of a bank holds, each of the batch's segments in all its arrays."""
+    rebuild = "delete it and build the bank again"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > FILE_LIMIT:
+            raise LimitError(f"a batch of nulls of {size} bytes", where=str(path), fix=f"at most {FILE_LIMIT} are read")
+        with np.load(path, allow_pickle=False) as stored:
+            content = {name: np.asarray(stored[name]) for name in stored.files}
+    except LimitError:
+        raise
+    except Exception as error:  # noqa: BLE001  zip, zlib and numpy each raise errors of their own kinds
+        raise CorruptError(f"not a batch of nulls: {error}", where=str(path), fix=rebuild) from None
+    if not set(content) >= {*_SEGMENTS, "version", "columns", "duration", "anchors_told"}:
+        raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
+    if content["version"].ravel().tolist() != [_VERSION]:
+        raise CorruptError("its arrays are those of another version", where=str(path), fix="build the bank again")
+    if tuple(content["columns"].ravel().tolist()) != names():
+        raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
+    segments = content["recording"].size
+    kinds = {name: "U" if name == "cloth" else "biuf" for name in _SEGMENTS}
+    wrong = [
+        name for name, kind in kinds.items()
+        if content[name].dtype.kind not in kind or content[name].shape[:1] != (segments,)
+    ]  # fmt: skip
+    single = all(
+        content[name].size == 1 and content[name].dtype.kind in "biuf" for name in ("duration", "anchors_told")
+    )
+    if wrong or not segments or not single:
+        raise CorruptError(
+            f"its arrays do not fit one another: {', '.join(wrong) or 'recording, duration or anchors_told'}",
+            where=str(path), fix=rebuild,
+        )  # fmt: skip
+    return content
+
+
+def _number(path: Path) -> int:
+    number = path.stem.partition("-")[2]
+    if not number.isdecimal():
+        raise CorruptError("not a file of a bank", where=str(path), fix="move it out of the folder")
+    return int(number)
+
+
+def files(folder: Path) -> list[Path]:
+    """The batches of a folder."""
+    return sorted(folder.glob("nulls-*.npz"))
+
+
+def load(folder: Path, *, words: str) -> NullBank:
+    """The bank of a folder.
+
+    Raises:
+        NotFoundError: no batches there.
+        CorruptError: a file that cannot be read, or of other columns.
+        InputError: too few batches.
+    """
+    paths = files(folder)
+    if not paths:
+        raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
+    parts: list[Nulls] = []
+    durations: set[float] = set()
+    told: set[bool] = set()
+    count = 0
+    for path in paths:
+        content = _content(path)
+        own = Statistics(
+            recording=content["recording"] + count, r=content["r"], response=content["response"],
+            error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
+            turning=Statistics(
+                recording=content["recording"] + count, r=content["turned"], response=content["turning"],
+                error=content["moment"], marker_error=content["moment"][:, None],
+            ),
+            course=Course(score=content["course"], curvature=content["course_curvature"]),
+        )  # fmt: skip
+        numerics = np.full(len(own.r), _number(path))
+        parts.append(
+            Nulls(
+                statistics=own, speeds=content["speeds"], calibration=content["calibration"], numerics=numerics,
+                noise=content["noise"], period=content["period"], cloth=content["cloth"],
+            )
+        )  # fmt: skip
+        durations.add(round(float(content["duration"]), 1))
+        told.add(bool(content["anchors_told"]))
+        count = int(own.recording.max()) + 1
+    if len(durations) > 1 or len(told) > 1:
+        lengths = ", ".join(f"{d:g} s" for d in sorted(durations))
+        raise CorruptError(
+            f"segments of {lengths}, anchors {' and '.join('told' if t else 'taken from recordings' for t in told)}",
+            where=str(folder), fix="build a bank of one design into a folder of its own",
+        )  # fmt: skip
+    return NullBank(
+        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_told=told.pop()
+    )

@@ -1,0 +1,408 @@
+"""What the tests' statistics are when nothing is missing: groups of null recordings that the null model did not see."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.rng import stream
+from measure.forecasting.regressors import THETA, Calibration
+from measure.forecasting.setting import Design
+from measure.inference.evidence import Evidence, best_gain
+from measure.inference.fluctuation import fluctuation
+from measure.inference.growth import power
+from measure.inference.random_effect import NullModel, Nulls
+from measure.nulls.conformal import GroupedConformal, kinds_needed
+from measure.probes.lines import Line, Lines, strongest
+from measure.probes.rows import Rows
+from measure.verdict.criteria import CRITERIA
+
+Floats = NDArray[np.float64]
+_GROUPS = 400
+_DAMPING = [name for name, *_ in THETA].index("damping")
+GUSTS = "air-density.change"
+"""The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeftOut:
+    """A null experiment, and a null model that has not seen its kind of numerics.
+
+    Attributes:
+        model: learnt from all other kinds, for its design.
+        outside: the nulls of this experiment.
+        groups: places among them.
+    """
+
+    model: NullModel
+    outside: Nulls
+    groups: tuple[NDArray[np.int64], ...]
+
+
+def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOut]:
+    """Groups like data, of each experiment in turn: so many segments of its recordings.
+
+    Args:
+        nulls: what the null models learn from.
+        pool: those of them that groups are made of.
+
+    Raises:
+        InputError: an experiment has fewer segments.
+    """
+    rng = stream(seed, "null", "groups")
+    each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
+    for index in range(pool.experiment.max() + 1):
+        outside = pool.select(pool.experiment == index)
+        recording = outside.statistics.recording
+        places = [np.flatnonzero(recording == r) for r in np.unique(recording)]
+        groups: list[NDArray[np.int64]] = []
+        for _ in range(each):
+            chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
+            if len(chosen) < segments:
+                raise InputError(
+                    f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
+                    fix="simulate longer nulls, or give shorter recordings",
+                )  # fmt: skip
+            groups.append(chosen)
+        others = nulls.select(nulls.numerics != outside.numerics[0])
+        yield LeftOut(model=NullModel.fit(others, outside.design), outside=outside, groups=tuple(groups))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NullBank:
+    """Null recordings.
+
+    Attributes:
+        nulls: their segments.
+        columns: names of the columns.
+        duration: of a segment [s].
+        words: how they were made.
+        anchors_told: whether they were predicted with the anchors they were simulated with.
+
+    Raises:
+        InputError: too few of them, or all of the same numerics.
+    """
+
+    nulls: Nulls
+    columns: tuple[str, ...]
+    duration: float
+    words: str
+    anchors_told: bool = True
+
+    def __post_init__(self) -> None:
+        kinds = len(np.unique(self.nulls.numerics))
+        if kinds < CRITERIA.fewest_kinds:
+            raise InputError(
+                f"nulls of {kinds} kinds of numerics", where="null bank",
+                fix=f"simulate at least {CRITERIA.fewest_kinds}, and {kinds_needed(CRITERIA.level)} to test at a level "
+                f"of {CRITERIA.level:g}",
+            )  # fmt: skip
+
+    def model(self, design: Design) -> NullModel:
+        """Learnt from all, for data of a design."""
+        return NullModel.fit(self.nulls, design)
+
+    def plain(self) -> NullBank:
+        """For those who look at the errors alone: without moments about the pole and the wind's course."""
+        own = replace(self.nulls.statistics, turning=None, course=None)
+        return replace(self, nulls=replace(self.nulls, statistics=own))
+
+    def reference(self, segments: int, *, noise: float, seed: int) -> Reference:
+        """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
+        that has seen none of its numerics.
+
+        Args:
+            noise: of the data's markers [m].
+
+        Raises:
+            InputError: no experiment has that many segments, or too few kinds have such noise.
+        """
+        plain: list[_Found] = []
+        beside_gusts: list[_Found] = []
+        for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
+            evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model)
+            for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
+                picked, own = evidence.select(chosen), kept.outside.select(chosen[:1])
+                plain.append(_Found.of(picked, self.columns, own))
+                beside_gusts.append(_Found.of(picked.freed(self.columns.index(GUSTS)), self.columns, own))
+        beside = Reference.of(_Found.joined(beside_gusts), noise)
+        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Found(Rows):
+    """Statistics of null groups.
+
+    Attributes:
+        shares: (group, column) of `unscaled`.
+        left: (group,) what the base model leaves.
+        gained: (group,) best held-out gains.
+        swings: (group, part) of the wind's course, of no part where it is not looked at.
+        lines: (group, shape · axis) `strongest`; None where spectra are not looked at.
+        deviations: (group, theta) of the calibrated parameters from the true ones, in standard errors.
+        noise: (group,) of the markers [m].
+        kinds: (group,) of numerics.
+        damping: (group,) logarithm of its ratio to the nominal one.
+    """
+
+    shares: Floats
+    left: Floats
+    gained: Floats
+    swings: Floats
+    lines: Floats | None
+    deviations: Floats
+    noise: Floats
+    kinds: NDArray[np.int64]
+    damping: Floats
+
+    @classmethod
+    def of(cls, evidence: Evidence, columns: tuple[str, ...], own: Nulls) -> _Found:
+        """Of one group, whose statistics are at its true calibration.
+
+        Args:
+            own: one segment of it.
+        """
+        nominal = -own.calibration[0]
+        swing = np.zeros(0) if evidence.swing is None else evidence.swing
+        return cls(
+            shares=unscaled(evidence, columns)[None], left=np.array([evidence.fit(()).left]),
+            gained=np.array([best_gain(evidence)]), swings=swing[None],
+            lines=None if evidence.lines is None else strongest(evidence.lines)[None],
+            deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
+            noise=own.noise, kinds=own.numerics, damping=own.calibration[:, _DAMPING],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Usual:
+    """What the statistics of some null groups are like: see `Reference`."""
+
+    spread: Floats
+    centre: Floats
+    width: Floats
+    lines: Lines | None
+    powers: Floats
+
+    @classmethod
+    def of(cls, found: _Found) -> _Usual:
+        lines = None if found.lines is None else Lines.of(found.lines)
+        powers = np.array([power(np.abs(own), found.damping) for own in found.swings.T])
+        roots = _roots(found, lines, powers)
+        return cls(
+            powers=powers, spread=np.maximum(found.shares.mean(axis=0), _NOTHING), centre=roots.mean(axis=0),
+            width=np.maximum(roots.std(axis=0), np.cbrt(_NOTHING)), lines=lines,
+        )  # fmt: skip
+
+    def far(self, found: _Found) -> Floats:
+        """(group, column + 2 to 6) how far groups are from their mean, in their standard deviations."""
+        far = (_roots(found, self.lines, self.powers) - self.centre) / self.width
+        swings = slice(found.shares.shape[1] + 2, found.shares.shape[1] + 2 + found.swings.shape[1])
+        far[:, swings] = np.abs(far[:, swings])
+        return far
+
+
+def _roots(found: _Found, lines: Lines | None, powers: Floats) -> Floats:
+    swings = found.swings * np.exp(-np.outer(found.damping, powers))
+    roots = np.c_[np.cbrt(np.c_[found.shares, found.left, found.gained]), swings]
+    return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reference:
+    """Null distributions.
+
+    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the mean share of
+    nulls with about the same noise of the markers: 1 in the mean if nothing is missing. Sets whose errors are larger
+    all over are so no larger here, nor are those whose noise alone moves a column. One more statistic stands for gusts:
+    the likelihood ratio of a wind pressure that fluctuates, over one that differs by a constant.
+
+    Some columns are near their mean in all nulls, others are far from it in some. The tests compare how far from the
+    nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
+    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
+    the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
+    What the calibrated parameters and the directions of the numerics take in of an effect shows on winds that they were
+    not fitted to: so they weigh the best held-out gain as well.
+    So they do how the wind's course swings: a covariance, of which nulls have what chance and their numerics leave, on
+    either side of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
+    `growth`). Evidence whose moments or course are not to count goes
+    without them.
+
+    What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
+    had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).
+
+    Attributes:
+        scaled: (group, column) of `unscaled`: columns, gusts, then moments.
+        spread: (column,) mean share of nulls as noisy as the data.
+        far: (group, column + 2 to 6) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
+            standard deviations; after the columns that of what the base model leaves, then the best held-out gain,
+            swings and the line as they are.
+        kinds: (group,) of numerics.
+        deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
+            standard errors as Σ has them.
+        centre, width: (column + 2 to 6,) mean and standard deviation of the same, of nulls as noisy as the data.
+        lines: of the nulls; None where spectra are not looked at.
+        powers: (part,) of the damping by which swings grow.
+        damping: of the data, the logarithm of its ratio to the nominal one.
+        beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
+    """
+
+    scaled: Floats
+    spread: Floats
+    far: Floats
+    kinds: NDArray[np.int64]
+    deviations: Floats
+    centre: Floats
+    width: Floats
+    lines: Lines | None = None
+    powers: Floats = field(default_factory=lambda: np.zeros(0))
+    damping: float = 0.0
+    beside_gusts: Reference | None = None
+
+    @classmethod
+    def of(cls, found: _Found, noise: float, *, beside_gusts: Reference | None = None) -> Reference:
+        """For data of some noise [m].
+
+        Raises:
+            InputError: no nulls of such noise.
+        """
+        kinds = found.kinds
+        alike = np.abs(found.noise - noise) <= CRITERIA.alike_noise
+        count, needed = len(np.unique(kinds[alike])), kinds_needed(1 - CRITERIA.interval)
+        if count < needed:
+            raise InputError(
+                f"{count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
+                fix=f"build a bank of {needed} or more with such noise, or leave it out",
+            )  # fmt: skip
+        usual = _Usual.of(found.select(alike))
+        scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
+        for kind in np.unique(kinds):
+            own = kinds == kind
+            near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
+            if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds:  # else no others have such noise
+                near &= ~own
+            others = _Usual.of(found.select(near))
+            scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
+        return cls(
+            scaled=scaled, spread=usual.spread, far=far, kinds=kinds, deviations=found.deviations,
+            centre=usual.centre, width=usual.width, lines=usual.lines, powers=usual.powers,
+            beside_gusts=beside_gusts,
+        )  # fmt: skip
+
+    def at(self, calibration: Calibration) -> Reference:
+        """For data whose statistics are taken at a calibration."""
+        return replace(self, damping=calibration.steps_from(Calibration())[_DAMPING])
+
+    def beside(self) -> Reference:
+        """That of evidence with a pressure that is free in every segment.
+
+        Raises:
+            UsageError: this is it.
+        """
+        if self.beside_gusts is None:
+            raise UsageError("it is beside gusts itself", where="reference", fix="ask that of the bank")
+        return self.beside_gusts
+
+    @cached_property
+    def conformal(self) -> GroupedConformal:
+        """The global test: how far the farthest is of all columns, what is left and the line."""
+        return GroupedConformal(null=self.far.max(axis=1), kinds=self.kinds)
+
+    @cached_property
+    def reach(self) -> Floats:
+        """(theta,) standard errors, as Σ has them, to either side of an interval of the calibrated parameters: as many
+        as hold the true ones in a share of the kinds of numerics, themselves and one more counted, that is the
+        intervals' level."""
+        return np.array(
+            [
+                GroupedConformal(null=np.abs(own), kinds=self.kinds).quantile(CRITERIA.interval)
+                for own in self.deviations.T
+            ]
+        )
+
+    def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
+        """(column,) of data, as `scaled` has them, where some columns are fitted already."""
+        shares = unscaled(evidence, columns, beside)
+        return shares / self.spread[: len(shares)]
+
+    def p_family(self, statistic: float, column: int) -> float:
+        """Chance that in nulls any is as far as this column."""
+        return self.conformal.p(float(self._far(statistic * self.spread[column], column)))
+
+    def p_alone(self, statistic: float, column: int) -> float:
+        """The same for the column alone."""
+        return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
+
+    def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
+        """p of the global test on what some columns leave, fitted to the data."""
+        return self.conformal.p(self.farthest(evidence, columns, chosen))
+
+    def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
+        """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
+        shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
+        far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
+        gained = float(self._far(best_gain(evidence, chosen), len(self.spread) + 1))
+        swing, line = self.swing(evidence), self.line(evidence)
+        return max([far, gained, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
+
+    def swing(self, evidence: Evidence) -> float | None:
+        """How far the wind's course of data swings, by the part that does most; None where it is not looked at.
+
+        Raises:
+            UsageError: it is of the data, and was not of the nulls.
+        """
+        found = evidence.swing
+        if found is None:
+            return None
+        own = slice(len(self.spread) + 2, len(self.centre) - (self.lines is not None))
+        if len(self.centre[own]) != len(found):
+            raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
+        alike = found * np.exp(-self.damping * self.powers)
+        return float(np.abs((alike - self.centre[own]) / self.width[own]).max())
+
+    def line(self, evidence: Evidence) -> Line | None:
+        """The most prominent one of data; None where spectra are not looked at.
+
+        Raises:
+            UsageError: they are, of the data or of the nulls alone.
+        """
+        if self.lines is None and evidence.lines is None:
+            return None
+        if self.lines is None or evidence.lines is None:
+            raise UsageError(
+                "spectra of the nulls or of the data alone", where="reference", fix="look at lines in both or in none"
+            )
+        return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+
+    def _far(self, values: Floats | float, columns: int | slice) -> Floats:
+        """How far shares, what is left or the best gain lie, as `far` has it."""
+        return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
+
+
+_NOTHING = 1e-6
+"""Mean share below which a column is never seen: that of the columns that are always fitted."""
+
+
+def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
+    """Each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where moments
+    about the pole are looked at, then the same drops of these, and what they leave.
+
+    Args:
+        beside: columns that are fitted already.
+    """
+    drops, left = evidence.drops(beside), evidence.fit(beside).left
+    gusts = fluctuation(evidence, columns.index(GUSTS), beside).likelihood
+    found = np.append(_shares(drops, left), max(gusts, 0.0))
+    if evidence.turning is None:
+        return found
+    drops, left = evidence.turning.drops(beside), evidence.turning.fit(beside).left
+    return np.concatenate([found, _shares(drops, left), [left]])
+
+
+def _shares(drops: Floats, left: float) -> Floats:
+    return drops / np.maximum(left - drops, 1e-9)

@@ -1,0 +1,173 @@
+"""Recordings of the base model itself, made with other numerics than the fit's: its errors when it is right.
+
+Nothing of the fitter's numerics is used: meshes are finer by random factors, half of them irregular, and steps are
+shorter by other methods.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from flagdata.errors import FlagdataError
+from flagdata.rng import stream
+from measure.forecasting.regressors import Calibration
+from measure.observe.interpolation import onto
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from sim.effects import Effect, apply
+from sim.handles import Handles
+from sim.integrate import Integrator
+from sim.integrate.implicit import BackwardEuler
+from sim.integrate.split import SplitEuler
+from sim.integrate.symplectic import SAFETY, Symplectic
+from sim.mesh import Diagonals, Mesh, grid
+from sim.scene import Scene, assemble
+
+Floats = NDArray[np.float64]
+
+_SETTLE = 3.0  # s; a flag of 1.5 m has forgotten a start from rest after two swings
+_FINER = (1.3, 1.75)
+_STEPS = (1e-3, 2e-3)  # s, of backward Euler
+_UNEVEN = 0.2  # share of the spacing by which inner vertices are moved at most
+_HALVINGS = 3  # of the step of a run that diverges
+_GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NullBatch:
+    """Null recordings that are simulated together, on one mesh by one method.
+
+    Attributes:
+        specimen: the cloth, its mesh that of the fit.
+        markers: (marker, 2) [m].
+        rate: [Hz].
+        duration: of each recording [s].
+        noise: standard deviation of a marker's coordinate [m].
+        calibrations: one a recording.
+        speeds: of the wind, along +x, one a recording [m/s].
+        seed: of the numerics, the starts and the noise.
+        stretching: factor on the nominal tables of stretching.
+        effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
+    """
+
+    specimen: Specimen
+    markers: Floats
+    rate: float
+    duration: float
+    noise: float
+    calibrations: tuple[Calibration, ...]
+    speeds: tuple[float, ...]
+    seed: int
+    stretching: float = 1.0
+    effects: tuple[Effect, ...] = ()
+
+    def simulate(self) -> list[Trajectory]:
+        """One recording a calibration."""
+        flat, held = self._mesh()
+        seen = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, held))
+        jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
+        return [
+            Trajectory(
+                name=f"null {self.seed}-{place}", markers=self.markers, positions=seen[..., place] + jitter[..., place],
+                rate=self.rate, wind=WindTrack.constant((speed, 0.0, 0.0)), noise=self.noise,
+            )
+            for place, speed in enumerate(self.speeds)
+        ]  # fmt: skip
+
+    @property
+    def effort(self) -> float:
+        """About how much work it is, in vertices: explicit steps take twice as long."""
+        integrator, _ = self._method()
+        return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
+
+    def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
+        """A finer mesh in the fit's frame, and its vertices nearest to the attachments: a grid, or in half of the draws
+        one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
+        rng = stream(self.seed, "null", "mesh")
+        rest = self.specimen.mesh.rest
+        low, size = rest.min(axis=0), np.ptp(rest, axis=0)
+        spacing = math.sqrt(size[0] * size[1] / self.specimen.mesh.vertex_count) / rng.uniform(*_FINER)
+        columns, rows = (max(2, round(extent / spacing)) for extent in size)
+        diagonals = list(Diagonals)[rng.integers(2)]
+        flat = grid(width=float(size[0]), height=float(size[1]), columns=columns, rows=rows, diagonals=diagonals)
+        if rng.random() < 0.5:
+            flat = _irregular(flat, spacing, rng)
+        flat = replace(flat, rest=flat.rest + low)
+        held = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
+        return flat, tuple(held)
+
+    def _frames(self, flat: Mesh, held: tuple[int, ...]) -> Floats:
+        """(frame, vertex, 3, recording) [m], after the start has been forgotten.
+
+        Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew in smaller steps.
+
+        Raises:
+            FlagdataError: it diverges in the smallest steps as well.
+        """
+        for halvings in range(1 + _HALVINGS):
+            found = self._run(flat, held, halvings)
+            if np.isfinite(found).all():
+                return found
+        raise FlagdataError(
+            f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
+            where=f"{self.calibrations[0]}, stretching × {self.stretching:.3g}, winds "
+            f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
+            fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
+        )  # fmt: skip
+
+    def _run(self, flat: Mesh, held: tuple[int, ...], halvings: int) -> Floats:
+        """The same in steps that were halved so often; not finite where it diverges."""
+        specimen = self.specimen
+        integrator, damped = self._method(halvings)
+        lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
+        offset = flat.rest - specimen.mesh.rest[lowest]
+        start = specimen.anchors[np.argmin(specimen.anchors[:, 2])] + np.stack(
+            [offset[:, 0], 0 * offset[:, 0], offset[:, 1]], axis=1
+        )
+        roughness = 2e-3 * stream(self.seed, "null", "start").standard_normal((len(self.speeds), *start.shape))
+        scenes = []
+        for calibration, rough, speed in zip(self.calibrations, roughness, self.speeds, strict=True):
+            position = start + rough
+            position[list(held)] = specimen.anchors
+            material = calibration.material(specimen.material.scaled(stretching=self.stretching))
+            scenes.append(
+                Scene(
+                    mesh=flat, position=position, gravity=specimen.gravity, air=specimen.air, wind=(speed, 0.0, 0.0),
+                    material=replace(material, damping=max(material.damping - damped, 0.0)),
+                    handles=Handles(vertices=held, stiffness=specimen.stiffness),
+                )
+            )  # fmt: skip
+        system, state = apply(self.effects, *assemble(scenes))
+        frames = []
+        with torch.no_grad():
+            for frame in range(round((_SETTLE + self.duration) * self.rate)):
+                state = integrator.advance(system, state, 1 / self.rate)
+                if frame >= round(_SETTLE * self.rate):
+                    frames.append(state.position.double().numpy().copy())
+        return np.stack(frames)
+
+    def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
+        """A method for these dampings with steps that were halved so often, and the damping it adds by itself [s]."""
+        if max(c.damping for c in self.calibrations) <= _GENTLE and not self.effects:
+            return Symplectic(safety=SAFETY / 2**halvings), 0.0
+        step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))] / 2**halvings
+        base = BackwardEuler(step=step, tolerance=1e-4)
+        return SplitEuler(base=base) if self.effects else base, step
+
+
+def _irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
+    """A grid's vertices, those inside moved by up to `_UNEVEN` of the spacing [m] along each axis, joined anew."""
+    low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
+    inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)
+    rest = flat.rest + np.where(inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0)
+    faces = np.asarray(Delaunay(rest).simplices, dtype=np.int64)
+    (a, b), (c, d) = (rest[faces[:, k]].T - rest[faces[:, 0]].T for k in (1, 2))
+    doubled = a * d - b * c
+    faces[doubled < 0] = faces[doubled < 0][:, ::-1]
+    # Vertices along an edge lie on a line but for rounding, which may join three of them.
+    return Mesh(rest=rest, faces=faces[np.abs(doubled) > spacing**2 * np.finfo(np.float32).eps])

@@ -1,0 +1,88 @@
+"""Null recordings for an experiment: a bank that is given, or one simulated for it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from flagdata.errors import InputError
+from flagdata.rng import child_seed
+from measure.forecasting.setting import Setting, Stage
+from measure.nulls import bank as banks
+from measure.nulls.reference import NullBank
+from measure.nulls.simulation import NullBatch
+
+
+def supplied(setting: Setting, *, bank: Path | None, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
+    """The bank of a folder where one is named; else one of so many nulls, simulated for an experiment.
+
+    Raises:
+        FlagdataError: as `given`.
+    """
+    if bank is not None:
+        return given(bank, setting)
+    return simulated(setting, nulls=nulls, seed=seed, workers=workers, stage=stage)
+
+
+def given(folder: Path, setting: Setting) -> NullBank:
+    """The bank of a folder, made as `measure.nulls.bank` does.
+
+    Raises:
+        InputError: its segments or anchors are not like the recordings'.
+        FlagdataError: as `measure.nulls.bank.load`.
+    """
+    bank = banks.load(folder, words=f"over priors, from {folder.name}")
+    check(bank, setting, where=str(folder))
+    return bank
+
+
+def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
+    """Refuse nulls that do not fit the recordings.
+
+    Raises:
+        InputError: segments of another length, or anchors known in another way.
+    """
+    if bank.anchors_told != setting.experiment.specimen.anchors_told:
+        ways = ("taken from where the recordings show the attachments", "told")
+        raise InputError(
+            f"its anchors were {ways[bank.anchors_told]}, those of the recordings are {ways[not bank.anchors_told]}",
+            where=where, fix="simulate nulls for these recordings: leave the bank out",
+        )  # fmt: skip
+    if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
+        raise InputError(
+            f"its segments last {bank.duration:.2g} s, those of the recordings {setting.segments.duration:.2g} s",
+            where=where, fix="simulate nulls for these recordings: leave the bank out; or record for longer",
+        )  # fmt: skip
+
+
+def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
+    """Nulls over the priors of the cloth, of the winds of an experiment: a batch for each kind of numerics. Those of
+    one cloth hold as many segments as the data, and are as noisy as the noisiest of its recordings."""
+    segments = setting.segments
+    return [
+        banks.prior_batch(
+            setting.experiment.specimen, markers=segments.markers, rate=1 / segments.period, noise=setting.design.noise,
+            duration=segments.cut.lasting(banks.each(len(segments))),
+            speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
+            seed=child_seed(seed, "null", index),
+        )
+        for index in range(kinds)
+    ]  # fmt: skip
+
+
+def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
+    """A bank for one verdict, of `batches`."""
+    wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
+    done = 0
+
+    def count(more: int) -> None:
+        nonlocal done
+        done += more
+        stage("nulls", done, len(wanted))
+
+    with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
+        banks.build(Path(folder), wanted, workers=workers, progress=count)
+        total = banks.WINDS * len(wanted)
+        words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
+        return banks.load(Path(folder), words=words)

@@ -1,0 +1,312 @@
+"""Prediction errors and sensitivities, brought down to a few numbers a segment: all that inference needs.
+
+With e the errors, s_i the sensitivity of the predictions to column i and w weights of the markers, a segment gives
+
+    r_i = Σ w e·s_i / √(Σ w s_i²),   R_ij = Σ w s_i·s_j / √(Σ w s_i²),
+
+sums over frames and markers, w the inverse mean square of a marker's errors in the recording beyond what its noise
+explains: the errors' size along the direction of each column, and how coefficients δ move it, E r = μ + R δ, with μ
+what the model's own numerics leave. The mean square is taken over all frames, so that the errors and sensitivities of a
+marker that was tracked in a share q of them are divided by √q, and r is that of a complete recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import Calibration, Column, winds
+from measure.forecasting.segments import Segments
+from measure.probes.course import Course, Gauge
+from measure.probes.lines import Spectrum
+from measure.probes.moment import PoleMoment
+from measure.probes.rows import Rows
+from measure.probes.wind_log import sensitivities
+
+Floats = NDArray[np.float64]
+
+_CHUNK = 64
+"""Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
+_CLIP = 4.0
+"""Errors beyond so many times a marker's root mean square count as that much (Huber): folds snap in ways no effect
+explains."""
+
+_NEVER = 1e-4
+"""Least mean square of a marker's errors over the largest: one that was hardly ever tracked says nothing."""
+
+_NOISE = 6.0
+"""Variance of e by markers of variance 1: each frame's weighs 1, the one before 2, the one before that 1, in amplitude,
+as for a point that moves evenly."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Statistics(Rows):
+    """Sums over the frames and markers of segments.
+
+    Attributes:
+        recording: (segment,) index of each one's recording.
+        r: (segment, column).
+        response: (segment, column, column) R.
+        error: (segment,) mean squared prediction error [m²].
+        marker_error: (segment, marker) the same of each marker.
+        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
+        turning: the same of the errors' moment about the pole, see `pole_moment`, its `error` in m⁸/s⁴; None where not
+            looked at.
+        course: of the wind, as the errors tell it; None where not looked at.
+        log: (segment, column, nuisance) how r moves with a prior standard deviation of what the wind's log may be off
+            by, see `wind_log`; None where the wind is known, as in nulls.
+    """
+
+    recording: NDArray[np.int64]
+    r: Floats
+    response: Floats
+    error: Floats
+    marker_error: Floats
+    lines: Floats | None = None
+    turning: Statistics | None = None
+    course: Course | None = None
+    log: Floats | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Projection:
+    """The directions that statistics are taken along, kept: other models' errors have r along the same ones.
+
+    Attributes:
+        directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
+        scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
+        spectrum: what their periodograms are taken along; None where lines are not looked at.
+        pole_moment: what their moments are taken by; None where they are not looked at.
+        turning: (segment, column, frame) the sensitivities' moments, of length 1.
+        gauge: what the wind's course is told by; None where not looked at.
+    """
+
+    directions: Tensor
+    scale: Tensor
+    spectrum: Spectrum | None = None
+    pole_moment: PoleMoment | None = None
+    turning: Tensor | None = None
+    gauge: Gauge | None = None
+
+    @classmethod
+    def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
+        """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
+        moved = torch.stack([_plain(change, scale).flatten(1) for change in changes], dim=1)
+        moved /= moved.norm(dim=2, keepdim=True)
+        return cls(directions=moved, scale=scale)
+
+    def of(self, errors: Tensor) -> Floats:
+        """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
+        clipped = _clipped(errors, self.scale).flatten(1).to(self.directions)
+        return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
+
+    def turned(self, errors: Tensor) -> Floats | None:
+        """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
+        if self.pole_moment is None or self.turning is None:
+            return None
+        moment = self.pole_moment.moment(errors[None])[0].to(self.turning)
+        return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
+
+    def course(self, errors: Tensor) -> Course | None:
+        """The wind's course, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
+        return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
+
+    def lines(self, errors: Tensor) -> Floats | None:
+        """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
+        return None if self.spectrum is None else self.spectrum.prominence(errors)
+
+    def response(self, changes: Sequence[Tensor]) -> Floats:
+        """(segment, column, k) how r moves with k sensitivities (frame, marker, 3, segment) [m per unit]."""
+        moved = torch.stack([_plain(change, self.scale).flatten(1) for change in changes], dim=2)
+        return (self.directions @ moved).double().cpu().numpy()
+
+
+def statistics(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> Statistics:
+    """Run the base model, its parameters and every column along segments, each with its calibration.
+
+    The columns of the result are `THETA`'s, then those given.
+    """
+    return Statistics.joined([piece.found for piece in _pieces(forecaster, segments, calibrations, columns)])
+
+
+def projected(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> tuple[Statistics, Projection]:
+    """The same, with how they move with what the wind's log may be off by, and with the directions, 4 MB a segment of
+    50 frames, 190 markers and 36 columns."""
+    parts: list[Statistics] = []
+    along: list[Projection] = []
+    pieces = list(_pieces(forecaster, segments, calibrations, columns))
+    for piece in pieces:
+        own = Projection.along(piece.changes, piece.scale)
+        off = sensitivities(forecaster, piece.segments, piece.calibrations, piece.base)
+        parts.append(_with_log(piece, own, off))
+        along.append(own)
+    whole = Projection(
+        directions=torch.cat([own.directions for own in along]),
+        scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
+        pole_moment=PoleMoment.joined([piece.pole_moment for piece in pieces]),
+        turning=torch.cat([piece.turning for piece in pieces]), gauge=Gauge.joined([piece.gauge for piece in pieces]),
+    )  # fmt: skip
+    return Statistics.joined(parts), whole
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Piece:
+    """Some segments, with their calibrations, errors and sensitivities (frame, marker, 3, segment), the scale of the
+    errors, the directions of moments (segment, column, frame), and all statistics but those of a log."""
+
+    segments: Segments
+    calibrations: Sequence[Calibration]
+    base: Tensor
+    changes: Sequence[Tensor]
+    scale: Tensor
+    pole_moment: PoleMoment
+    turning: Tensor
+    gauge: Gauge
+    found: Statistics
+
+
+def _pieces(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+) -> Iterator[_Piece]:
+    """Some segments at a time."""
+    # Segments of one recording share weights, and so stay in one chunk.
+    for chosen in _chunks(segments.recording):
+        own, recording = segments.select(chosen), segments.recording[chosen]
+        starts = [calibrations[i] for i in chosen]
+        base = forecaster.errors(*forecaster.system(own, starts), own)
+        changes = forecaster.sensitivities((*columns, *winds()), own, starts, base)
+        changes, blown = changes[: -len(winds())], changes[-len(winds()) :]
+        pole_moment = PoleMoment.of(base, own, forecaster.specimen)
+        scale = error_scale(base, recording, own.noise, own.counted)
+        gauge = Gauge.of(blown, scale, period=own.period)
+        turned, turning = _turned(pole_moment, base, changes, recording)
+        found = replace(
+            reduced(base, changes, recording, own.noise, own.counted),
+            lines=_spectrum(forecaster, own).prominence(base), turning=turned,
+            course=gauge.course(_clipped(base, scale)),
+        )  # fmt: skip
+        yield _Piece(
+            segments=own, calibrations=starts, base=base, changes=changes, scale=scale, pole_moment=pole_moment,
+            turning=turning, gauge=gauge, found=found,
+        )  # fmt: skip
+
+
+def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statistics:
+    """Statistics with how they move with what the wind's log may be off by.
+
+    Args:
+        along: the sensitivities that the statistics are along.
+        off: (frame, marker, 3, segment) [m] of each nuisance.
+    """
+    turning, course = piece.found.turning, piece.found.course
+    if turning is not None:
+        moved = piece.pole_moment.moment(torch.stack(list(off))).double().permute(2, 0, 1)
+        turning = replace(turning, log=(piece.turning @ moved.transpose(1, 2)).cpu().numpy())
+    if course is not None:
+        scores = [piece.gauge.course(_plain(own, piece.scale)).score for own in off]
+        course = replace(course, log=np.stack(scores, axis=-1))
+    return replace(piece.found, log=along.response(off), turning=turning, course=course)
+
+
+def _turned(
+    pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
+) -> tuple[Statistics, Tensor]:
+    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment,
+    column, frame) of length 1 where there is any."""
+    moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
+    moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
+    directions = moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
+    size = ((moment * pole_moment.scale) ** 2).mean(0).cpu().numpy()
+    return Statistics(
+        recording=recording, r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
+        response=(directions @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
+    ), directions  # fmt: skip
+
+
+def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
+    speeds = np.array([item.wind.speed for item in segments.items])
+    return Spectrum.of(forecaster.markers, forecaster.specimen.mesh.rest, speeds, segments.period)
+
+
+def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    chunks: list[list[int]] = [[]]
+    for index in np.unique(recording):
+        own = np.flatnonzero(recording == index).tolist()
+        if chunks[-1] and len(chunks[-1]) + len(own) > _CHUNK:
+            chunks.append([])
+        chunks[-1] += own
+    return [np.array(chunk) for chunk in chunks if chunk]
+
+
+def error_scale(
+    base: Tensor, recording: NDArray[np.int64], noise: Floats, counted: NDArray[np.bool_] | None = None
+) -> Tensor:
+    """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m].
+
+    Args:
+        counted: (frame, marker, segment) whether each position was tracked; None where all were.
+    """
+    mean = (base**2).mean((0, 2))
+    scale = torch.empty_like(mean)
+    for index in np.unique(recording):
+        own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
+        squared = mean[:, own].mean(1)
+        noisy = _NOISE * float(noise[recording == index][0]) ** 2
+        if counted is not None:
+            share = torch.as_tensor(counted[:, :, recording == index].mean(axis=(0, 2))).to(base)
+            noisy, squared = noisy * share, torch.maximum(squared, _NEVER * squared.max())
+        scale[:, own] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
+    return scale
+
+
+def _plain(changes: Tensor, scale: Tensor) -> Tensor:
+    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
+    return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
+
+
+def _clipped(errors: Tensor, scale: Tensor) -> Tensor:
+    """The same of errors, long ones clipped."""
+    errors = errors / scale[None, :, None]
+    size = errors.norm(dim=2, keepdim=True) / 3**0.5
+    return (errors * (_CLIP / size.clamp(min=_CLIP))).permute(3, 0, 1, 2).flatten(2)
+
+
+def reduced(
+    base: Tensor,
+    changes: Sequence[Tensor],
+    recording: NDArray[np.int64],
+    noise: Floats,
+    counted: NDArray[np.bool_] | None = None,
+) -> Statistics:
+    """Statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m].
+
+    Args:
+        counted: (frame, marker, segment) whether each position was tracked; None where all were.
+    """
+    mean = (base**2).mean((0, 2))  # (marker, segment)
+    r = np.empty((len(recording), len(changes)))
+    response = np.empty((len(recording), len(changes), len(changes)))
+    stacked = torch.stack(list(changes))
+    scale = error_scale(base, recording, noise, counted)
+    errors = _clipped(base, scale)
+    for place in range(len(recording)):
+        error = errors[place].flatten().double()
+        moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
+        inner = (moved @ moved.T).cpu().numpy()
+        length = np.sqrt(np.diag(inner))
+        r[place] = (moved @ error).cpu().numpy() / length
+        response[place] = inner / length[:, None]
+    return Statistics(
+        recording=recording, r=r, response=response, error=mean.mean(0).double().cpu().numpy() * 3,
+        marker_error=mean.T.double().cpu().numpy() * 3,
+    )  # fmt: skip

@@ -1,0 +1,119 @@
+"""What a logged wind may be off by: its gain, its direction and its clock, each with a prior.
+
+The wind at the flag is U(t) = (1 + g) Rz(α) L(t + τ), L the logged one: the log lags by τ. To first order in (g, α, τ)
+the errors of the predictions move by their sensitivities, found by simulation as those of every other regressor. Each
+recording has nuisances of its own, since loggers are set up and clocks are aligned anew for each. Like what numerics
+do, they are always fitted, under their priors, and nothing that they explain counts as an effect.
+
+A lag τ that is not small beside the time in which the wind changes is not of first order. It is found beforehand from
+the course of the wind as the errors tell it, which for a log that lags is L(t + τ)/L(t) − 1, and the log is moved by
+it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import Calibration
+from measure.forecasting.segments import Segments
+from measure.observe.trajectory import WindTrack
+from measure.probes.course import ALONG, Course
+
+Floats = NDArray[np.float64]
+
+_STEPS = (0.03, 0.05, 0.1)
+"""Steps of the gain, the direction [rad] and the clock [s]: about as large as what is expected of them."""
+
+_REACH = 3.0
+"""Prior standard deviations to either side within which a lag is sought."""
+_LAGS = 121
+_CALM = 0.3
+"""Wind below which no share of a log is taken [m/s]."""
+
+
+def misread(wind: WindTrack, *, gain: float = 0.0, direction: float = 0.0, clock: float = 0.0) -> WindTrack:
+    """The wind at the flag where the log is off.
+
+    Args:
+        gain: share by which the wind is stronger than logged.
+        direction: angle by which it blows further to the left, counter-clockwise seen from above [rad].
+        clock: time by which the log lags behind the recording [s].
+    """
+    cosine, sine = np.cos(direction), np.sin(direction)
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return replace(wind.later(clock), velocity=(1 + gain) * wind.velocity @ turn)
+
+
+def sensitivities(
+    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
+) -> list[Tensor]:
+    """Change of the predictions (frame, marker, 3, segment) [m] by a prior standard deviation of each nuisance.
+
+    Args:
+        base: errors of the base model [m].
+    """
+    batches = []
+    for place, step in enumerate(_STEPS):
+        off = [step if k == place else 0.0 for k in range(3)]
+        items = tuple(
+            replace(item, wind=misread(item.wind, gain=off[0], direction=off[1], clock=off[2]))
+            for item in segments.items
+        )
+        batches.append(forecaster.system(replace(segments, items=items), calibrations))
+    errors = forecaster.errors_jointly(batches, segments)
+    widths = np.array([item.wind.uncertainty for item in segments.items])  # (segment, nuisance)
+    return [
+        (base - own) / step * base.new_tensor(widths[:, place])
+        for place, (own, step) in enumerate(zip(errors, _STEPS, strict=True))
+    ]
+
+
+def lags(course: Course, segments: Segments) -> tuple[float, ...]:
+    """(recording,) by how much each log lags, most probably, as the course of the wind along itself tells it [s].
+
+    Least squares of the windows about their mean, as large as they are, under the prior of the clock; 0 where the wind
+    is steady or the clock is known.
+    """
+    count = course.score.shape[1]
+    window = segments.cut.length // count
+    weight = np.einsum("swpp->swp", course.curvature)[..., ALONG]
+    value = course.score[..., ALONG] / np.maximum(weight, np.finfo(np.float64).tiny)
+    own = (segments.first + np.arange(count * window)) * segments.period
+    found: list[float] = []
+    for index in np.unique(segments.recording):
+        places = np.flatnonzero(segments.recording == index)
+        wind = segments.items[places[0]].wind
+        if wind.steady or not wind.clock:
+            found.append(0.0)
+            continue
+        times = np.stack([segments.items[place].start + own for place in places])
+        tried = np.linspace(-_REACH, _REACH, _LAGS) * wind.clock
+        left = np.array([_left(value[places], weight[places], _late(wind, times, lag, count)) for lag in tried])
+        size = max(float(left.min()) / value[places].size, np.finfo(np.float64).tiny)
+        found.append(float(tried[np.argmin(left / size + (tried / wind.clock) ** 2)]))
+    return tuple(found)
+
+
+def _late(wind: WindTrack, times: Floats, lag: float, count: int) -> Floats:
+    """(segment, window) share by which the wind is stronger than a log that lags, at times (segment, frame) [s]."""
+    logged, true = (wind.at((times + shift).ravel())[:, 0].reshape(times.shape) for shift in (0.0, lag))
+    share = true / np.where(np.abs(logged) > _CALM, logged, np.inf) - 1
+    return share.reshape(len(times), count, -1).mean(axis=2)
+
+
+def _left(value: Floats, weight: Floats, expected: Floats) -> float:
+    off = value - expected
+    return float((weight * (off - (weight * off).sum() / weight.sum()) ** 2).sum())
+
+
+def by_recording(moved: Floats, recording: NDArray[np.int64]) -> Floats:
+    """(segment, row, nuisance · recording) of (segment, row, nuisance): each moves its own recording alone."""
+    numbers = np.unique(recording)
+    own = (recording[:, None] == numbers).astype(np.float64)
+    return np.einsum("srk,sn->srnk", moved, own).reshape(*moved.shape[:2], -1)

@@ -1,0 +1,225 @@
+"""The verdict in sentences: what was found, what was assumed, what would settle what is open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from measure.forecasting.regressors import FieldColumn
+from measure.forecasting.segments import Cut
+from measure.loop.corrective_field import Mode
+from measure.loop.run import Outcome
+from measure.loop.selection import heterogeneous
+from measure.nulls.conformal import MOST_KINDS, kinds_needed
+from measure.observe.trajectory import Experiment
+from measure.probes.course import ALONG, LEFT, Variation
+from measure.probes.lines import STROUHAL, Line
+from measure.report.sentences import readable, titles
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.quantity import level_text, number, probability, with_error, with_level
+from measure.verdict.record import Conclusion, NullTest, Verdict
+
+_SEPARATES: dict[frozenset[str], str] = {
+    frozenset({"tangential-linear-drag", "tangential-quadratic-drag"}): "a second wind speed, twice as fast: one drag "
+    "doubles, the other quadruples",
+    frozenset(
+        {"added-mass", "reactive-loading"}
+    ): "the cloth released in still air, where only its own motion loads it",
+    frozenset({"air-density", "porosity"}): "the air's temperature and pressure: they give its density",
+    frozenset({"air-density", "power-law-drag"}): "a second wind speed, twice as fast: a power law changes its scale",
+    frozenset({"lift", "power-law-drag"}): "a stiff plate of the same cloth at a few angles to the wind",
+    frozenset({"hem-mass", "hem-stiffness"}): "the hem weighed, or the cloth hanging in calm air",
+    frozenset({"shear", "vertical-wind"}): "the wind logged at the top and at the bottom of the flag",
+}
+
+
+_AXES = ("along the wind", "across the wind", "up")
+
+
+def stated(outcome: Outcome) -> Verdict:
+    """The verdict of an outcome, with all that it says in sentences."""
+    verdict, experiment = outcome.verdict, outcome.experiment
+    said = [sentence(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
+    return replace(
+        verdict, words=" ".join(said), separating=separating(verdict), proposal=_lacking(outcome),
+        assumptions=(*assumptions(experiment), *clocks(experiment, outcome.lags)),
+    )  # fmt: skip
+
+
+def _lacking(outcome: Outcome) -> str:
+    """What the library lacks looks like, where it has no answer or half of one."""
+    if not outcome.field:
+        return ""
+    told = [] if outcome.line is None else [shedding(outcome.line)]
+    if outcome.course is not None and outcome.course.whole[ALONG] > 0:
+        told.append(blowing(outcome.course))
+    return " ".join([*told, proposal(outcome.field, whole=outcome.whole)])
+
+
+def sentence(verdict: Verdict) -> str:
+    """The verdict in words."""
+    test = f"p = {probability(verdict.test.p_value.value)} against nulls of {verdict.test.kinds} kinds of numerics"
+    if verdict.conclusion is Conclusion.UNTESTED:
+        return (
+            f"The base model cannot be tested at a level of {verdict.test.level:g}: by nulls of {verdict.test.kinds} "
+            f"kinds of numerics no p is below {probability(1 / (1 + verdict.test.kinds))}. At least "
+            f"{kinds_needed(verdict.test.level)} kinds are needed."
+        )
+    if verdict.conclusion is Conclusion.SUFFICIENT:
+        return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
+    rejected = f"The base model is rejected ({test})."
+    if verdict.conclusion is Conclusion.OUTSIDE:
+        return f"{rejected} No effect of the library explains what it lacks."
+    found = " and ".join(
+        f"{c.effect}, {readable(c.parameter)} {with_level(c.strength)}" for c in verdict.ranking if not c.why_not
+    )  # fmt: skip
+    if verdict.conclusion is Conclusion.ONE_OF:
+        return (
+            f"{rejected} One of {', '.join(titles(verdict))} explains it; they predict unseen recordings equally well. "
+            f"They would be: {found}."
+        )
+    if verdict.conclusion is Conclusion.PARTLY:
+        return f"{rejected} It is partly explained by {found}; {_incomplete(verdict)}."
+    return (
+        f"{rejected} It lacks {found}. With that added, the remaining errors are no larger than those of "
+        "simulated nulls."
+    )
+
+
+def _incomplete(verdict: Verdict) -> str:
+    """Why what is named is not enough."""
+    for candidate in verdict.ranking:
+        if not candidate.why_not and heterogeneous(candidate, verdict.test.level):
+            each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
+            unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
+            return (
+                f"fitted to each recording alone it is {each}{unit}, which differs by more than chance "
+                f"(p = {probability(candidate.heterogeneity)}): another dependence on the wind would fit better"
+            )
+    return "the errors that remain are larger than those of simulated nulls"
+
+
+def by_draw(test: NullTest) -> tuple[str, ...]:
+    """That other nulls could decide otherwise, and how many would settle it; nothing where they hardly could."""
+    if not test.open:
+        return ()
+    p = test.p_value
+    more = (
+        f"more than {MOST_KINDS} kinds of numerics would be needed to settle it"
+        if test.settling is None
+        else f"{test.settling} kinds of numerics would settle it, if the same share of them is as far"
+    )
+    told = (
+        f"Another draw of nulls could decide otherwise: the interval of p, [{probability(p.low)}, "
+        f"{probability(p.high)}] {level_text(p.level)}, holds the level of {test.level:g}; {more}."
+    )
+    return (told,)
+
+
+def bounds(ended: Sequence[str]) -> tuple[str, ...]:
+    """Which calibrated parameters are as small or large as the model holds; nothing where none is."""
+    if not ended:
+        return ()
+    return (f"The fit ends at the bound of what the model holds in {' and '.join(ended)}: its interval says no more.",)
+
+
+def ratios(experiment: Experiment) -> tuple[str, ...]:
+    """What the numbers are of where the mass of the cloth is not known; nothing where it is."""
+    if experiment.specimen.mass_known:
+        return ()
+    told = (
+        "The mass of the cloth is not known: motion tells forces per mass alone, so that density, bending and the "
+        f"strengths of forces are ratios to a density of {number(experiment.specimen.material.density)} kg/m²."
+    )
+    return (told,)
+
+
+def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
+    """By how much the logs of the wind were moved, as the errors told it [s]; nothing where none was."""
+    moved = [
+        f"{recording.name} by {number(lag, digits=2)} s"
+        for recording, lag in zip(experiment.recordings, late, strict=True)
+        if lag
+    ]
+    return (f"the log of the wind lags, as the motion tells it, and was moved: {', '.join(moved)}",) if moved else ()
+
+
+def separating(verdict: Verdict) -> str:
+    """The cheapest experiment known that tells the named effects apart."""
+    if verdict.conclusion is not Conclusion.ONE_OF:
+        return ""
+    pairs = [text for effects, text in _SEPARATES.items() if effects <= set(verdict.named)]
+    if pairs:
+        return "; ".join(pairs)
+    return "a longer recording, at one more wind speed: the effects named differ in how they grow with the wind"
+
+
+def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
+    """What the corrective field looks like: the modes that are told best.
+
+    Args:
+        whole: whether it stands for all that the base model lacks, or for what a named effect leaves.
+    """
+    told = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
+    terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in told]
+    fitted = "fits the errors best" if whole else "fits the remaining errors best"
+    return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
+
+
+def shedding(line: Line) -> str:
+    """What a line of the errors' spectra looks like."""
+    return (
+        f"The errors oscillate {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind, as vortices behind a "
+        f"cylinder of {number(STROUHAL / line.reduced, digits=2)} m do."
+    )
+
+
+def blowing(variation: Variation) -> str:
+    """What a course of the wind looks like that is none of turbulence."""
+    along, turned = (math.sqrt(max(variation.whole[part], 0.0)) for part in (ALONG, LEFT))
+    fast = math.sqrt(max(variation.fast[ALONG], 0.0))
+    return (
+        f"The errors look like those of a wind that varies by {number(100 * along, digits=2)} % of its mean along its "
+        f"own direction, by {number(100 * fast, digits=2)} % within two seconds, and by "
+        f"{number(100 * turned, digits=2)} % across it."
+    )
+
+
+def _where(mode: FieldColumn) -> str:
+    shapes = {
+        (0, 0): "all over", (1, 0): "hoist against fly", (0, 1): "bottom against top", (1, 1): "corner against corner",
+        (2, 0): "both ends against the middle",
+    }  # fmt: skip
+    return f"{_AXES[mode.axis]}, {shapes[mode.mode]}"
+
+
+def assumptions(experiment: Experiment) -> tuple[str, ...]:
+    """What was taken as given."""
+    specimen = experiment.specimen
+    size = np.ptp(specimen.mesh.rest, axis=0)
+    air = specimen.air.plain
+    cut = Cut.of(experiment.recordings[0].rate, min(len(r.positions) for r in experiment.recordings))
+    every = "every frame" if cut.stride == 1 else f"every {cut.stride}th frame"
+    winds = [recording.wind.uncertainty for recording in experiment.recordings]
+    gain, direction, clock = (max(parts) for parts in zip(*winds, strict=True))
+    logged = (
+        "the wind at the flag is the same all over it, and the logged one within standard deviations of "
+        f"{number(100 * gain, digits=2)} % in speed, {number(math.degrees(direction), digits=2)}° in direction and "
+        f"{number(clock, digits=2)} s in time"
+    )
+    held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
+    places = "" if specimen.anchors_told else ", tied at their mean observed places"
+    cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
+    return (
+        f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
+        f"it is held at {len(specimen.held)} points {held}{places}",
+        f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
+        logged,
+        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
+        "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
+        f"the coarse mesh of the fit may bias a strength by {100 * CRITERIA.response:.0f} %: its interval says so",
+        "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
+    )

@@ -1,0 +1,225 @@
+"""What closing the loop concludes, and everything a reader needs to judge it. Plain values only: it becomes JSON."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Conclusion(StrEnum):
+    """What became of the base model."""
+
+    UNTESTED = "cannot test"
+    SUFFICIENT = "no effect needed"
+    EFFECT = "effect"
+    ONE_OF = "one of"
+    PARTLY = "partly explained"
+    OUTSIDE = "none of the library"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A value with its interval: `value [low, high]` at `level`, in `unit`."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    level: float = 0.9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """An effect that was weighed.
+
+    Attributes:
+        effect: its name in the library, or "corrective-field" for the smooth field that stands for what is not in it.
+        parameter: of the effect.
+        strength: as fitted, with the effect's own unit.
+        null: the strength at which the effect is not there.
+        z: of the strength against the null distribution.
+        p_value: of |z| for this candidate alone.
+        p_family: of the largest |z| of all candidates.
+        gain: held-out improvement of the fit over the base model, in units of log likelihood; higher is better.
+        gain_error: its standard error.
+        behind: how many standard errors of the paired difference it lies behind the best candidate; 0 for the best.
+        leftover: p-value of what the model with it still leaves unexplained.
+        by_recording: strength fitted on each recording alone, in the order of the recordings; of a refitted candidate
+            about what it then has.
+        heterogeneity: p-value of the same strength in all of these (Cochran's Q); None of a single recording, and
+            of gusts.
+        why_not: why it was not named; empty where it was.
+    """
+
+    effect: str
+    parameter: str
+    strength: Estimate
+    z: float
+    p_value: float
+    p_family: float
+    gain: float
+    gain_error: float
+    behind: float
+    leftover: float
+    by_recording: tuple[Estimate, ...] = ()
+    heterogeneity: float | None = None
+    why_not: str = ""
+    null: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Errors on data neither model was fitted to: root mean square one-step prediction error [m].
+
+    Attributes:
+        what: which data ("recording 7.0 m/s, unseen", "last part of each recording, unseen").
+        frames: how many.
+        before, after: of the base model and of the model with the effect.
+        reduction: paired, before − after [m].
+        floor: of the model itself on data simulated from it with other numerics: differences below are not effects.
+        oracle: of the model with the true effect, where it is known.
+        share: E_red = (before − after) / (before − oracle, or floor); None where before is not above it.
+        control: after, with the same freedom spent on the best wrong effect.
+        control_name: which.
+        apart: mean half misfit of a segment by the control less that by the effect, paired, what the model's numerics
+            leave taken out: natural units of log likelihood.
+    """
+
+    what: str
+    frames: int
+    before: Estimate
+    after: Estimate
+    reduction: Estimate
+    floor: Estimate
+    oracle: Estimate | None
+    share: float | None
+    control: Estimate | None
+    control_name: str
+    apart: Estimate | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Residual:
+    """Where and when the model errs. Lists are over the grid named with them.
+
+    Attributes:
+        recording: its name.
+        speed: mean logged wind [m/s].
+        held_out: whether neither model was fitted to it.
+        times: of the frames [s].
+        in_time: root mean square over the markers, base model [m].
+        in_time_after: with the effect; empty where none was named.
+        markers: (u, v) of the markers [m].
+        in_space: root mean square over the frames, base model [m], one a marker.
+        in_space_after: with the effect.
+        mean: (x, y, z) mean of observed − predicted over the frames, base model [m], one a marker.
+        frequencies: [Hz].
+        spectrum: of the error, base model [m²/Hz].
+        spectrum_after: with the effect.
+        observed: (frame, marker, xyz) of a short stretch [m].
+        before: predicted from the frame before by the base model, the same stretch.
+        after: predicted with the effect.
+    """
+
+    recording: str
+    speed: float
+    held_out: bool
+    times: list[float]
+    in_time: list[float]
+    in_time_after: list[float]
+    markers: list[list[float]]
+    in_space: list[float]
+    in_space_after: list[float]
+    mean: list[list[float]]
+    frequencies: list[float]
+    spectrum: list[float]
+    spectrum_after: list[float]
+    observed: list[list[list[float]]]
+    before: list[list[list[float]]]
+    after: list[list[list[float]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NullTest:
+    """The global test.
+
+    Attributes:
+        statistic: observed: how far the farthest column is from nulls' mean, in their standard deviations (see
+            `measure.nulls.reference`).
+        null: the same of every group of simulated nulls.
+        p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.nulls.conformal`, with an interval of
+            the share of all kinds that are, by how many were simulated.
+        kinds: of numerics among the nulls.
+        level: at which it was judged.
+        critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
+        nulls: how they were made, in words: how many, from which parameters, with which numerics.
+        open: whether the interval of p holds the level, so that another draw of nulls could decide otherwise; None in
+            documents that do not tell.
+        settling: kinds of numerics whose interval would not hold it, if the same share of them is as far; None where
+            the test is not open, or 1,000 would not do.
+    """
+
+    statistic: float
+    null: list[float]
+    p_value: Estimate
+    kinds: int
+    level: float
+    critical: float | None
+    nulls: str
+    open: bool | None = None
+    settling: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A calibrated parameter of the base model, before and after the effect was added; `shift` in standard errors."""
+
+    name: str
+    before: Estimate
+    after: Estimate | None
+    shift: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The whole of it.
+
+    Attributes:
+        conclusion: see `Conclusion`.
+        named: the effect, or the effects that cannot be told apart; empty for none.
+        words: the verdict in a sentence or three.
+        test: of the base model.
+        parameters: of the base model.
+        ranking: candidates, best first.
+        comparisons: on unseen data.
+        residuals: of every recording.
+        assumptions: what was taken as given.
+        separating: the cheapest experiment that would tell the named effects apart; empty where one is named.
+        proposal: what the corrective field looks like and the terms it proposes, where the library has no answer.
+        apart: half misfit of the wrong-effect control less that of what was named, a segment, over all recordings left
+            out in turn [nat]; None where no control was run.
+        findings: remarks on the data (kind, text).
+        provenance: seed, versions, parents, recipe.
+        seconds: wall time.
+    """
+
+    conclusion: Conclusion
+    named: tuple[str, ...]
+    words: str
+    test: NullTest
+    parameters: tuple[Parameter, ...]
+    ranking: tuple[Candidate, ...]
+    comparisons: tuple[Comparison, ...]
+    residuals: tuple[Residual, ...]
+    assumptions: tuple[str, ...] = ()
+    separating: str = ""
+    proposal: str = ""
+    apart: Estimate | None = None
+    findings: tuple[tuple[str, str], ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {"schema": "flagdata.verdict/1", **asdict(self)}

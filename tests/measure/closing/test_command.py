@@ -1,0 +1,191 @@
+"""`flagdata close-loop`: what does not fit is refused before anything is simulated, with the option it is about."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.cli import main
+from flagdata.errors import NotFoundError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.markers import MarkerOptions
+from flagdata.ingest.markers.store import ingest_markers
+from flagdata.lake import Lake
+from measure.closing.command import doubted
+from measure.closing.sources import Reading, read
+from measure.observe import Up
+from measure.verdict.record import Conclusion
+from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag
+from tests.measure.report.verdicts import Size, verdict
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two recordings of 40 frames in one table, z up, in metres."""
+    path = tmp_path_factory.mktemp("tracks") / "tracks.csv"
+    seen = flag(noise=0.5e-3, seed=1, seconds=2.2)
+    lines = ["recording,frame,marker,u,v,x,y,z"]
+    for name in ("calm", "brisk"):
+        for frame, at in enumerate(seen.positions[:40]):
+            for marker, ((u, v), (x, y, z)) in enumerate(zip(seen.markers, at, strict=True)):
+                lines.append(f"{name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, dict]:
+    """Exit code and document of a command that fails."""
+    with pytest.raises(SystemExit) as ended:
+        main(["close-loop", *arguments, "--json"])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "what"),
+    [
+        ([], 2, "no recordings"),
+        (["nowhere.csv"], 1, "no such file"),
+        (["nowhere.csv", "--recipe", "nowhere.toml"], 1, "no such recipe"),
+        (["nowhere.csv", "--nulls", "100"], 2, "100 nulls"),
+        (["nowhere.csv", "--nulls", "200", "--bank", "."], 2, "both --nulls and --bank"),
+        (["nowhere.csv", "--level", "1.5"], 2, "1.5"),
+        (["nowhere.csv", "--material", "camel-ponte-rom"], 2, "camel-ponte-rom"),
+        (["nowhere.csv", "--size", "1.5"], 2, "not a size"),
+        (["nowhere.csv", "--pins", "hoist-corner"], 2, "no place"),
+        (["nowhere.csv", "--up", "w"], 2, "unknown axis"),
+        (["nowhere.csv", "--axis", "1,0"], 2, "three numbers"),
+        (["nowhere.csv", "--axis", "0,0,0"], 2, "no direction"),
+        (["nowhere.csv", "--axis", "1,0,0", "--north", "30"], 2, "both --axis and --north"),
+        (["nowhere.csv", "--lake", "nowhere"], 1, "no lake"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(
+    arguments: Sequence[str], code: int, what: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ended, told = said(arguments, capsys)
+    assert ended == code
+    assert what in told["what"]
+    assert told["fix"]
+
+
+def test_winds_are_one_for_all_or_one_each(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, told = said([str(table), "--rate", str(RATE), *["--wind", "4"] * 3], capsys)
+    assert (code, told["what"]) == (2, "3 winds for 2 recordings")
+
+
+@pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])
+def test_what_is_said_of_a_log_is_not_ignored_where_there_is_none(
+    table: Path, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, told = said([str(table), "--rate", str(RATE), "--wind", "4", option], capsys)
+    assert (code, told["where"]) == (2, option.partition("=")[0])
+
+
+def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -> None:
+    """Its first frame at the log's second sample, whose speed is 5."""
+    log = tmp_path / "log.csv"
+    log.write_text("time,wind_speed\n2026-05-14 09:30:00,4\n2026-05-14 09:30:01,5\n2026-05-14 09:30:02,6\n")
+    reading = Reading(rate=RATE, offset=1.0, sensor="generic-csv", zone="+02:00")
+    calm, _ = read([str(table)], [str(log)], reading, None)
+    assert calm.wind is not None
+    np.testing.assert_allclose(calm.wind.at(np.array([0.0, 0.5])), [[5, 0, 0], [5.5, 0, 0]])
+
+
+def test_a_warning_that_may_be_what_was_found_is_said_with_the_verdict() -> None:
+    whole = verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2))
+    doubt = Finding(kind="inertia-does-not-fit", severity=Severity.WARNING, what="it moves as in 8 m/s", where="flag")
+    other = replace(doubt, kind="cloth-not-covered", what="no marker near", severity=Severity.NOTE)
+    told = doubted(whole, (doubt, other))
+    remark = "The data themselves may be wrong, which would look like an effect: flag: it moves as in 8 m/s."
+    assert told.words == f"{whole.words} {remark}"
+    assert told.findings == (
+        ("inertia-does-not-fit", "flag: it moves as in 8 m/s"), ("cloth-not-covered", "flag: no marker near"),
+    )  # fmt: skip
+    assert doubted(whole, (other,)).words == whole.words
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        "--wind=4",
+        "--axis=1,0,0",
+        "--rate=25",
+        "--unit=mm",
+        "--up=y",
+        "--noise=0.001",
+        "--sensor=generic-csv",
+        "--zone=UTC",
+    ],
+)
+def test_beside_a_recipe_with_recordings_no_option_is_ignored(
+    table: Path, tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "flag.toml"
+    recipe.write_text(f'[[recording]]\nsource = "{table}"\ntake = "calm"\n')
+    code, told = said(["--recipe", str(recipe), option], capsys)
+    assert (code, told["where"]) == (2, option.partition("=")[0])
+    code, told = said([str(table), "--recipe", str(recipe)], capsys)
+    assert (code, told["where"]) == (2, "SOURCE")
+
+
+@pytest.mark.parametrize(("line", "what"), [("nuls = 64", "did you mean 'nulls'"), ("nulls = 0.5", "whole number")])
+def test_a_recipe_says_what_the_test_is_and_no_more(
+    tmp_path: Path, line: str, what: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "flag.toml"
+    recipe.write_text(f"[test]\n{line}\n")
+    code, told = said(["tracks.csv", "--recipe", str(recipe)], capsys)
+    assert code in (1, 2)
+    assert what in told["fix"]
+
+
+def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Markers in millimetres that are taken for metres."""
+    code, told = said(
+        [str(table), "--rate", str(RATE), "--wind", "4", "--size", f"{1e3 * WIDTH}x{1e3 * HEIGHT}", "--pins", "hoist",
+         "--material", "camel-ponte-roma"], capsys,
+    )  # fmt: skip
+    assert (code, told["kind"]) == (1, "bad-input")
+
+
+def test_each_recording_of_a_table_has_its_wind(table: Path) -> None:
+    reading = Reading(rate=RATE, noise=1e-3, axis=(0.0, 2.0, 0.0))
+    calm, brisk = read([str(table)], ["3", "7"], reading, None)
+    assert (calm.name, brisk.name) == ("calm", "brisk")
+    assert calm.noise == 1e-3
+    assert calm.wind is not None
+    assert brisk.wind is not None
+    np.testing.assert_allclose(calm.wind.velocity, [[0, 3, 0]])
+    np.testing.assert_allclose(brisk.wind.velocity, [[0, 7, 0]])
+
+
+def test_markers_of_a_lake_and_of_a_file_are_the_same(table: Path, tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    kept = ingest_markers(lake, table, MarkerOptions(rate=RATE))
+    from_file = read([str(table)], ["4"], Reading(rate=RATE, up=Up.Y), lake)
+    from_lake = read([result.artifact.id for result in kept], ["4"], Reading(up=Up.Y), lake)
+    for one, other, result in zip(from_file, from_lake, kept, strict=True):
+        np.testing.assert_array_equal(one.positions, other.positions)
+        assert one.wind is not None
+        np.testing.assert_array_equal(one.wind.velocity, [[4, 0, 0]])  # said with z up, whatever the recording's axes
+        assert (one.source, other.source) == ("", result.artifact.id)
+
+
+def test_a_speed_needs_an_axis_and_a_source_a_place(table: Path) -> None:
+    north = Reading(rate=RATE, axis=None, north=math.radians(30))
+    with pytest.raises(UsageError, match="direction"):
+        read([str(table)], ["4"], north, None)
+    with pytest.raises(NotFoundError, match="nowhere"):
+        read(["nowhere"], [], Reading(), None)
+
+
+def test_recordings_of_one_name_are_told_apart(table: Path) -> None:
+    names = [seen.name for seen in read([str(table), str(table)], ["4"], Reading(rate=RATE), None)]
+    assert len(set(names)) == 4

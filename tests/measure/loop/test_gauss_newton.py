@@ -1,0 +1,75 @@
+"""Models whose cloth does not stay one are drawn back to the nominal model, which ran."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import pytest
+
+from measure.forecasting.model import Model
+from measure.forecasting.observer import Forecaster
+from measure.forecasting.regressors import THETA, Calibration, EffectColumn
+from measure.forecasting.segments import Segments
+from measure.inference.random_effect import NullModel
+from measure.loop import gauss_newton
+from measure.probes.statistics import Statistics
+
+LIFT = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
+FAR = Model(calibration=Calibration(density=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),))
+NOTHING = cast(Forecaster, None), cast(Segments, None)
+
+
+def linearised(_: Forecaster, __: Segments, model: Model) -> Statistics:
+    """Of models that run from 70 % of the nominal density on; the data are the model."""
+    count, size = len(THETA) + len(model.effects), 4
+    r = np.full((size, count), np.nan if model.calibration.density < 0.7 else 0.0)
+    return Statistics(
+        recording=np.zeros(size, dtype=np.int64), r=r, response=np.tile(10 * np.eye(count), (size, 1, 1)),
+        error=np.ones(size), marker_error=np.ones((size, 1)),
+    )  # fmt: skip
+
+
+def null(count: int) -> NullModel:
+    return NullModel(coefficients=np.zeros((3, count)), covariance=np.eye(count), shifts=np.zeros((0, count)))
+
+
+def test_halfway_is_halfway_in_the_units_of_the_parameters() -> None:
+    half = FAR.halved()
+    np.testing.assert_allclose(
+        np.array(half.calibration.steps_from(Calibration())), np.array(FAR.calibration.steps_from(Calibration())) / 2
+    )
+    assert half.effects == ((LIFT, 1.0),)
+
+
+@pytest.mark.parametrize("effects", [(), FAR.effects])
+def test_a_model_that_diverges_is_drawn_back(
+    monkeypatch: pytest.MonkeyPatch, effects: tuple[tuple[EffectColumn, float], ...]
+) -> None:
+    monkeypatch.setattr(gauss_newton, "_linearised", linearised)
+    model = Model(calibration=FAR.calibration, effects=effects)
+    found = gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
+        *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects), anchor=Calibration()
+    )
+    assert found.origin.calibration.density == pytest.approx(0.5**0.5)
+    assert [strength for _, strength in found.origin.effects] == [strength / 2 for _, strength in effects]
+
+
+def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = linearised(*NOTHING, Model(calibration=FAR.calibration))
+    monkeypatch.setattr(gauss_newton, "_linearised", lambda *_: lost)
+    with pytest.raises(gauss_newton.DivergedError, match="does not stay one"):
+        gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
+            *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), (), anchor=Calibration()
+        )
+
+
+@pytest.mark.parametrize(("bending", "steps"), [(1.0, (0.7, 0.3)), (50.0, (-0.7, 0.3)), (35.0, (-0.7, 0.3))])
+def test_sensitivities_at_a_bound_are_taken_from_within(bending: float, steps: tuple[float, float]) -> None:
+    """The bending's factor is at most 50, its step a factor of e^0.7 = 2."""
+    model = Model(calibration=Calibration(bending=bending), effects=((LIFT, 1.0),))
+    for place, step in ((1, steps[0]), (3, steps[1])):
+        size = abs(step)
+        moved, taken = gauss_newton._stepped(model, place, size)  # pyright: ignore[reportPrivateUsage]
+        assert taken == pytest.approx(step)
+        np.testing.assert_allclose(moved.steps_from(model), np.where(np.arange(4) == place, step, 0.0), atol=1e-12)

@@ -1,0 +1,235 @@
+"""The whole loop at small size: nulls stand, a strong effect is named, the same seed says the same."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from flagdata.errors import InputError, UsageError
+from measure.closing.close import close_loop
+from measure.forecasting.regressors import Calibration, columns, fields
+from measure.forecasting.setting import Design, Setting
+from measure.inference.evidence import Fit
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop import run
+from measure.loop.corrective_field import corrective_field
+from measure.loop.run import Options
+from measure.nulls import bank as banks
+from measure.nulls.simulation import NullBatch
+from measure.observe.trajectory import Experiment, Specimen, Trajectory
+from measure.probes.statistics import projected
+from measure.verdict.record import Conclusion, Verdict
+from sim.cloth import Cloth
+from sim.effects import EFFECTS, Effect
+from sim.effects.effect import ForceEffect
+from sim.effects.parameter import Value, strength
+
+DURATION, NOISE, SPEEDS = 4.6, 5e-4, (3.5, 6.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Push(ForceEffect):
+    """A force per mass across the wind, alike all over.
+
+    Attributes:
+        acceleration: of it [m/s²].
+    """
+
+    acceleration: Annotated[Value, strength(unit="m/s²", prior=(-10.0, 10.0), source="made for a test")] = 0.0
+
+    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+        return torch.zeros_like(position).index_fill(1, torch.tensor(1), 1.0) * cloth.mass[:, None] * self.acceleration
+
+
+@pytest.fixture(scope="module")
+def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Nulls of twelve kinds of numerics, by which a level of 0.1 can be tested."""
+    folder = tmp_path_factory.mktemp("bank")
+    banks.build(folder, batches(specimen), workers=2)
+    return folder
+
+
+def batches(specimen: Specimen) -> list[NullBatch]:
+    return [
+        banks.prior_batch(
+            specimen,
+            markers=specimen.mesh.rest,
+            rate=25.0,
+            duration=DURATION,
+            noise=NOISE,
+            speeds=(3.0, 6.5),
+            seed=seed,
+        )
+        for seed in range(12)
+    ]
+
+
+def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
+    """Two winds, by a mesh and steps of their own."""
+    batch = NullBatch(
+        specimen=specimen, markers=specimen.mesh.rest, rate=25.0, duration=DURATION, noise=NOISE, speeds=SPEEDS,
+        calibrations=(Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS), seed=seed, effects=effects,
+    )  # fmt: skip
+    return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))
+
+
+@pytest.fixture(scope="module")
+def dragged(specimen: Specimen, bank: Path) -> Verdict:
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
+    return close_loop(data, Options(bank=bank, level=0.1))
+
+
+def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, bank: Path) -> None:
+    nulls = banks.load(bank, words="made").nulls
+    first = batches(specimen)[0].calibrations[0].damping
+    assert nulls.design.damping == pytest.approx(first, rel=1e-12)
+    known = replace(nulls.design, damping=first)
+    assert known == Design(noise=NOISE, period=0.04, cloth=specimen.material.fingerprint, damping=first)
+    for kind, batch in enumerate(batches(specimen)):
+        own = nulls.select(nulls.numerics == kind)
+        recording = own.statistics.recording - own.statistics.recording.min()
+        np.testing.assert_array_equal(own.speeds, np.array(batch.speeds)[recording])
+        steps = np.array([cloth.steps_from(Calibration()) for cloth in batch.calibrations])
+        np.testing.assert_array_equal(own.calibration, steps[recording])
+        assert set(own.cloth) == {specimen.material.fingerprint}
+        assert set(own.noise) == {NOISE}
+
+
+def test_a_null_needs_no_effect(specimen: Specimen, bank: Path) -> None:
+    verdict = close_loop(recorded(specimen, seed=5), Options(bank=bank, level=0.1))
+    assert verdict.conclusion is Conclusion.SUFFICIENT
+    assert not verdict.named
+    assert not verdict.comparisons
+
+
+def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Verdict) -> None:
+    assert dragged.conclusion is not Conclusion.SUFFICIENT
+    assert dragged.named[:1] == ("tangential-linear-drag",)
+    assert len(dragged.comparisons) == 3
+    for comparison in dragged.comparisons:
+        assert comparison.after.value < comparison.before.value
+        assert comparison.control is None or comparison.after.value < comparison.control.value
+
+
+def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_otherwise(dragged: Verdict) -> None:
+    """By twelve kinds of numerics of which none is as far, up to 22 % of all may be: 0.05^(1/12) = 0.78."""
+    test = dragged.test
+    assert test.p_value.value == pytest.approx(1 / 13)
+    assert test.p_value.high == pytest.approx(1 - 0.05 ** (1 / 12))
+    assert test.open
+    assert test.settling == 29  # 0.9^28 > 5 % > 0.9^29
+    assert "Another draw of nulls could decide otherwise" in dragged.words
+    assert "29 kinds of numerics would settle it" in dragged.words
+
+
+def test_the_same_data_and_seed_give_the_same_verdict(specimen: Specimen, bank: Path, dragged: Verdict) -> None:
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
+    again = close_loop(data, Options(bank=bank, level=0.1, workers=2))
+    assert replace(again, seconds=0.0) == replace(dragged, seconds=0.0)
+
+
+def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: Path) -> None:
+    setting = Setting.of(recorded(specimen, Push(acceleration=6.0), seed=11))
+    nominal = [setting.calibration] * len(setting.segments)
+    found, projection = projected(setting.forecaster, setting.segments, nominal, columns())
+    null = banks.load(bank, words="made").model(setting.design)
+    whitened = WhitenedMisfit(found=found, projection=projection, null=null, speeds=setting.speeds[setting.recording])
+    modes = corrective_field(setting, whitened)
+    assert [mode.column for mode in modes] == list(fields())
+    across = next(mode for mode in modes if mode.column.name == "field.y.00")
+    assert across.value == pytest.approx(6.0, abs=3 * across.error)
+    assert across.value > 3 * across.error
+    assert max(modes, key=lambda mode: abs(mode.value / mode.error)) is across
+    # Of errors without the part of them that such a force makes, none of it is left.
+    segments, forecaster = setting.segments, setting.forecaster
+    errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
+    change = forecaster.sensitivities([across.column], segments, nominal, errors)[-1]
+    rest = corrective_field(setting, whitened, left=errors - across.value * change)
+    unmoved = next(mode for mode in rest if mode.column == across.column)
+    assert abs(unmoved.value) < across.error
+
+
+def test_turning_the_world_changes_nothing(specimen: Specimen, bank: Path, dragged: Verdict) -> None:
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
+    c, s = np.cos(2.0), np.sin(2.0)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def turned(recording: Trajectory) -> Trajectory:
+        wind = replace(recording.wind, velocity=recording.wind.velocity @ turn)
+        return replace(recording, positions=recording.positions @ turn, wind=wind)
+
+    moved = Experiment(
+        specimen=replace(specimen, anchors=specimen.anchors @ turn), recordings=tuple(map(turned, data.recordings))
+    )
+    verdict = close_loop(moved, Options(bank=bank, level=0.1))
+    assert verdict.named == dragged.named
+    # Single precision: the statistic to a few digits.
+    assert verdict.test.statistic == pytest.approx(dragged.test.statistic, rel=0.05)
+
+
+def test_a_level_that_the_bank_cannot_test_is_said_to_be_so(specimen: Specimen, bank: Path) -> None:
+    """Twelve kinds of numerics: no p is below 1/13."""
+    data = recorded(specimen, EFFECTS["tangential-linear-drag"](coefficient=0.8), seed=77)
+    verdict = close_loop(data, Options(bank=bank))
+    assert verdict.conclusion is Conclusion.UNTESTED
+    assert verdict.test.p_value.value >= 1 / 13
+    assert "cannot be tested at a level of 0.05" in verdict.words
+    assert "At least 19 kinds" in verdict.words  # K + 1 ≥ 1/0.05
+    assert not verdict.test.open
+    assert "Another draw" not in verdict.words
+    assert len(verdict.parameters) == 3
+
+
+def test_a_bank_of_other_segments_is_refused(specimen: Specimen, bank: Path) -> None:
+    data = recorded(specimen, seed=5)
+    short = tuple(replace(r, positions=r.positions[:60]) for r in data.recordings)
+    with pytest.raises(InputError, match="segments last"):
+        close_loop(Experiment(specimen=specimen, recordings=short), Options(bank=bank, level=0.1))
+
+
+def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen, bank: Path) -> None:
+    data = recorded(replace(specimen, anchors_told=False), seed=5)
+    with pytest.raises(InputError, match="anchors were told, those of the recordings are taken from where"):
+        close_loop(data, Options(bank=bank, level=0.1))
+
+
+@pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"level": 0.01}, {"nulls": 10}, {"workers": 0}])
+def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(UsageError):
+        Options(**wrong)  # pyright: ignore[reportArgumentType]
+
+
+@dataclass(frozen=True)
+class At:
+    """What of a setting the looks for the base model need."""
+
+    calibration: Calibration = field(default_factory=Calibration)
+
+
+@pytest.mark.parametrize(
+    ("left", "looks"), [((9.0, 5.0, 4.0, 3.0, 2.0, 1.0), 5), ((9.0, 5.0, 6.0), 2), ((9.0, 9.5), 1)]
+)
+def test_the_base_model_is_led_on_only_to_where_less_is_left(
+    monkeypatch: pytest.MonkeyPatch, left: tuple[float, ...], looks: int
+) -> None:
+    """Each step doubles the bending. The first look is that of the nominal cloth, at most four follow."""
+
+    def fitted(setting: At, fits: object) -> Fit:
+        place = round(math.log2(setting.calibration.bending))
+        return Fit(
+            active=(0, 1, 2), value=np.array([0.0, math.log(2), 0.0]), covariance=1e-2 * np.eye(3), left=left[place]
+        )
+
+    monkeypatch.setattr(run, "_looked_at", lambda setting: ())
+    monkeypatch.setattr(run, "_fits", lambda setting, bank: setting)
+    monkeypatch.setattr(run, "_base_fit", fitted)
+    ended, fits = run._calibrated(*cast(Any, (At(), At(), None)))  # pyright: ignore[reportPrivateUsage]
+    assert ended.calibration.bending == pytest.approx(2.0 ** (looks - 1))
+    assert fits is ended or looks == 1

@@ -1,0 +1,83 @@
+"""What is said of what the library lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from measure.forecasting.regressors import Calibration, FieldColumn
+from measure.loop.corrective_field import Mode
+from measure.probes.course import Variation
+from measure.probes.lines import Line
+from measure.report.statement import blowing, bounds, by_draw, proposal, sentence, shedding
+from measure.verdict.record import Conclusion
+from tests.measure.report.verdicts import verdict
+
+
+def test_the_modes_that_are_told_best_are_said_first() -> None:
+    modes = [
+        Mode(column=FieldColumn(axis=0, mode=(1, 0)), value=0.5, error=0.1),
+        Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),
+        Mode(column=FieldColumn(axis=2, mode=(2, 0)), value=-4.0, error=1.0),
+        Mode(column=FieldColumn(axis=2, mode=(1, 1)), value=9.0, error=9.0),
+    ]
+    said = proposal(modes)
+    first, second, third = said.split(": ", 1)[1].split("; ")
+    assert first.startswith("across the wind, all over (3")
+    assert second.startswith("along the wind, hoist against fly (0.5")
+    assert third.startswith("up, both ends against the middle (−4")
+    assert "corner" not in said
+    assert "fits the remaining errors best, per mass: across" in proposal(modes, whole=False)
+
+
+def test_a_strength_that_is_another_in_every_recording_is_told_with_its_values() -> None:
+    partly = verdict(Conclusion.PARTLY)
+    assert "the errors that remain are larger than those of simulated nulls" in sentence(partly)
+    ranking = [replace(c, heterogeneity=None if c.why_not else 0.001) for c in partly.ranking]
+    said = sentence(replace(partly, ranking=tuple(ranking)))
+    each = ", ".join(f"{e.value:.2g}" for e in next(c for c in ranking if not c.why_not).by_recording)
+    assert f"fitted to each recording alone it is {each}" in said
+    assert "p = 0.0010" in said or "p = 0.001" in said
+    assert "the errors that remain" not in said
+
+
+def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
+    # A Strouhal number of 0.2: 1.33 Hz for each m/s is a width of 0.15 m.
+    said = shedding(Line(far=9.0, reduced=0.2 / 0.15, direction=1))
+    assert "across the wind at 1.3 Hz for each m/s" in said
+    assert "0.15 m" in said
+
+
+def test_a_course_that_is_not_turbulence_is_said_in_shares_of_the_wind() -> None:
+    said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
+    told = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
+    assert told in said
+
+
+@pytest.mark.parametrize(
+    ("damping", "told"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")]
+)
+def test_a_fit_that_ends_at_a_bound_says_so(damping: float, told: str) -> None:
+    ended = Calibration().moved((0.0, 0.0, float(np.log(damping / 2.5e-3))))
+    said = " ".join(bounds(ended.at_bounds))
+    assert (told in said) if told else said == ""
+
+
+def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
+    few = verdict(Conclusion.SUFFICIENT)
+    untested = replace(few, conclusion=Conclusion.UNTESTED, test=replace(few.test, kinds=20, level=0.03))
+    assert "no p is below 0.048. At least 33 kinds are needed." in sentence(untested)
+
+
+def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_settle_it() -> None:
+    test = replace(verdict(Conclusion.EFFECT).test, level=0.05, open=True, settling=59)
+    test = replace(test, p_value=replace(test.p_value, value=0.024, low=0.0, high=0.072))
+    (told,) = by_draw(test)
+    assert told == (
+        "Another draw of nulls could decide otherwise: the interval of p, [0, 0.072] 90 %, holds the level of 0.05; "
+        "59 kinds of numerics would settle it, if the same share of them is as far."
+    )
+    assert "more than 1000 kinds" in by_draw(replace(test, settling=None))[0]
+    assert by_draw(replace(test, open=False)) == ()

@@ -1,0 +1,106 @@
+"""Thresholds live in one frozen object, which verdicts record; nowhere else in the rooms of a verdict is one."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import UsageError
+from measure.verdict.criteria import CRITERIA, Criteria
+
+MEASURE = Path(__file__).resolve().parents[3] / "measure"
+ROOMS = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "closing")
+
+METHOD = {
+    "forecasting/alignment": {"_CALM"},
+    "forecasting/observer": {"WIDEST"},
+    "forecasting/regressors": {
+        "_DENSITY",
+        "_BENDING",
+        "_DAMPING",
+        "_MODES",
+        "_MOTIONS",
+        "PRIOR",
+        "PRIOR_WITHOUT_MASS",
+    },
+    "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
+    "probes/course": {"ALONG", "LEFT", "_WINDOW"},
+    "probes/lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},
+    "probes/statistics": {"_CHUNK", "_CLIP", "_NEVER", "_NOISE"},
+    "probes/wind_log": {"_STEPS", "_REACH", "_LAGS", "_CALM"},
+    "inference/evidence": {"_HERE"},
+    "inference/random_effect": {"_SHIFTS", "_POWERS", "_UNSEEN"},
+    "nulls/bank": {"WINDS", "FILE_LIMIT", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING", "_STRETCHING"},
+    "nulls/conformal": {"MOST_KINDS"},
+    "nulls/reference": {"_GROUPS", "_NOTHING"},
+    "nulls/simulation": {"_SETTLE", "_FINER", "_STEPS", "_UNEVEN", "_HALVINGS", "_GENTLE"},
+    "loop/gauss_newton": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST"},
+    "loop/residuals": {"_SHOWN"},
+    "loop/run": {"_FLOOR_COPIES", "_LOOKS"},
+    "loop/selection": {"GUST_COLUMN"},
+    "loop/validation": {"_DURATION", "_ENOUGH"},
+    "verdict/quantity": {"_DIGITS", "_MOST_DIGITS", "_WIDEST", "_NARROWEST"},
+    "closing/artifacts": {"_FORMAT"},
+    "closing/models": {"_SETTLE", "_FRAMES", "_ROUGH"},
+}
+"""Numbers that say what is simulated, how errors are brought down and how it is shown; no verdict is decided by one."""
+PLAIN = {0, 1, 2, 3, -1}
+"""Counts and places, not thresholds."""
+
+
+def numbers(node: ast.AST) -> list[float]:
+    return [
+        found.value for found in ast.walk(node)
+        if isinstance(found, ast.Constant) and type(found.value) in (int, float)
+    ]  # fmt: skip
+
+
+def constants(path: Path) -> set[str]:
+    """Names of upper case that a module binds to something with a number in it."""
+    names: set[str] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        targets = (
+            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        )
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None and numbers(node.value):
+            for target in targets:
+                names |= {n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id.upper() == n.id}
+    return names
+
+
+@pytest.mark.parametrize(
+    "name", sorted(f"{room}/{path.stem}" for room in ROOMS for path in (MEASURE / room).glob("*.py"))
+)
+def test_no_threshold_lives_outside_the_criteria(name: str) -> None:
+    path = MEASURE / f"{name}.py"
+    if name == "verdict/criteria":
+        pytest.skip("the criteria themselves")
+    tables = {"THETA", "_FIRST", "_AXES", "SHAPES"}  # of parameters, places and names, in which numbers are no limits
+    tables |= {name for name in constants(path) if name.startswith("_STEPS")}
+    assert constants(path) - METHOD.get(name, set()) - tables == set()
+
+
+@pytest.mark.parametrize("name", ["loop/selection", "loop/run", "loop/refit", "nulls/conformal"])
+def test_what_decides_compares_with_no_number_of_its_own(name: str) -> None:
+    tree = ast.parse((MEASURE / f"{name}.py").read_text(encoding="utf-8"))
+    compared = {value for node in ast.walk(tree) if isinstance(node, ast.Compare) for value in numbers(node)}
+    assert compared <= PLAIN
+
+
+def test_the_hash_is_that_of_the_values() -> None:
+    assert Criteria().hash == CRITERIA.hash == CRITERIA.as_dict()["hash"]
+    assert replace(CRITERIA, lead=2.5).hash != CRITERIA.hash
+
+
+def test_criteria_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        CRITERIA.level = 0.5  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@pytest.mark.parametrize("name", ["level", "interval", "room"])
+def test_a_share_is_between_nothing_and_all(name: str) -> None:
+    with pytest.raises(UsageError, match="between 0 and 1"):
+        replace(CRITERIA, **{name: 1.0})
