@@ -11,7 +11,7 @@ import torch
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.key import Key
 from measure.challenge.recipe import effect_type
-from measure.forecasting.regressors import Calibration
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.setting import Setting
 from measure.loop.validation import folds
 from measure.observe.trajectory import Experiment

@@ -85,14 +85,11 @@ def _model(
     if effects:
         strengths: dict[str, dict[str, float]] = {}
         for candidate in effects:
-            strengths.setdefault(candidate.effect, {})[candidate.parameter.replace("_", "-")] = _admissible(candidate)
+            described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
+            own = strengths.setdefault(candidate.effect, {})
+            own[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
         content["effects"] = strengths
     return NamedModel(name=name, content=content)
-
-
-def _admissible(candidate: Candidate) -> float:
-    least, most = EFFECTS[candidate.effect].parameters()[candidate.parameter].admissible
-    return float(np.clip(candidate.strength.value, least, most))
 
 
 def _common(experiment: Experiment, seed: int) -> dict[str, Any]:

@@ -10,8 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import WIDEST, Forecaster
-from measure.forecasting.regressors import Calibration, EffectColumn
+from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
 from sim.effects import Effect, apply
 from sim.state import State
@@ -82,5 +83,5 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
 
 
 def _admissible(column: EffectColumn, coefficient: float) -> float:
-    null, (least, most) = column.described.null, column.described.admissible
-    return float(np.clip(null + coefficient, least, most)) - null
+    null = column.described.null
+    return column.described.nearest(null + coefficient) - null

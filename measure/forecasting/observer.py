@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from measure.forecasting.regressors import DOUBLE, THETA, Calibration, Column, StepColumn, WrittenColumn
+from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.regressors import DOUBLE, Column, StepColumn, WrittenColumn
 from measure.forecasting.segments import Segments
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen

@@ -1,4 +1,4 @@
-"""What is varied about the model, one column each: calibrated parameters, effects of the library, forces.
+"""What is varied about the model, one column each: effects of the library, forces, the wind.
 
 A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
 of parameters, of effects, of the corrective field and of the wind are found by simulation: `StepColumn.system` gives
@@ -7,10 +7,8 @@ the batch with a small step taken. Forces along the motion and across it, which 
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,70 +17,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import UsageError
+from measure.forecasting.calibration import THETA
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, apply
 from sim.effects.effect import ForceEffect
 from sim.effects.geometry import left_of
 from sim.effects.gusts import Gusts
 from sim.effects.parameter import Parameter
-from sim.material import Material
 from sim.state import State
 from sim.system import System
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Calibration:
-    """The base model's parameters, as factors on the nominal material; damping as it is [s]."""
-
-    density: float = 1.0
-    bending: float = 1.0
-    damping: float = 2.5e-3
-
-    def material(self, nominal: Material) -> Material:
-        """The material they make of the nominal one."""
-        scaled = nominal.scaled(density=self.density, bending=self.bending)
-        return replace(scaled, damping=self.damping)
-
-    def moved(self, steps: Sequence[float]) -> Calibration:
-        """After steps along `THETA`, in its units, kept within its bounds."""
-        density, bending, damping = steps
-        return Calibration(
-            density=float(np.clip(self.density * math.exp(density), *_DENSITY)),
-            bending=float(np.clip(self.bending * math.exp(bending), *_BENDING)),
-            damping=float(np.clip(self.damping * math.exp(damping), *_DAMPING)),
-        )
-
-    def steps_from(self, other: Calibration) -> tuple[float, float, float]:
-        """Steps along `THETA` that lead here from another."""
-        return (
-            math.log(self.density / other.density),
-            math.log(self.bending / other.bending),
-            math.log(self.damping / other.damping),
-        )
-
-    @property
-    def at_bounds(self) -> tuple[str, ...]:
-        """Names of the parameters that are as small or as large as the model holds: their data want to go beyond."""
-        bounds = {"density": _DENSITY, "bending": _BENDING, "damping": _DAMPING}
-        return tuple(name for name, span in bounds.items() if not span[0] < getattr(self, name) < span[1])
-
-
-_DENSITY = (0.2, 5.0)
-_BENDING = (0.02, 50.0)
-_DAMPING = (0.25e-3, 0.2)  # s; with less, the motion of a flag does not converge in the mesh
-
-THETA: tuple[tuple[str, str, float], ...] = (("density", "ln", 0.1), ("bending", "ln", 0.7), ("damping", "ln", 0.7))
-"""Name, unit and step of the calibrated parameters: natural logarithms of factors, and of the damping's time."""
-
-PRIOR = np.array([0.3, 1.0, 1.5])
-"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
-30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever
-measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard deviations."""
-
-PRIOR_WITHOUT_MASS = np.array([1.0, 1.0, 1.5])
-"""The same of a cloth that was not weighed and whose material is a guess: its density within a factor of e."""
 
 
 class Column(ABC):

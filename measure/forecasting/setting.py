@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from measure.forecasting.alignment import aligned
+from measure.forecasting.calibration import PRIOR, PRIOR_WITHOUT_MASS, Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import PRIOR, PRIOR_WITHOUT_MASS, Calibration
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
 from sim.integrate.split import SplitEuler

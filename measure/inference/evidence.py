@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.forecasting.regressors import PRIOR, THETA
+from measure.forecasting.calibration import PRIOR, THETA
 from measure.inference.random_effect import NullModel
 from measure.probes.course import Course
 from measure.probes.rows import Rows

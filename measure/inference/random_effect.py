@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.forecasting.regressors import PRIOR, THETA, Calibration
+from measure.forecasting.calibration import DAMPING, PRIOR, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.growth import power
 from measure.probes.rows import Rows
@@ -56,7 +56,7 @@ class NullModel:
         of it is taken to be larger by a power of the damping.
         """
         grown = _power_of_damping(nulls)
-        clean = nulls.statistics.r * np.exp(-grown * nulls.calibration[:, _DAMPING])[:, None]
+        clean = nulls.statistics.r * np.exp(-grown * nulls.calibration[:, DAMPING])[:, None]
         features = np.c_[_features(nulls.speeds), nulls.beyond(design)]
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
         left = clean - features @ coefficients
@@ -132,7 +132,7 @@ class Nulls(Rows):
     @property
     def design(self) -> Design:
         """The design of the first segment: that of all, where they are of one experiment."""
-        damping = Calibration().moved((0.0, 0.0, float(self.calibration[0, _DAMPING]))).damping
+        damping = Calibration().moved((0.0, 0.0, float(self.calibration[0, DAMPING]))).damping
         return Design(
             noise=float(self.noise[0]), period=float(self.period[0]), cloth=str(self.cloth[0]), damping=damping
         )
@@ -141,9 +141,6 @@ class Nulls(Rows):
 _POWERS = 3
 _UNSEEN = 1e-9
 """Share of the mean variance that a column has of which nothing is seen, as of an effect without a moment."""
-
-
-_DAMPING = [name for name, *_ in THETA].index("damping")
 
 
 def _power_of_damping(nulls: Nulls) -> float:
@@ -155,7 +152,7 @@ def _power_of_damping(nulls: Nulls) -> float:
     squared = (left - means[experiment]) ** 2
     whole = np.maximum(squared.mean(axis=0), np.finfo(np.float64).tiny)
     sizes = np.array([(squared[experiment == index].mean(axis=0) / whole).mean() for index in range(len(first))])
-    return power(np.sqrt(sizes), nulls.calibration[first, _DAMPING])
+    return power(np.sqrt(sizes), nulls.calibration[first, DAMPING])
 
 
 def _features(speeds: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.forecasting.regressors import Calibration
+from measure.forecasting.calibration import Calibration
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel
 from measure.probes.statistics import Projection, Statistics

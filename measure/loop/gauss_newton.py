@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError
+from measure.forecasting.calibration import PRIOR, THETA, Calibration
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import DOUBLE, PRIOR, THETA, Calibration, Column, EffectColumn
+from measure.forecasting.regressors import DOUBLE, Column, EffectColumn
 from measure.forecasting.segments import Segments
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel

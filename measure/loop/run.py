@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
-from measure.forecasting.regressors import THETA, Calibration, columns
+from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.regressors import columns
 from measure.forecasting.setting import Setting, Stage
 from measure.inference.evidence import Evidence, Fit
 from measure.inference.whitened_misfit import WhitenedMisfit

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from measure.forecasting.regressors import THETA, EffectColumn, columns, names
+from measure.forecasting.calibration import THETA
+from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.inference.evidence import Evidence, gains
 from measure.inference.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.refit import Refit
@@ -27,7 +28,6 @@ from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import number
 from measure.verdict.record import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
-from sim.effects.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
@@ -236,8 +236,13 @@ def _second(
         if not _leads(pairs[1 + place], pairs[0], evidence.recording):
             return None
         value, _ = evidence.fit(both).of(second.column)
+        described = EFFECTS[second.candidate.effect].parameters()[second.candidate.parameter]
         constant = all(_homogeneous_beside(evidence, both, w, level) for w in (first, second) if w.column in both)
-        if _physical(_described(second), value) and constant and reference.p_left_by(evidence, names(), both) > level:
+        if (
+            described.admits(described.null + value)
+            and constant
+            and reference.p_left_by(evidence, names(), both) > level
+        ):
             return second
     return None
 
@@ -271,16 +276,6 @@ def _each(
     return tuple(made)
 
 
-def _described(weighed: Weighed) -> Parameter:
-    return EFFECTS[weighed.candidate.effect].parameters()[weighed.candidate.parameter]
-
-
-def _physical(described: Parameter, coefficient: float) -> bool:
-    """Whether a strength beyond null is one that the effect may have."""
-    least, most = described.admissible
-    return least <= described.null + coefficient <= most
-
-
 def _weigh(
     evidence: Evidence,
     reference: Reference,
@@ -306,7 +301,7 @@ def _weigh(
     by_recording = _each(left, [column], column, about=about, larger=error / fit.of(column)[1], unit=effect.unit)
     return Weighed(
         column=column, error=error, gains=gained, recording=evidence.recording,
-        admissible=_physical(effect.described, value) and not lost,
+        admissible=effect.described.admits(null + value) and not lost,
         candidate=Candidate(
             effect=effect.effect, parameter=effect.parameter, null=null,
             strength=strength(null, value, error, effect.unit),

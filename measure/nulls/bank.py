@@ -20,8 +20,9 @@ import torch
 from flagdata.errors import CorruptError, LimitError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
 from flagdata.rng import child_seed, stream
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration, Column, columns, names
+from measure.forecasting.regressors import Column, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import Nulls
 from measure.nulls.reference import NullBank

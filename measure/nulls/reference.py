@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
-from measure.forecasting.regressors import THETA, Calibration
+from measure.forecasting.calibration import DAMPING, THETA, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.evidence import Evidence, best_gain
 from measure.inference.fluctuation import fluctuation
@@ -25,7 +25,6 @@ from measure.verdict.criteria import CRITERIA
 
 Floats = NDArray[np.float64]
 _GROUPS = 400
-_DAMPING = [name for name, *_ in THETA].index("damping")
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
 
@@ -175,7 +174,7 @@ class _Found(Rows):
             gained=np.array([best_gain(evidence)]), swings=swing[None],
             lines=None if evidence.lines is None else strongest(evidence.lines)[None],
             deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
-            noise=own.noise, kinds=own.numerics, damping=own.calibration[:, _DAMPING],
+            noise=own.noise, kinds=own.numerics, damping=own.calibration[:, DAMPING],
         )  # fmt: skip
 
 
@@ -296,7 +295,7 @@ class Reference:
 
     def at(self, calibration: Calibration) -> Reference:
         """For data whose statistics are taken at a calibration."""
-        return replace(self, damping=calibration.steps_from(Calibration())[_DAMPING])
+        return replace(self, damping=calibration.steps_from(Calibration())[DAMPING])
 
     def beside(self) -> Reference:
         """That of evidence with a pressure that is free in every segment.

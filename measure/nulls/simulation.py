@@ -16,7 +16,7 @@ from scipy.spatial import Delaunay
 
 from flagdata.errors import FlagdataError
 from flagdata.rng import stream
-from measure.forecasting.regressors import Calibration
+from measure.forecasting.calibration import Calibration
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.effects import Effect, apply

@@ -20,8 +20,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration, Column, winds
+from measure.forecasting.regressors import Column, winds
 from measure.forecasting.segments import Segments
 from measure.probes.course import Course, Gauge
 from measure.probes.lines import Spectrum

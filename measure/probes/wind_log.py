@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import WindTrack
 from measure.probes.course import ALONG, Course

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.forecasting.regressors import THETA
+from measure.forecasting.calibration import THETA
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import Nulls
 from measure.nulls.reference import left_out_groups

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
-from measure.forecasting.regressors import THETA, Calibration, EffectColumn
+from measure.forecasting.regressors import EffectColumn
 from measure.inference.random_effect import NullModel
 from measure.loop.gauss_newton import ROUNDS, STAYS, cut
 from measure.propose.lens import Lens, evidence

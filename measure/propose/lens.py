@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import THETA, Calibration, Column
+from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel

@@ -17,7 +17,8 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from measure.forecasting.regressors import THETA, Column, EffectColumn, columns
+from measure.forecasting.calibration import THETA
+from measure.forecasting.regressors import Column, EffectColumn, columns
 from measure.forecasting.setting import Setting, Stage
 from measure.inference.evidence import Evidence, gains
 from measure.inference.random_effect import NullModel
@@ -202,8 +203,7 @@ def weigh(
 
 def _admissible(column: EffectColumn, own: Evidence, place: int, beside: Sequence[int]) -> bool:
     """Whether the strength that fits makes sense."""
-    least, most = column.described.admissible
-    return least <= column.described.null + own.fit([*beside, place]).of(place)[0] <= most
+    return column.described.admits(column.described.null + own.fit([*beside, place]).of(place)[0])
 
 
 def _kind(column: EffectColumn) -> str:

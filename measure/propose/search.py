@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure.forecasting.regressors import PRIOR, THETA
+from measure.forecasting.calibration import PRIOR, THETA
 from measure.inference.evidence import Evidence, gains
 from measure.loop.validation import total_error
 from measure.propose.family import Family

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import WIDEST, Forecaster
-from measure.forecasting.regressors import Calibration, Column
+from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
 from measure.propose.terms import MASS, TermColumn
 from sim.cloth import Cloth

@@ -55,6 +55,15 @@ class Described:
     admissible: tuple[float, float]
     source: str
 
+    def admits(self, value: float) -> bool:
+        """Whether a value makes sense at all."""
+        least, most = self.admissible
+        return least <= value <= most
+
+    def nearest(self, value: float) -> float:
+        """The admissible value that is nearest to one."""
+        return float(np.clip(value, *self.admissible))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter(Described):

@@ -1,4 +1,4 @@
-"""The rooms of a verdict stand in one order, and import only what lies before them; an import in a function counts too."""
+"""The rooms of a verdict stand in one order, and import only what lies before them, in functions as well."""
 
 from __future__ import annotations
 

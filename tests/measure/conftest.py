@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim import handles

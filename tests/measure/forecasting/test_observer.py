@@ -11,18 +11,10 @@ import torch
 from flagdata.errors import InputError, UsageError
 from measure.forecasting import model as model_module
 from measure.forecasting import observer
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import (
-    THETA,
-    AcrossColumn,
-    Calibration,
-    EffectColumn,
-    FieldColumn,
-    MotionColumn,
-    library,
-    winds,
-)
+from measure.forecasting.regressors import AcrossColumn, EffectColumn, FieldColumn, MotionColumn, library, winds
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from measure.propose.terms import Term, columns_of

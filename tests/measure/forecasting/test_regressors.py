@@ -10,8 +10,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
-from measure.forecasting.regressors import THETA, Calibration, FieldColumn, fields, library, motions
+from measure.forecasting.regressors import FieldColumn, fields, library, motions
 from sim.effects import EFFECTS
 from sim.material import named
 from sim.scene import assemble, flag

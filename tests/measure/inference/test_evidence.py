@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, kstest, uniform
 
 from flagdata.errors import InputError, UsageError
-from measure.forecasting.regressors import PRIOR, THETA
+from measure.forecasting.calibration import PRIOR, THETA
 from measure.forecasting.setting import Design
 from measure.inference.evidence import Evidence, best_gain, gains
 from measure.inference.fluctuation import fluctuation

@@ -7,9 +7,10 @@ from typing import cast
 import numpy as np
 import pytest
 
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import THETA, Calibration, EffectColumn
+from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import NullModel
 from measure.loop import gauss_newton

@@ -14,7 +14,8 @@ from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
 from measure.closing.close import close_loop
-from measure.forecasting.regressors import Calibration, columns, fields
+from measure.forecasting.calibration import Calibration
+from measure.forecasting.regressors import columns, fields
 from measure.forecasting.setting import Design, Setting
 from measure.inference.evidence import Fit
 from measure.inference.whitened_misfit import WhitenedMisfit

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
-from measure.forecasting.regressors import PRIOR, THETA, EffectColumn, columns, names
+from measure.forecasting.calibration import PRIOR, THETA
+from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel, Nulls
 from measure.loop.refit import Refit

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration, EffectColumn
+from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
 from measure.nulls.bank import evaluate
 from measure.nulls.simulation import NullBatch

@@ -12,8 +12,8 @@ import torch
 from flagdata.errors import InputError, UsageError
 from measure.closing.close import close_loop
 from measure.forecasting.alignment import aligned
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration
 from measure.forecasting.segments import Segments
 from measure.loop.run import Options
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet

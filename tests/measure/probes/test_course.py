@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration, EffectColumn, winds
+from measure.forecasting.regressors import EffectColumn, winds
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory, WindTrack
 from measure.probes.course import ALONG, LEFT, Course, Gauge

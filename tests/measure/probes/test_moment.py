@@ -7,8 +7,9 @@ import pytest
 import torch
 
 from flagdata.rng import stream
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Calibration, EffectColumn
+from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory
 from measure.probes.moment import PoleMoment, shares

@@ -9,8 +9,9 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
+from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import AcrossColumn, Calibration, EffectColumn
+from measure.forecasting.regressors import AcrossColumn, EffectColumn
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory
 from measure.probes.statistics import Statistics, projected, statistics

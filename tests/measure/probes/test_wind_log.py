@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import THETA, Calibration, library
+from measure.forecasting.regressors import library
 from measure.forecasting.segments import Cut, Segment, Segments
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel

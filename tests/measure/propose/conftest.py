@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from flagdata.rng import stream
-from measure.forecasting.regressors import THETA, Calibration, Column, EffectColumn, fields
+from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.regressors import Column, EffectColumn, fields
 from measure.inference.random_effect import Nulls
 from measure.nulls.bank import evaluate
 from measure.nulls.reference import NullBank

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.forecasting.regressors import PRIOR
+from measure.forecasting.calibration import PRIOR
 from measure.inference.random_effect import NullModel, Nulls
 from measure.probes.statistics import Statistics
 from measure.propose.family import Family

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import THETA, Calibration, Column
+from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
 from measure.probes.statistics import statistics

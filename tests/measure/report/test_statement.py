@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.forecasting.regressors import Calibration, FieldColumn
+from measure.forecasting.calibration import Calibration
+from measure.forecasting.regressors import FieldColumn
 from measure.loop.corrective_field import Mode
 from measure.probes.course import Variation
 from measure.probes.lines import Line

@@ -16,16 +16,9 @@ ROOMS = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "clos
 
 METHOD = {
     "forecasting/alignment": {"_CALM"},
+    "forecasting/calibration": {"_DENSITY", "_BENDING", "_DAMPING", "PRIOR", "PRIOR_WITHOUT_MASS"},
     "forecasting/observer": {"WIDEST"},
-    "forecasting/regressors": {
-        "_DENSITY",
-        "_BENDING",
-        "_DAMPING",
-        "_MODES",
-        "_MOTIONS",
-        "PRIOR",
-        "PRIOR_WITHOUT_MASS",
-    },
+    "forecasting/regressors": {"_MODES", "_MOTIONS"},
     "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
     "probes/course": {"ALONG", "LEFT", "_WINDOW"},
     "probes/lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},
