@@ -11,7 +11,6 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -46,41 +45,18 @@ Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
 _LOOKS = 4
 """At most: a damping of 30 ms is reached from 2.5 ms in two or three."""
-FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
-"""So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
-    """How to close the loop.
-
-    Attributes:
-        seed: of the nulls.
-        level: of the global test.
-        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
-        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
-            and winds, over the same priors.
-        workers: processes for the nulls, then threads for sensitivities and for the models that are refitted.
+class Options(supply.NullOptions):
+    """How to close the loop: by which nulls, at which level of the global test.
 
     Raises:
-        UsageError: a level or counts that make no sense.
+        UsageError: values that make no sense, or a level that so many nulls cannot test.
     """
 
-    seed: int = 0
-    level: float = CRITERIA.level
-    nulls: int = FEWEST_NULLS
-    bank: Path | None = None
-    workers: int = 1
-
     def __post_init__(self) -> None:
-        if not 0 < self.level < 1:
-            raise UsageError(f"a level of {self.level!r}", where="close-loop", fix="give one between 0 and 1")
-        if self.nulls < FEWEST_NULLS or self.workers < 1:
-            raise UsageError(
-                f"{self.nulls} nulls by {self.workers} workers",
-                where="close-loop",
-                fix=f"give {FEWEST_NULLS} or more, and 1 or more",
-            )
+        super().__post_init__()
         needed = banks.WINDS * kinds_needed(self.level)
         if self.bank is None and self.nulls < needed:
             raise UsageError(
@@ -140,9 +116,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         setting = setting.moved(late)
         found, projection = _looked_at(setting)
     tell("sensitivities", 1, 1)
-    bank = supply.supplied(
-        setting, bank=options.bank, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
-    )
+    bank = supply.supplied(setting, options, stage=tell)
     reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
     tell("base model", 0, 1)
     setting, fits = _calibrated(setting, _fits(setting, found, projection, bank), bank)

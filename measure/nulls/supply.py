@@ -3,26 +3,63 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UsageError
 from flagdata.rng import child_seed
 from measure.forecasting.setting import Setting, Stage
 from measure.nulls import bank as banks
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
+from measure.verdict.criteria import CRITERIA
+
+FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
+"""So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
 
 
-def supplied(setting: Setting, *, bank: Path | None, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
-    """The bank of a folder where one is named; else one of so many nulls, simulated for an experiment.
+@dataclass(frozen=True, kw_only=True)
+class NullOptions:
+    """By which nulls is tested, and at which level.
+
+    Attributes:
+        seed: of the nulls.
+        level: of the test.
+        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
+        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
+            and winds, over the same priors.
+        workers: processes for the nulls, then threads for what is fitted.
+
+    Raises:
+        UsageError: a level or counts that make no sense.
+    """
+
+    seed: int = 0
+    level: float = CRITERIA.level
+    nulls: int = FEWEST_NULLS
+    bank: Path | None = None
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0 < self.level < 1:
+            raise UsageError(f"a level of {self.level!r}", where="nulls", fix="give one between 0 and 1")
+        if self.nulls < FEWEST_NULLS or self.workers < 1:
+            raise UsageError(
+                f"{self.nulls} nulls by {self.workers} workers", where="nulls",
+                fix=f"give {FEWEST_NULLS} or more, and 1 or more",
+            )  # fmt: skip
+
+
+def supplied(setting: Setting, options: NullOptions, *, stage: Stage) -> NullBank:
+    """The bank of a folder where one is named; else nulls that are simulated for an experiment.
 
     Raises:
         FlagdataError: as `given`.
     """
-    if bank is not None:
-        return given(bank, setting)
-    return simulated(setting, nulls=nulls, seed=seed, workers=workers, stage=stage)
+    if options.bank is not None:
+        return given(options.bank, setting)
+    return simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=stage)
 
 
 def given(folder: Path, setting: Setting) -> NullBank:

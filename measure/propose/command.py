@@ -54,17 +54,17 @@ def propose(
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
     from flagdata.lake import Lake
+    from measure.nulls.supply import NullOptions
     from measure.observe import recipe as recipes
     from measure.propose import candidates, ledger
     from measure.propose.effect_file import write
-    from measure.propose.propose import Options
     from measure.propose.propose import propose as seek
     from measure.propose.terms import dictionary
     from measure.propose.words import words
 
     recipe = recipes.load(recipe_path)
     said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
-    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
+    options = NullOptions(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
     tried, controls = (dictionary(), ()) if effect is None else (candidates.from_file(effect), dictionary())
     observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))
     refuse(observed.findings)

@@ -10,19 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError
 from measure.forecasting.calibration import THETA
 from measure.forecasting.regressors import Column, EffectColumn, columns
 from measure.forecasting.setting import Setting, Stage
 from measure.inference.evidence import Evidence, gains
 from measure.inference.random_effect import NullModel
-from measure.loop.run import FEWEST_NULLS
 from measure.loop.selection import estimate
 from measure.nulls import supply
 from measure.nulls.reference import NullBank
@@ -37,7 +35,6 @@ from measure.propose.retest import retest
 from measure.propose.search import Step, search, wrong
 from measure.propose.split import data_hash, split
 from measure.propose.terms import MASS, TermColumn
-from measure.verdict.criteria import CRITERIA
 from sim.effects.field import Flat
 
 Floats = NDArray[np.float64]
@@ -52,44 +49,13 @@ _CLOSE = 0.6
 """A local term with this share of the best one's gain is worth a better place."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """How to search.
-
-    Attributes:
-        seed: of the nulls.
-        level: of each step's test against nulls.
-        nulls: null recordings simulated where no bank is given, at least.
-        bank: a folder of nulls over priors that hold for this design, as `flagdata close-loop --bank` takes it.
-        workers: processes for them.
-
-    Raises:
-        UsageError: values that make no sense.
-    """
-
-    seed: int = 0
-    level: float = CRITERIA.level
-    nulls: int = FEWEST_NULLS
-    bank: Path | None = None
-    workers: int = 1
-
-    def __post_init__(self) -> None:
-        if not 0 < self.level < 1:
-            raise UsageError(f"a level of {self.level!r}", where="propose", fix="give one between 0 and 1")
-        if self.nulls < FEWEST_NULLS or self.workers < 1:
-            raise UsageError(
-                f"{self.nulls} nulls by {self.workers} workers", where="propose",
-                fix=f"give {FEWEST_NULLS} or more, and 1 or more",
-            )  # fmt: skip
-
-
 def propose(
     experiment: Experiment,
     candidates: Sequence[EffectColumn],
     *,
     known: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
-    options: Options,
+    options: supply.NullOptions,
     stage: Stage | None = None,
 ) -> Outcome:
     """Seek terms that a model lacks, and keep them if they help on recordings that were not looked at.
@@ -106,9 +72,7 @@ def propose(
     torch.set_num_threads(1)
     tell = stage or (lambda what, done, total: None)
     setting = made_ready(experiment)
-    bank = supply.supplied(
-        setting, bank=options.bank, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=tell
-    )
+    bank = supply.supplied(setting, options, stage=tell)
     return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=tell)
 
 
@@ -136,7 +100,7 @@ def weigh(
     *,
     known: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
-    options: Options,
+    options: supply.NullOptions,
     stage: Stage,
 ) -> Outcome:
     """The outcome for recordings, given nulls.

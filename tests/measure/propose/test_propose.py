@@ -12,10 +12,11 @@ import torch
 from flagdata.errors import InputError, UsageError
 from measure.forecasting.regressors import Column, EffectColumn
 from measure.nulls.reference import NullBank
+from measure.nulls.supply import NullOptions
 from measure.observe.trajectory import Experiment, Specimen, WindTrack
 from measure.propose.effect_file import write
 from measure.propose.outcome import Decision, Outcome, Retest
-from measure.propose.propose import Options, made_ready, weigh
+from measure.propose.propose import made_ready, weigh
 from measure.propose.words import words
 from measure.verdict.record import Estimate
 from sim.effects.field import FieldEffect, Seen
@@ -29,7 +30,7 @@ def silent(what: str, done: int, total: int) -> None:
 
 @pytest.fixture(scope="module")
 def found(pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, lens: tuple[Column, ...]) -> Outcome:
-    return weigh(made_ready(pushed), columns, bank, lens, options=Options(), stage=silent)
+    return weigh(made_ready(pushed), columns, bank, lens, options=NullOptions(), stage=silent)
 
 
 def test_a_planted_push_is_kept(found: Outcome) -> None:
@@ -111,4 +112,4 @@ def test_what_helps_no_more_than_a_wrong_term_is_rejected(
 @pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"nulls": 10}, {"workers": 0}])
 def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(UsageError):
-        Options(**wrong)  # pyright: ignore[reportArgumentType]
+        NullOptions(**wrong)  # pyright: ignore[reportArgumentType]
