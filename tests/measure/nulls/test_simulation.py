@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
-from measure.forecasting.regressors import Calibration
+from measure.forecasting.calibration import Calibration
 from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import Specimen
 
