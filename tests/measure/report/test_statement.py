@@ -10,9 +10,11 @@ import pytest
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.regressors import FieldColumn
 from measure.loop.corrective_field import Mode
+from measure.loop.run import Outcome
+from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 from measure.probes.course import Variation
 from measure.probes.lines import Line
-from measure.report.statement import blowing, bounds, by_draw, proposal, sentence, shedding
+from measure.report.statement import blowing, bounds, by_draw, proposal, sentence, shedding, stated
 from measure.verdict.record import Conclusion
 from tests.measure.report.verdicts import verdict
 
@@ -82,3 +84,44 @@ def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_
     )
     assert "more than 1000 kinds" in by_draw(replace(test, settling=None))[0]
     assert by_draw(replace(test, open=False)) == ()
+
+
+@pytest.fixture
+def outcome(specimen: Specimen) -> Outcome:
+    """An outcome of one recording for which the library has no answer."""
+    recording = Trajectory(
+        name="first", markers=specimen.mesh.rest, positions=np.zeros((100, specimen.mesh.vertex_count, 3)), rate=25.0,
+        wind=WindTrack.constant((4.0, 0.0, 0.0)),
+    )  # fmt: skip
+    numbers = replace(
+        verdict(Conclusion.OUTSIDE), words="", proposal="", separating="", assumptions=(), ranking=(), named=()
+    )
+    return Outcome(
+        verdict=numbers, experiment=Experiment(specimen=specimen, recordings=(recording,)), lags=(0.5,),
+        at_bounds=("damping",), field=(Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),),
+        line=Line(far=9.0, reduced=0.2 / 0.15, direction=1),
+        course=Variation(whole=np.array([0.0169, 0.0, 0.0]), fast=np.array([0.0144, 0.0, 0.0])),
+    )  # fmt: skip
+
+
+def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its_field_in_this_order(
+    outcome: Outcome,
+) -> None:
+    said = stated(outcome)
+    assert said.words.startswith(sentence(outcome.verdict))
+    assert "bound of what the model holds in damping" in said.words
+    assert said.proposal.index("as vortices") < said.proposal.index("a wind that varies") < said.proposal.index("force")
+    assert "that fits the errors best" in said.proposal
+    assert said.assumptions[-1].endswith("was moved: first by 0.50 s")
+    numbers = replace(said, words="", proposal="", separating="", assumptions=())
+    assert numbers == outcome.verdict
+
+
+def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: Outcome) -> None:
+    falling = Variation(whole=np.array([-0.01, 0.0, 0.0]), fast=np.array([0.0, 0.0, 0.0]))
+    said = stated(replace(outcome, whole=False, line=None, course=falling)).proposal
+    assert said.startswith("The smooth force field that fits the remaining errors best")
+
+
+def test_an_outcome_with_an_answer_proposes_nothing(outcome: Outcome) -> None:
+    assert stated(replace(outcome, field=())).proposal == ""
