@@ -55,6 +55,10 @@ _ENDS = (
     "the hours run from 1 to 24: each is taken as the end of its hour, 24 as midnight; if they are numbers "
     "of hours that begin then, the times are an hour late"
 )
+_OF_YEAR = (
+    "the days are taken as those of the year, since no column holds a month; if they are days of a month, the times "
+    "are wrong: add a column of the month"
+)
 _UNNAMED = (("%m", 1, 12), ("%d", 1, 31), ("%H", 0, 24), ("%M", 0, 59))
 _YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
 _TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
@@ -84,13 +88,18 @@ def choices(
     columns = [_whole(cells) for cells in columns]
     for choice in _choices(layout, columns, dates, order):
         directives = (choice.form or "").split(" ")
-        at = (
-            choice.columns[directives.index("%H")]
-            if len(directives) == len(choice.columns) and "%H" in directives
-            else None
-        )
-        ends = at is not None and _ends_of_hours([cell for cell in columns[at] if cell])
-        yield replace(choice, remark=_ENDS) if ends else choice
+        column = dict(zip(directives, choice.columns, strict=True)) if len(directives) == len(choice.columns) else {}
+        if "%H" in column and _ends_of_hours([cell for cell in columns[column["%H"]] if cell]):
+            yield replace(choice, remark=_ENDS)
+        elif "%j" in column and _may_be_of_month(layout.names[column["%j"]], columns[column["%j"]]):
+            yield replace(choice, remark=_OF_YEAR)
+        else:
+            yield choice
+
+
+def _may_be_of_month(heading: str, cells: Sequence[str]) -> bool:
+    """Whether days of the year stand below a mere "day" and may as well be those of a month that is not told."""
+    return _fits("day", " ".join(words_of(heading)), "") and whole_numbers([c for c in cells if c], *_LIMITS["day"])
 
 
 def _ends_of_hours(cells: Sequence[str]) -> bool:

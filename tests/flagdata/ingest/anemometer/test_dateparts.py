@@ -61,6 +61,17 @@ def test_a_day_of_the_year_with_its_fraction_begins_with_one_at_new_year(log_fil
     assert np.all(np.diff(time) == np.timedelta64(10, "m"))
 
 
+@pytest.mark.parametrize(("heading", "first", "doubtful"), [("Day", 3, True), ("Day", 40, False), ("DOY", 3, False)])
+def test_a_day_beside_a_year_that_may_be_one_of_a_month_is_told(
+    log_file: Write, heading: str, first: int, doubtful: bool
+) -> None:
+    rows = "".join(f"2026 {first + at // 24} {at % 24} {3 + at % 2}.5\n" for at in range(48))
+    found = read_log(log_file(f"Year {heading} Hour wspd\n{rows}"), WindOptions(zone="UTC", unit="m/s"))
+    start = np.datetime64("2026-01-01") + np.timedelta64(first - 1, "D")
+    assert found.series.time[0].astype("datetime64[ns]") == start
+    assert doubtful == any("no column holds a month" in finding.what for finding in found.findings)
+
+
 def test_parts_of_a_time_of_day_alone_ask_for_the_day(log_file: Write) -> None:
     rows = "".join(f"7,{at},0,{3 + at % 2}.5\n" for at in range(30))
     path = log_file(f"hh,mm,ss,wind speed (m/s)\n{rows}")
