@@ -61,6 +61,8 @@ class TimeError(FlagdataError):
 class NothingMeasuredError(InputError):
     """A log, or one anemometer of a log, none of whose values can be used."""
 
+    kind = "nothing-measured"
+
 
 class ZoneMissingError(TimeError):
     """Stamps of a wall clock whose zone nobody named."""
