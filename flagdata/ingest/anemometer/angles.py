@@ -81,13 +81,6 @@ def degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:
     return np.array([points.get(cell.upper(), np.nan) for cell in layout.column(index)])
 
 
-def is_vane(heading: Heading, value: NDArray[np.float64]) -> bool:
-    """Whether WV is a wind vane, not a velocity: its numbers go beyond every wind, and not beyond a turn."""
-    known = value[np.isfinite(value)]
-    vane = heading.quantity == "wind_speed" and heading.unit is None and words_of(heading.name)[:1] == ["wv"]
-    return vane and len(known) > 0 and float(known.min()) >= 0 and 100 < float(known.max()) <= 360
-
-
 def may_be_points(heading: Heading) -> bool:
     """Whether words below a heading may be points of the compass: of a direction, or of a wind in words."""
     return heading.quantity.endswith(("wind_direction", "wind_speed"))

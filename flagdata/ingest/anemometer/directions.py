@@ -13,6 +13,8 @@ from flagdata.ingest.anemometer.headings import Heading, fits
 
 _TURN = (-181.0, 361.0)
 _GON, _MILS = 401.0, 6401.0
+_FASTEST = 100.0
+"""Number that no speed of a log reaches in any unit, by which angles are told [of whatever unit]."""
 _FEW = 3
 """Different values from which a column with a stated unit shows that it is in another."""
 
@@ -67,6 +69,8 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
             "north on, counted from 0, or tens of degrees",
             may_be=("sixteenths", "10 deg", "deg"),
         )
+    if heading.misstated:
+        return _misstated(heading.misstated, low, high)
     north = channel == "wind_direction"  # a boat writes the angle from its bow in degrees
     if heading.unit is None and 0 < high <= 6.3 and low >= -3.2 and (several or not whole):
         return Judged(left_out="may be in degrees or radians: left out", may_be=("rad", "deg"))
@@ -80,6 +84,15 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
         doubt = f"is stated in degrees, but holds numbers from {low:g} to {high:g}: likely radians"
         return Judged(unit=unit, told=told, may_be=("rad",), doubt=doubt)
     return Judged(unit=unit, told=told)
+
+
+def _misstated(stated: str, low: float, high: float) -> Judged:
+    """A direction whose heading states the unit of a speed: in degrees where its numbers are no speeds."""
+    if low >= 0 and high > _FASTEST:
+        doubt = f"says a direction, but in {stated}, a unit of speed: taken as degrees by its values, up to {high:g}"
+        return Judged(unit="deg", told=f"in degrees by its values, up to {high:g}", may_be=("deg",), doubt=doubt)
+    left_out = f"says a direction, but in {stated}, a unit of speed, and its values, {low:g} to {high:g}, do not tell "
+    return Judged(left_out=f"{left_out}which it is: left out", may_be=("deg",))
 
 
 def _beyond(low: float, high: float) -> Judged:

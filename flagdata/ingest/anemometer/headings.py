@@ -12,6 +12,7 @@ from functools import lru_cache
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
+from flagdata.ingest.anemometer.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.languages import in_english
 from flagdata.schema import CHANNELS
 from flagdata.timebase import zone
@@ -28,7 +29,8 @@ _TOWARDS = re.compile(
     r"\btowards?\b|\bblowing to\b|\bto dir|\bgoing to\b|\bdir(?:ection)? to\s*(?:[\[(]|$)", re.IGNORECASE
 )
 _PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
-_WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
+WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
+"""Words of the wind."""
 _SPEED = frozenset(
     {
         "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
@@ -40,11 +42,13 @@ _SPEED = frozenset(
 _DIRECTION = frozenset(
     {
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
-        "dd", "vane", "angle", "direccion", "dirección", "direção", "direcao", "richting", "windrichting", "direzione",
-        "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire", "deg", "winddeg", "azimuth",
-        "bearing",
+        "dd", "vane", "wvane", "windvane", "angle", "direccion", "dirección", "direção", "direcao", "richting",
+        "windrichting", "direzione", "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire",
+        "deg", "winddeg", "azimuth", "bearing",
     }
 )  # fmt: skip
+_SURE_DIRECTION = _DIRECTION - {"angle", "deg", "azimuth", "bearing", "dd", "vane"}
+"""Words that mean a direction whatever unit stands behind them."""
 VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", "vertikale", "vertic"})
 """Words of the component of the wind upwards, which is no speed of wind."""
 _OTHER = frozenset(
@@ -58,17 +62,15 @@ _OTHER = frozenset(
         "id", "unit", "units",
     }
 )  # fmt: skip
-_SPREAD = frozenset(
+_SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
     {
-        "max", "maximum", "maxi", "min", "minimum", "mini", "gust", "gusts", "gst", "std", "sd", "sdev", "stdev",
-        "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov", "covariance", "peak", "lull", "hi",
-        "high", "low", "lo", "böe", "böen", "boe", "boeen", "bö", "windböe", "rafale", "rafales", "racha", "rajada",
-        "ti", "turbulence", "flag", "flags", "qc", "quality", "qf", "qa", "err", "error", "diag", "diagnostic",
-        "status", "skew", "skewness", "kurt", "kurtosis", "windgust", "wgust", "gustspeed", "windgustdir", "windrun",
-        "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples", "percentile", "trend",
-        "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast", "threshold",
-        "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr", "setpoint",
-        "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
+        "std", "sd", "sdev", "stdev", "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov",
+        "covariance", "peak", "lull", "hi", "high", "low", "lo", "ti", "turbulence", "flag", "flags", "qc", "quality",
+        "qf", "qa", "err", "error", "diag", "diagnostic", "status", "skew", "skewness", "kurt", "kurtosis",
+        "windgustdir", "windrun", "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples",
+        "percentile", "trend", "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast",
+        "threshold", "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr",
+        "setpoint", "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
         "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
     }
 )  # fmt: skip
@@ -152,6 +154,7 @@ class Heading:
         label: words that tell instruments apart, lower-case.
         magnetic: of a direction, whether it is from magnetic north.
         towards: of a direction, whether the wind blows to it.
+        misstated: the unit of a speed that the heading of a direction states by mistake; "" where it does not.
         strange: what stands in brackets where a unit does, but spells none that is known, or how an angle is turned
             that is not clockwise from north; "" where nothing does.
     """
@@ -167,6 +170,7 @@ class Heading:
     label: tuple[str, ...]
     magnetic: bool = False
     towards: bool = False
+    misstated: str = ""
     strange: str = ""
 
 
@@ -195,6 +199,8 @@ def understand(name: str, stated: str = "") -> Heading:
     known = set(words)
     compact = "".join(words)
     spread = bool(known & _SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
+    misstated = _misstated(known, unit)
+    unit = None if misstated else unit
     quantity, sure, used = _quantity(words, compact, unit, rest)
     if quantity and known & _OTHER and not (quantity.endswith("direction") and known & {"course"}):
         excluded = known & _OTHER - VERTICAL if quantity == "wind_z" else known & _OTHER
@@ -205,12 +211,12 @@ def understand(name: str, stated: str = "") -> Heading:
     left = list(words)
     for word in used:
         left.remove(word)
-    label = tuple(word for word in left if word not in _MEAN | _SPREAD | _PLAIN | _WIND)
+    label = tuple(word for word in left if word not in _MEAN | _SPREAD | _PLAIN | WIND)
     return Heading(
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
         mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
         magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
-        towards=bool(_TOWARDS.search(text.replace("_", " "))),
+        towards=bool(_TOWARDS.search(text.replace("_", " "))), misstated=misstated,
         strange=tenfold[0].strip() if tenfold is not None
         else turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
@@ -349,7 +355,7 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
     """The channel, whether the words name it (or only the unit does), and the words that do."""
     known = set(words)
     si = UNITS[unit].si if unit is not None else None
-    windy = bool(known & _WIND) or compact.startswith(("wind", "wnd"))
+    windy = bool(known & WIND) or compact.startswith(("wind", "wnd"))
     if words[:1] == ["w"] and words[1:2] and words[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
         windy = True
     component = _component(words, si)
@@ -358,12 +364,12 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
     if si in (None, "rad", "1") or windy:
         away = known & _DIRECTION
         if (away or re.search(r"wind?.?dir|windricht|wind_?ri\b|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
-            sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane"}) or "dir" in compact
+            sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane", "wvane"}) or "dir" in compact
             if away and away <= {"deg", "azimuth", "bearing", "angle"} and not windy and not known & {"awa", "twa"}:
                 return "", False, set()
             return _by_platform(known, "direction"), sure, known & (_DIRECTION | _APPARENT | _THEORETICAL)
-        if si == "rad" and windy and not known - _WIND - _MEAN - _PLAIN:
-            return _by_platform(known, "direction"), True, known & _WIND
+        if si == "rad" and windy and not known - WIND - _MEAN - _PLAIN:
+            return _by_platform(known, "direction"), True, known & WIND
     if si in (None, "m/s"):
         for word, channel in _ABBREVIATED.items():
             if word in known and (si == "m/s") <= channel.endswith("speed"):
@@ -371,14 +377,21 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
         named = known & _SPEED or (known & {"strength"} if windy else set())
         if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
             return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
-        if windy and len(known - _WIND - _MEAN - _PLAIN) == 0:
-            return "wind_speed", True, known & _WIND
+        if windy and len(known - WIND - _MEAN - _PLAIN) == 0:
+            return "wind_speed", True, known & WIND
     if si in (None, "rad") and known & {"awa", "twa", "awd"}:
         word = next(iter(sorted(known & {"awa", "twa", "awd"})))
         return _ABBREVIATED[word], True, {word}
     if si == "m/s" and not known & _OTHER:
         return "wind_speed", False, set()
     return _weather(words, compact, si, windy)
+
+
+def _misstated(known: set[str], unit: str | None) -> str:
+    """The unit of a speed behind words that are of a direction alone; "" where there is none."""
+    if unit is None or UNITS[unit].si != "m/s" or known & (_SPEED | _OTHER | _COMPONENTS.keys()):
+        return ""
+    return unit if known & _SURE_DIRECTION else ""
 
 
 def _component(words: list[str], si: str | None) -> str | None:

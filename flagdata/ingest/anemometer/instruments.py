@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer import codes, unitcheck
-from flagdata.ingest.anemometer.angles import compass_unit, degrees, is_vane, may_be_points, may_be_two
+from flagdata.ingest.anemometer.angles import compass_unit, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.axes import along_axes
 from flagdata.ingest.anemometer.cells import Cell, Numbers, numbers
 from flagdata.ingest.anemometer.directions import judge
-from flagdata.ingest.anemometer.headings import Heading, fits, understand, words_of
+from flagdata.ingest.anemometer.headings import WIND, Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.no_speeds import beaufort
+from flagdata.ingest.anemometer.vanes import number, vanes
 from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
@@ -140,10 +141,10 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
         elif bool((parsed.state == Cell.NUMBER).any()):
             found.values[index] = parsed.value
-            if is_vane(heading, parsed.value):
-                found.headings[index] = replace(heading, channel="wind_direction", quantity="wind_direction")
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
+    for index in vanes(found.headings, found.values):
+        found.headings[index] = replace(found.headings[index], channel="wind_direction", quantity="wind_direction")
     return found
 
 
@@ -162,7 +163,8 @@ def _few_words(found: _Found, index: int, parsed: Numbers) -> bool:
 def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
     """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
     words = [set(words_of(name)) for name in found.layout.names]
-    windy = any("wind" in word for name in words for word in name) or any(found.of("wind_direction", *COMPONENTS))
+    windy = any("wind" in word or word in WIND for name in words for word in name)
+    windy = windy or bool(found.of("wind_direction", *COMPONENTS))
     for wind in winds:
         speed = wind.columns.get("wind_speed")
         if speed is not None and not windy and words[speed.index] & {"speed", "velocity", "vel"}:
@@ -371,7 +373,9 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     )
     own = found.key(candidates[0]) if len(candidates) == 1 else ()
     of_another = bool(own[:-1]) and own != found.key(speed) and any(found.key(i) == own for i in found.of(*SPEEDS))
+    of_another = of_another or (len(candidates) == 1 and _numbered_otherwise(found, speed, candidates[0]))
     lone = candidates if len(candidates) == 1 and not of_another else []
+    exact = exact or _of_its_number(found, speed, candidates)
     alike = [index for index in found.of(found.headings[speed].channel) if found.key(index) == found.key(speed)]
     if len(exact) == len(alike) > 1:
         exact = [exact[alike.index(speed)]]  # blocks of columns with the same headings, one an instrument
@@ -400,6 +404,24 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
         channel = "wind_direction_magnetic"
     told = f"{judged.told}, to which the wind blows" if heading.towards else judged.told
     return channel, Column(index=index, unit=judged.unit, told=told, towards=heading.towards)
+
+
+def _of_its_number(found: _Found, speed: int, candidates: Sequence[int]) -> list[int]:
+    """The direction that has a speed's number and words of no other (WV2 or Vane 2 beside AN2Speed), if one does."""
+    own = number(found.headings[speed])
+    speeds = [at for at in found.of(found.headings[speed].channel) if number(found.headings[at]) == own]
+    numbered = [at for at in candidates if number(found.headings[at]) == own]
+    if not own or len(speeds) != 1 or len(numbered) != 1:
+        return []
+    heading = found.headings[numbered[0]]
+    return numbered if heading.label == (own,) and heading.height == found.headings[speed].height else []
+
+
+def _numbered_otherwise(found: _Found, speed: int, direction: int) -> bool:
+    """Whether a direction has the number of another speed, and this speed has not (WD2 beside AN1Speed, AN2Speed)."""
+    own = number(found.headings[direction])
+    others = {number(found.headings[at]) for at in found.of(*SPEEDS) if at != speed}
+    return bool(own) and own != number(found.headings[speed]) and own in others
 
 
 def _points(heading: Heading) -> bool:

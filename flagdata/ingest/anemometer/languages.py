@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 _GUST = (
-    r"最大|极大|瞬[間时]|阵风|陣風|突風|최대|순간|돌풍|порыв|пориви?|макс|\bporyw|\bmaks|\bnáraz|puuska|puhang|vindby|"
+    r"最大|极大|瞬[間时]|阵风|陣風|突風|최대|순간|돌풍|порыв\w*|пориви?|макс|\bporyw\w*|\bmaks|\bnáraz|puuska|puhang|vindby|"
     r"vindkast|széllökés|rafal[ăa]|ριπή|משב|sunek|udar"
 )
 _SPEED = (
@@ -46,7 +46,7 @@ _WORDS = tuple(
 
 
 _ASCII = re.compile(
-    r"angin|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|vjetra|vetra|vantului|viento|vento",
+    r"angin|poryw|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|vjetra|vetra|vantului|viento|vento",
     re.IGNORECASE,
 )
 """What there is of these words in letters of ASCII."""
