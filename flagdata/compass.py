@@ -91,7 +91,7 @@ CALM = frozenset(
     {
         "calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr", "cv", "cal",
         "calmo", "stil", "stille", "vindstille", "umlaufend", "variabel", "no wind", "windstil",
-        "静穏", "静风", "靜風", "無風",
+        "静穏", "静风", "靜風", "無風", "无风", "静稳", "風向不定", "风向不定", "不定",
     }
 )  # fmt: skip
 """What stands in a column of points where there is no direction."""

@@ -124,6 +124,21 @@ SPELLINGS: dict[str, str] = {
 }  # fmt: skip
 
 
+_HOURS = ("小時", "小时", "時間", "時", "时", "h", "시")
+_SECONDS = ("秒", "秒鐘", "秒钟", "s", "초")
+_PER = {
+    "km/h": (("公里", "千米", "km", "キロメートル", "キロ", "킬로미터"), _HOURS),
+    "m/s": (("米", "公尺", "m", "メートル", "미터"), _SECONDS), "kn": (("海里", "海浬", "浬", "カイリ"), _HOURS),
+}  # fmt: skip
+"""Lengths and times of which Chinese, Japanese and Korean tables make their units of speed."""
+SPELLINGS |= {
+    spelling: name for name, (lengths, times) in _PER.items() for length in lengths for time in times
+    for spelling in (f"{length}/{time}", f"{length}每{time}", f"{length}毎{time}", f"每{time}{length}",
+                     f"毎{time}{length}")
+    if not spelling.isascii()
+} | {"節": "kn", "节": "kn", "ノット": "kn", "노트": "kn", "度": "deg", "도": "deg"}  # fmt: skip
+
+
 def unit(text: str, *, where: str | None = None) -> Unit:
     """The unit that a file spells as `text`.
 

@@ -49,10 +49,10 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
     """
     if heading.unit is not None and not fits(channel, heading.unit):
         return Judged()
-    if heading.strange:
-        return Judged(left_out=f"is in {heading.strange!r}, which is no direction clockwise from north: left out")
     if heading.unit in compass.BY_UNIT:
         return Judged(unit=heading.unit, told="as points of the compass, 22.5° apart")
+    if heading.strange:
+        return Judged(left_out=f"is in {heading.strange!r}, which is no direction clockwise from north: left out")
     stated = f"in {heading.unit} by its heading"
     if heading.unit in ("gon", "mil", "0.1 deg", "0.01 deg"):
         return Judged(unit=heading.unit, told=stated)

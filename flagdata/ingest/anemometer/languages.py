@@ -25,17 +25,19 @@ _DIRECTION = (
     r"כיוון\s*ה?רוח|اتجاه\s*الرياح|hướng\s*gió|vēja\s*virziens|vėjo\s*kryptis"
 )
 _TIME = (
-    r"时间|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|годин[аи]|godzina|čas|zaman|waktu|tanggal|aika|kellonaika|"
-    r"tidspunkt|időpont|ώρα|שעה|الوقت|thời gian|laikas|laiks)\b"
+    r"时间|時間|时刻|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|годин[аи]|godzina|čas|zaman|waktu|tanggal|aika|"
+    r"kellonaika|tidspunkt|időpont|ώρα|שעה|الوقت|thời gian|laikas|laiks)\b"
 )
 _STATION = (
-    r"城市|站点|站名|测站|観測所|観測地点|地点名|관측소|지점명|"
+    r"城市|站点|站點|站名|[测測]站|(?:自[动動])?[气氣]象站|[监監][测測]站|観測所|観測地点|地点名|관측소|지점명|"
     r"\b(?:город|станция|станції|станція|пункт|asema|állomás)\b"
 )
 _WORDS = tuple(
     (re.compile(pattern, re.IGNORECASE), word)
     for pattern, word in (
         (_STATION, "station"), (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
+        (r"平均|평균", "mean"), (r"[\d一二三五十]+\s*(?:分[鐘钟間间]?|분)", "10 min"),
+        (r"\((?:十六|16)?\s*方位[點点]?\)", ""),
         (r"\b(?:дата|päivämäärä|dátum|ημερομηνία|תאריך|التاريخ|ngày)\b", "date"),
         (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"), (r"^\s*[日일]\s*$", "day"),
         (r"^\s*[時时시]\s*$", "hour"), (r"^\s*[分분]\s*$", "minute"), (r"^\s*[秒초]\s*$", "second"),
@@ -52,10 +54,15 @@ _ASCII = re.compile(
 """What there is of these words in letters of ASCII."""
 
 
+_WIDE = str.maketrans("（）［］／：，％", "()[]/:,%")
+"""Signs in the width of Chinese and Japanese letters, and those they stand for."""
+
+
 def in_english(name: str) -> str:
     """A heading with the words of other languages that are known replaced; one of ASCII letters as it is."""
     if name.isascii() and not _ASCII.search(name):
         return name
+    name = name.translate(_WIDE)
     for pattern, word in _WORDS:
         name = pattern.sub(f" {word} ", name)
     return " ".join(name.split())

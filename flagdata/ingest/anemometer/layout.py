@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from flagdata.compass import CALM
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.rows import blank_cells
 from flagdata.units import UNITS, spelled
@@ -309,17 +310,22 @@ def _typed(rows: Sequence[Sequence[str]], width: int) -> list[int]:
     """Columns that hold numbers or stamps in nine rows of ten, missing cells apart."""
     found: list[int] = []
     for index in range(width):
-        kinds = Counter(cell_kind(row[index]) for row in rows)
+        kinds = Counter(_kind(row[index]) for row in rows)
         if kinds["number"] + kinds["stamp"] and kinds["text"] <= 0.1 * (len(rows) - kinds["missing"]):
             found.append(index)
     return found
+
+
+def _kind(cell: str) -> CellKind:
+    """What a cell of a row seems to hold; a word for calm air is a missing number or direction."""
+    return "missing" if cell.strip().lower() in CALM else cell_kind(cell)
 
 
 def _is_row(cells: Sequence[str], width: int, typed: Sequence[int]) -> bool:
     row = _trimmed(cells, width)
     if len(row) != width:
         return False
-    kinds = Counter(cell_kind(row[index]) for index in typed)
+    kinds = Counter(_kind(row[index]) for index in typed)
     return kinds["number"] + kinds["stamp"] > 0 and kinds["text"] <= 0.2 * (len(typed) - kinds["missing"])
 
 

@@ -33,7 +33,12 @@ def _near_a_thousand(layout: Layout, wind: Wind | None) -> bool:
 def _words(layout: Layout, wind: Wind | None) -> list[str]:
     """The few words for no value in the columns of a wind."""
     found: dict[str, None] = {}
-    for column in wind.columns.values() if wind is not None else ():
+    columns = wind.columns.values() if wind is not None else ()
+    calm = compass.CALM if any(column.unit in compass.BY_UNIT for column in columns) else frozenset[str]()
+    for column in columns:
+        if column.unit not in compass.BY_UNIT:
+            # What stands among points of the compass for calm air may stand in the speed of that row as well.
+            found.update(dict.fromkeys(sorted({cell.lower() for cell in layout.column(column.index)} & calm)))
         if column.unit in compass.BY_UNIT or layout.suffixes[column.index]:
             continue
         cells = layout.column(column.index)

@@ -20,10 +20,12 @@ _SITES = frozenset(
 )  # fmt: skip
 _STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})
 """Words of a heading whose cells, where they are words, are places, though each has one row."""
-_MOST = 50
+_MOST = 1000
 """Sites beyond which a column of words is something else."""
 _FEWEST, _SHARE = 3, 0.6
 """Rows of a site, and the share of the sites that a stamp holds, by which words alone tell sites apart."""
+_AT_ONCE = 3
+"""Rows of one stamp, all of other words, from which on they are sites though each has that row alone."""
 _NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
 """Words beside which a heading is still that of a site."""
 
@@ -65,7 +67,11 @@ def _in_every_stamp(layout: Layout, time: Sequence[int], stamps: Sequence[str]) 
         if any(cell_kind(kind) != "text" for kind in kinds) or compass_unit(layout, index) is not None:
             continue
         apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
-        if len(apart) == len(cells) >= _FEWEST * len(kinds) and len(cells) >= _SHARE * len(kinds) * len(set(stamps)):
+        if len(apart) < len(cells):
+            continue
+        rows = len(set(stamps))
+        often = len(cells) >= _FEWEST * len(kinds) or (len(cells) >= _AT_ONCE * rows and "" not in cells)
+        if often and len(cells) >= _SHARE * len(kinds) * rows:
             return index, tuple(kinds)
     return None
 

@@ -43,6 +43,12 @@ _REGULAR = 0.7
 ENOUGH = 10
 
 
+_APART = (
+    "log a stamp with every row; if the rows of one stamp are of several stations, say which column tells them apart: "
+    '--columns "time,site,wind_speed[m/s]"'
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Runs:
     """Rows in runs of one stamp: index of each run's first row, its rows, its stamp, time to the next stamp [ns]."""
@@ -230,7 +236,7 @@ def _held(reading: Reading, runs: _Runs, *, period: float, burst: bool, continui
         where=f"line {reading.line[1]}",
         what=f"a stamp stands for {low if low == high else f'{low} to {high}'} rows and is renewed every {every:g} s: "
         f"the rows are spread {f'within {reading.step / NANOSECONDS:g} s, ' if burst else 'evenly, '}{what}; {why}",
-        fix=None if continuity is not None and continuity <= BURST else "log a stamp with every row",
+        fix=None if continuity is not None and continuity <= BURST else _APART,
     )  # fmt: skip
 
 
