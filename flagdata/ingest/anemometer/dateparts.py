@@ -10,14 +10,22 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer import counted, unnamed_columns
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import words_of
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
-from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice, whole_numbers
-from flagdata.timebase import NANOSECONDS
+from flagdata.ingest.anemometer.timechoice import (
+    TWO_DIGITS,
+    YEAR,
+    TimeChoice,
+    fits,
+    hours_and_minutes,
+    share,
+    time_choice,
+    whole_numbers,
+)
 
 MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
 """Dates with the name of the month; {s} is the sign between their parts."""
@@ -27,11 +35,14 @@ _WORDS = {
     "day": r"day|dom|dy|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
     "doy": r"doy|jday|julian|day of year|julian day|julian date|yday|jd|j day|dayofyear|year ?day"
     r"|(?:decimal|dec) (?:day|doy)|day of year decimal|decimal day of year",
-    "hour": r"hour|hours|hr|hrs|hh( 24)?|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day|hhmm|hour minute",
+    "hour": r"hour|hours|hr|hrs|hh( 24)?|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day|hhmm|hour minute"
+    r"|(?:hours? (?:and )?minutes?|time)(?: (?:as|in))? hhmm|hours? (?:and )?minutes?",
     "minute": r"minute|minutes|min|mins|minuto|минута|mm",
     "second": r"seconds?|sec|secs|ss|sekunde|seconde|segundo",
 }
 """Headings of the parts of a time in columns of their own, wherever these stand."""
+_SAYS_MINUTES = re.compile(r"hhmm|hours? (?:and )?minutes?")
+"""Headings of hours and minutes in one number, though it may be small just after midnight."""
 _BEHIND: dict[str, tuple[str, frozenset[str]]] = {
     "month": (r"mm?", frozenset({"year", "day"})), "day": (r"da|dd|d", frozenset({"month"})),
     "hour": (r"h", frozenset({"day", "doy"})), "minute": (r"mi|mn|m|mi format.*", frozenset({"hour"})),
@@ -59,11 +70,6 @@ _OF_YEAR = (
     "the days are taken as those of the year, since no column holds a month; if they are days of a month, the times "
     "are wrong: add a column of the month"
 )
-_UNNAMED = (("%m", 1, 12), ("%d", 1, 31), ("%H", 0, 24), ("%M", 0, 59))
-_YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
-_TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
-_SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
-_DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 _SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
 _MONTH_NAME = re.compile(r"^\s*(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?\s*$", re.IGNORECASE)
 _DECIMAL = re.compile(r"^\s*\d{1,3}\.\d+\s*$")
@@ -111,7 +117,7 @@ def _ends_of_hours(cells: Sequence[str]) -> bool:
 def _choices(
     layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int], order: Order | None
 ) -> Iterator[TimeChoice]:
-    found = _unnamed_parts(layout, columns) or _unnamed_ordinal(layout, columns)
+    found = unnamed_columns.choice(layout, columns)
     if found is not None:
         yield found
     named = _named(layout, columns)
@@ -148,7 +154,7 @@ def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator
         for first, parts in ((index, ("%b", "%d", "clock", "%Y")), (index, ("%b", "%d", "%Y", "clock")),
                              (index - 1, ("%d", "%b", "%Y", "clock"))):  # fmt: skip
             taken = list(range(first, first + 4))
-            if first < 0 or taken[-1] >= len(columns) or not share(_YEAR, columns[first + parts.index("%Y")]):
+            if first < 0 or taken[-1] >= len(columns) or not share(YEAR, columns[first + parts.index("%Y")]):
                 continue
             forms = [" ".join(form if part == "clock" else part for part in parts) for form in CLOCKS[:4]]
             yield from _read(layout, columns, taken, forms, score=2.2)
@@ -167,7 +173,7 @@ def hour_alone(layout: Layout, columns: Sequence[Sequence[str]], index: int) -> 
     if not _fits("hour", " ".join(words_of(layout.names[index])), ""):
         return False
     cells = [cell for cell in columns[index] if cell]
-    return share(_TWO_DIGITS, cells) and whole_numbers(cells, 0, 24) and not any(re.match(r"0\d\d", c) for c in cells)
+    return share(TWO_DIGITS, cells) and whole_numbers(cells, 0, 24) and not any(re.match(r"0\d\d", c) for c in cells)
 
 
 def _fits(part: str, name: str, before: str) -> bool:
@@ -195,10 +201,12 @@ def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int
             if not _fits(part, name, before) or (part == "minute" and name in _OR_LEAST and maxima):
                 continue
             month = part == "month" and share(_MONTH_NAME, cells)
-            clock = part == "hour" and _hours_and_minutes(cells)
-            if part not in found and (month or clock or whole_numbers(cells, *_LIMITS[part])):
+            clock = part == "hour" and hours_and_minutes(cells)
+            said = part == "hour" and _SAYS_MINUTES.search(name) is not None and hours_and_minutes(cells, said=True)
+            if part not in found and (month or clock or said or whole_numbers(cells, *_LIMITS[part])):
                 of = part
                 found[part] = index
+                found |= {"hour and minute": index} if said else {}
                 break
         before = of
     if "year" in found and not {"month", "doy"} & set(found):
@@ -209,13 +217,6 @@ def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int
             if _fits("day", " ".join(words_of(heading)), "") and whole_numbers(cells, *_LIMITS["doy"]):
                 return {**found, "doy": index}
     return found
-
-
-def _hours_and_minutes(cells: Sequence[str]) -> bool:
-    """Whether numbers are hours and minutes in one, 0 to 2400, without leading zeros or with them."""
-    if not share(_DIGITS, cells) or not whole_numbers(cells, 0, 2400) or not any(len(cell) > 2 for cell in cells):
-        return False
-    return all(int(cell) % 100 < 60 for cell in cells if cell.isdigit())
 
 
 def _counted(
@@ -345,9 +346,9 @@ def _clock(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> tuple[
     hours = columns[named["hour"]]
     if share(_DECIMAL, [cell for cell in hours if cell]):
         return _pointed(hours), [named["hour"]]
-    if _hours_and_minutes([cell for cell in hours if cell]):
+    if "hour and minute" in named or hours_and_minutes([cell for cell in hours if cell]):
         return "%H%M", [named["hour"]]
-    if not share(_TWO_DIGITS, [cell for cell in hours if cell]):
+    if not share(TWO_DIGITS, [cell for cell in hours if cell]):
         return "", []
     form, taken = "%H", [named["hour"]]
     for part, directive in (("minute", "%M"), ("second", "%S%f")):
@@ -406,78 +407,3 @@ def order_of(heading: str) -> Order | None:
         return None
     known: dict[str, Order] = {"dm": "dmy", "md": "mdy", "ym": "ymd"}
     return known.get(found["first"][0] + found["second"][0])
-
-
-def _unnamed_parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
-    """Year, month, day, hour, minute and second side by side where no line names the columns.
-
-    Whole numbers that are a year, a month, a day, an hour and a minute and rise from row to row are nothing else; what
-    follows is a second only where it is written or moves as one, since a speed looks much the same.
-    """
-    if any(layout.names):
-        return None
-    for index, cells in enumerate(columns):
-        if not share(_YEAR, cells):
-            continue
-        taken, form = [index], "%Y"
-        for (directive, low, high), at in zip(_UNNAMED, range(index + 1, len(columns)), strict=False):
-            if not share(_TWO_DIGITS, columns[at]) or not whole_numbers(columns[at], low, high):
-                break
-            taken, form = [*taken, at], f"{form} {directive}"
-        if "%H" not in form or ("%M" not in form and not _hourly([columns[at] for at in taken])):
-            continue
-        after = taken[-1] + 1
-        if "%M" in form and after < len(columns) - 1 and _seconds(columns[after], [columns[at] for at in taken]):
-            taken, form = [*taken, after], f"{form} %S%f"
-        texts = [" ".join(row) for row in zip(*(columns[i] for i in taken), strict=True)]
-        found, _ = parse_with_bare_dates(texts, form)
-        if fits(found) and bool(np.all(np.diff(found.ns[found.valid]) >= 0)):
-            return replace(time_choice(layout, tuple(taken), form, found, 2.2), unnamed=True)
-    return None
-
-
-def _unnamed_ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
-    """Year, day of the year and a clock of one number side by side, as arrays of Campbell's older loggers have them.
-
-    They are told by their numbers alone: the clock has no minutes above 59, and the rows rise.
-    """
-    if any(layout.names):
-        return None
-    for index in range(len(columns) - 2):
-        year, day, clock = columns[index : index + 3]
-        if not share(_YEAR, year) or not share(_DIGITS, clock) or not whole_numbers(day, 1, 366):
-            continue
-        if not whole_numbers(clock, 0, 2400) or any(int(cell) % 100 > 59 for cell in clock if cell.isdigit()):
-            continue
-        texts = [" ".join(row) for row in zip(year, day, clock, strict=True)]
-        found, _ = parse_with_bare_dates(texts, "%Y %j %H%M")
-        rising = np.diff(found.ns[found.valid])
-        if fits(found) and len(rising) and bool(np.all(rising >= 0)) and bool(np.any(rising > 0)):
-            choice = time_choice(layout, (index, index + 1, index + 2), "%Y %j %H%M", found, 2.2)
-            return replace(choice, unnamed=True)
-    return None
-
-
-def _hourly(parts: Sequence[Sequence[str]]) -> bool:
-    """Whether year, month, day and hour in columns that nothing names are those of a log of a row an hour."""
-    found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], "%Y %m %d %H")
-    steps = np.diff(found.ns)
-    return len(steps) >= 24 and bool(found.valid.all()) and float((steps == 3600 * NANOSECONDS).mean()) >= SHARE
-
-
-def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
-    """Whether a column behind that of the minutes, which nothing names, is of the seconds."""
-    if not share(_SECONDS_OF_MINUTE, cells) or not whole_numbers([cell.split(".")[0] for cell in cells], 0, 59):
-        return False
-    padded = any(len(cell) > 1 and cell[0] == "0" for column in before for cell in column)
-    if padded and any(len(cell.split(".")[0]) < 2 for cell in cells):
-        return False  # all of the date is written in two digits, this is not
-    if any(re.match(r"0\d", cell) for cell in cells):
-        return True
-    stamps = list(zip(*before, strict=True))
-    same = np.array([one == other for one, other in itertools.pairwise(stamps)], dtype=bool)
-    steps = np.diff(numbers(cells).value)
-    if same.any():
-        return bool(np.all(steps[same] > 0))
-    # Rows minutes apart: the second of a steady clock stays or drifts, a speed does not.
-    return padded and len(steps) > 2 and bool(np.all(np.abs(steps) <= 2))

@@ -91,9 +91,9 @@ class Delimited:
             reading = _read(source, recipe, turned, where)
         except TimeError as error:
             rest = [n.fix for n in proposal.needs if n.without(options) and f"--{n.option}" not in error.fix]
-            told = next(
-                (n.fix for n in proposal.needs if f"--{n.option}" in error.fix and "(line " in n.fix), error.fix
-            )
+            same = [need.fix for need in proposal.needs if f"--{need.option}" in error.fix]
+            more = (fix for fix in same if "(line " in fix or fix.startswith(f"{error.fix}; columns"))
+            told = next(more, error.fix)
             raise type(error)(error.what, where=error.where, fix="; ".join([told, *rest])) from None
         found = [
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")

@@ -225,6 +225,7 @@ def _needs(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tup
         statement = zones.stated(lines)
         fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
         fix = f"{fix}; {statement.advice()}" if statement is not None else fix
+        fix = f"{fix}; {time.zone_advice}" if time.zone_advice else fix
         found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
     return tuple(found)
 

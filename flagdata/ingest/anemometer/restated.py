@@ -35,6 +35,7 @@ KINDS = (
     "flagdata.ingest.anemometer.blocks",
     "flagdata.ingest.anemometer.bracketed",
     "flagdata.ingest.anemometer.before_cells",
+    "flagdata.ingest.anemometer.listed_fields",
     "flagdata.ingest.anemometer.headings_anew",
 )
 LOOKED_AT = 60

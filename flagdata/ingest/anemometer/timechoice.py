@@ -13,6 +13,9 @@ from flagdata.ingest.anemometer.headings import names_time, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.stamps import Stamps
 
+YEAR = re.compile(r"^\s*(19|20)\d\d\s*$")
+TWO_DIGITS = re.compile(r"^\s*\d{1,2}\s*$")
+DIGITS = re.compile(r"^\s*\d{1,4}\s*$")
 SHARE = 0.9
 """Share of rows that must fit for a column to be what it seems."""
 
@@ -32,6 +35,7 @@ class TimeChoice:
         counts: whether it counts from a start, by a unit that may not be known.
         remark: what was taken for granted, and may be otherwise; `None` where nothing was.
         unnamed: whether it is told by its numbers alone, since no line names the columns.
+        zone_advice: what other columns tell of its zone, as a sentence for the user who is to name it; "" for nothing.
     """
 
     columns: tuple[int, ...]
@@ -43,6 +47,7 @@ class TimeChoice:
     fix: str | None = None
     counts: bool = False
     unnamed: bool = False
+    zone_advice: str = ""
     remark: str | None = None
 
 
@@ -76,3 +81,16 @@ def whole_numbers(cells: Sequence[str], low: int, high: int) -> bool:
     value = numbers(cells).value
     known = value[np.isfinite(value)]
     return len(known) >= SHARE * len(cells) > 0 and bool(np.all((known >= low) & (known <= high)))
+
+
+def hours_and_minutes(cells: Sequence[str], *, said: bool = False) -> bool:
+    """Whether numbers are hours and minutes in one, 0 to 2400, without leading zeros or with them.
+
+    Args:
+        said: whether a heading says so; else one must be larger than the hours of a day are.
+    """
+    if not share(DIGITS, cells) or not whole_numbers(cells, 0, 2400):
+        return False
+    if not said and not any(len(cell) > 2 for cell in cells):
+        return False
+    return all(int(cell) % 100 < 60 for cell in cells if cell.isdigit())
