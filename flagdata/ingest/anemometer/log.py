@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import platform, possible, quality, spelled_stamps, untimed, zero, zones
+from flagdata.ingest.anemometer import (
+    metar_bulletins,
+    platform,
+    possible,
+    quality,
+    spelled_stamps,
+    untimed,
+    zero,
+    zones,
+)
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.options import WindOptions
@@ -56,6 +65,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         source, options = untimed.dated(source, options.date), replace(options, date=None)
     elif recipe is None and options.columns is None and spelled_stamps.spelled(source.head()):
         source, options = spelled_stamps.restamped(source, options.date_order), replace(options, date_order=None)
+    if recipe is None and metar_bulletins.matches(source.head()):
+        source, options = metar_bulletins.dated(source, options.date), replace(options, date=None)
     source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()

@@ -17,11 +17,12 @@ from collections.abc import Sequence
 
 from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
+from flagdata.units import unit
 
 _STAMP = re.compile(
     r"\D*(?P<year>\d{4})[-/]?(?P<month>\d{2})[-/]?(?P<day>\d{2})[T ,]?(?P<hour>\d{2}):?(?P<minute>\d{2})"
 )
-_REPORT = re.compile(
+REPORT = re.compile(
     r"\b(?P<station>[A-Z][A-Z0-9]{3})\s+(?P<day>\d{2})(?P<hour>\d{2})(?P<minute>\d{2})Z\s+(?:AUTO\s+|COR\s+)?"
     r"(?P<dir>\d{3}|VRB|///)(?P<speed>P?\d{2,3}|//)(?:G(?P<gust>P?\d{2,3}))?(?P<unit>KT|MPS|KMH)\b"
 )
@@ -43,23 +44,39 @@ def matches(lines: Sequence[str]) -> bool:
 def as_table(source: TextFile) -> TableText | None:
     """The wind of each report."""
     found, other = rows_of(source, _row)
-    units = {row[-1] for row in found}
-    unit = next(iter(units)) if len(units) == 1 else ""
-    names = ["time [UTC]", "station", f"wind speed [{unit}]", "wind direction [deg]", f"gust [{unit}]"]
-    if len(units) > 1:
-        names = ["time [UTC]", "station", "wind speed", "unit", "wind direction [deg]", "gust"]
-        found = [[*row[:3], row[5], *row[3:5]] for row in found]
-    else:
-        found = [row[:5] for row in found]
-    return table(source, names, found, kind="metar-reports", what="METAR reports", left_out=other)
+    return tabled(source, found, left_out=other)
+
+
+def tabled(source: TextFile, found: Sequence[Sequence[str]], *, left_out: int) -> TableText | None:
+    """Rows as `row_of` makes them as a table; `None` where there is none."""
+    units = sorted({row[-1] for row in found})
+    named = units[0] if len(units) == 1 else "m/s"
+    rows = [list(row[:5]) if row[-1] == named else _in_si(row) for row in found]
+    # The last column is filled in every row: most reports have no gust, and a table ends where its rows do.
+    rows = [[when, *wind, station] for when, station, *wind in rows]
+    names = ["time [UTC]", f"wind speed [{named}]", "wind direction [deg]", f"gust [{named}]", "station"]
+    what = "METAR reports" if len(units) == 1 else f"METAR reports in {' and '.join(units)}, all put in m/s"
+    return table(source, names, rows, kind="metar-reports", what=what, left_out=left_out)
+
+
+def _in_si(row: Sequence[str]) -> list[str]:
+    """A row with its speed and gust in m/s."""
+    scale = unit(row[5]).scale
+    speed, gust = (f"{float(cell) * scale:.9g}" if cell else "" for cell in (row[2], row[4]))
+    return [row[0], row[1], speed, row[3], gust]
 
 
 def _row(line: str) -> list[str] | None:
     """Stamp, station, speed, direction, gust and unit of a line; `None` where it is no report of a known day."""
-    report = _REPORT.search(line)
+    report = REPORT.search(line)
     date = None if report is None else _date(line, report["day"])
     if report is None or date is None:
         return None
+    return row_of(report, date)
+
+
+def row_of(report: re.Match[str], date: str) -> list[str]:
+    """Stamp, station, speed, direction, gust and unit of a report (a match of `REPORT`) of a date [UTC, ISO 8601]."""
     when = f"{date}T{report['hour']}:{report['minute']}:00Z"
     speed = "" if "/" in report["speed"] else report["speed"].lstrip("P")
     away = report["dir"] if report["dir"].isdigit() and speed.strip("0") else ""

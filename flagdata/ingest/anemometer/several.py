@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flagdata.ingest.anemometer import metar_bulletins
 from flagdata.ingest.anemometer.delimited import drafted, guess, sites
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniff import recognise
 from flagdata.ingest.anemometer.sniffing import Guess
-from flagdata.ingest.anemometer.source import open_text
+from flagdata.ingest.anemometer.source import TextFile, open_text
 
 
 def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[str, ...]:
@@ -23,7 +24,7 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     options = options or WindOptions()
     if options.wind is not None or options.recipe is not None or options.format not in (None, "delimited"):
         return ()
-    source = restate(open_text(Path(path), limits=options.limits, encoding=options.encoding))
+    source = _table(Path(path), options)
     if options.format is None and options.columns is None:
         guesses = recognise(source)
         if not guesses or guesses[0].format != "delimited" or guesses[0].recipe is not None:
@@ -41,5 +42,13 @@ def completed(path: Path | str, options: WindOptions) -> Guess | None:
     Raises:
         FlagdataError: the file cannot be read as text.
     """
-    proposal = drafted(restate(open_text(Path(path), limits=options.limits, encoding=options.encoding)), options)
+    proposal = drafted(_table(Path(path), options), options)
     return None if proposal is None else guess(proposal)
+
+
+def _table(path: Path, options: WindOptions) -> TextFile:
+    """The file as a table, where it can be restated as one; bulletins need the day that the user gives."""
+    source = open_text(path, limits=options.limits, encoding=options.encoding)
+    if options.date is not None and metar_bulletins.matches(source.head()):
+        return metar_bulletins.dated(source, options.date)
+    return restate(source)

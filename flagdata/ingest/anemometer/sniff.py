@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.ingest.anemometer import excel, spelled_stamps, untimed
+from flagdata.ingest.anemometer import excel, metar_bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.layout import cell_kind
@@ -48,6 +48,9 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         if untimed.clocked(opened):
             day = untimed.year_alone(opened) or "01-01"
             return recognise(untimed.dated(opened, dt.date.fromisoformat(f"2000-{day}")))
+        if metar_bulletins.matches(opened.head()):
+            day = dt.date.fromisoformat(f"2000-01-{metar_bulletins.first_day(opened)}")
+            return recognise(metar_bulletins.dated(opened, day))
         if spelled_stamps.spelled(opened.head()):
             return recognise(spelled_stamps.provisional(opened))
         source = restate(opened)
