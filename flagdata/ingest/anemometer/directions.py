@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer import codes
-from flagdata.ingest.anemometer.headings import Heading, fits
+from flagdata.ingest.anemometer.headings import COURSES, Heading, fits, words_of
 
 _TURN = (-181.0, 361.0)
 _GON, _MILS = 401.0, 6401.0
@@ -83,6 +83,9 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
     if unit == "deg" and several and low >= -3.2 and 0 < high <= 6.3 and not whole:
         doubt = f"is stated in degrees, but holds numbers from {low:g} to {high:g}: likely radians"
         return Judged(unit=unit, told=told, may_be=("rad",), doubt=doubt)
+    if north and not heading.towards and set(words_of(heading.name)) & COURSES:
+        doubt = "is taken as where the wind comes from; if it is where it blows to, --columns has wind_direction_to"
+        return Judged(unit=unit, told=told, doubt=doubt)
     return Judged(unit=unit, told=told)
 
 

@@ -21,6 +21,7 @@ from flagdata.ingest.anemometer import (
     stated_rate,
     unitcheck,
     unread,
+    unread_winds,
     yearless,
     zones,
 )
@@ -188,6 +189,7 @@ def draft(
     if columns is None and chosen is not None:
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
+        remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),

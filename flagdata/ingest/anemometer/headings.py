@@ -49,6 +49,8 @@ _DIRECTION = frozenset(
 )  # fmt: skip
 _SURE_DIRECTION = _DIRECTION - {"angle", "deg", "azimuth", "bearing", "dd", "vane"}
 """Words that mean a direction whatever unit stands behind them."""
+COURSES = frozenset({"heading", "course"})
+"""Words of the wind's direction that leave open whether it blows from or to it."""
 VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", "vertikale", "vertic"})
 """Words of the component of the wind upwards, which is no speed of wind."""
 _OTHER = frozenset(
@@ -138,6 +140,13 @@ _SENSORS = frozenset(
 )
 
 
+_YEARS = frozenset({"yyyy", "aaaa", "jjjj", "yy", "aa", "åååå"})
+_DATE_PARTS = frozenset({"mm", "mmm", "dd", "gg", "jj", "tt", "hh", "ss", "sss", "mi", "nn", "t", "z", "min", "sec"})
+"""Parts of a format of a stamp as headings write it, in several languages."""
+_PARTS_OF_DATE = 3
+"""Parts from which such words are a format: year, month and day."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Heading:
     """What a heading says.
@@ -177,7 +186,7 @@ class Heading:
 @lru_cache(maxsize=4096)
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
-    text = in_english(name[:120].strip().strip('"').strip())
+    text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
     text = _RATE.sub(" ", text)
     text = _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text))
     tenfold = _TENFOLD.search(text)
@@ -202,7 +211,8 @@ def understand(name: str, stated: str = "") -> Heading:
     misstated = _misstated(known, unit)
     unit = None if misstated else unit
     quantity, sure, used = _quantity(words, compact, unit, rest)
-    if quantity and known & _OTHER and not (quantity.endswith("direction") and known & {"course"}):
+    courses = {"course", "heading"} if known & _WIND else {"course"}
+    if quantity and known & _OTHER and not (quantity.endswith("direction") and known & courses):
         excluded = known & _OTHER - VERTICAL if quantity == "wind_z" else known & _OTHER
         if "wind" in quantity and excluded:
             quantity, sure = "", False
@@ -243,8 +253,17 @@ def names_time(name: str) -> bool:
         "utc", "tijd", "tid", "dato", "data", "dt", "timestamps", "isotime", "when", "year", "month", "day", "hour",
         "doy", "jday", "tstamp", "ora", "tmstamp", "dateutc", "ms", "observed", "obs",
     }  # fmt: skip
+    if is_format(name):
+        return True
     labview = name.strip() == "X_Value"
     return bool(words & known) or labview or bool(re.search(r"time|date", "".join(words)))
+
+
+def is_format(name: str) -> bool:
+    """Whether a heading is the format of the stamps below it, such as "yyyy-mm-dd hh:mm" or "JJ/MM/AAAA"."""
+    parts = re.findall(r"[^\W\d_]+", name.lower())
+    year = any(part in _YEARS for part in parts)
+    return len(parts) >= _PARTS_OF_DATE and year and all(part in _YEARS | _DATE_PARTS for part in parts)
 
 
 def zone_of(name: str) -> str | None:
@@ -361,6 +380,8 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
     component = _component(words, si)
     if component is not None:
         return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
+    if known & _WIND and si in (None, "rad") and known & COURSES and not known - _WIND - _MEAN - COURSES - {"deg"}:
+        return "wind_direction", True, known & COURSES
     if si in (None, "rad", "1") or windy:
         away = known & _DIRECTION
         if (away or re.search(r"wind?.?dir|windricht|wind_?ri\b|^wd\d*$|winddeg", compact)) and si in (None, "rad"):

@@ -317,6 +317,19 @@ def read_also(
     return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
 
 
+def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> str:
+    """The line that reads another column as the wind's speed, by the time and the direction of the one understood."""
+    known = wind.columns.get("wind_speed")
+    stated_unit = understand(layout.names[speed], layout.units[speed]).unit or (known.unit if known else None)
+    others = {
+        name: column for name, column in wind.columns.items()
+        if not name.startswith(("apparent", "theoretical")) and name not in ("wind_speed", *COMPONENTS)
+    }  # fmt: skip
+    entries = _understood(time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
+    entries |= {} if wind.site is None else {wind.site[0]: _SITE}
+    return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
+
+
 def calibrated(layout: Layout, time: TimeChoice | None, column: int) -> str:
     """The option that reads a column of counts or of a frequency as a speed, by what one of them is in m/s."""
     known = {at: entry for at, entry in _known(layout, time, ()).items() if "?" not in entry and "speed" not in entry}

@@ -8,7 +8,7 @@
 
 Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
 Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (fields 6
-average and 7 latest speed, 8 bearing, 14 the unit of the speeds); Weather Display's list of the fields of clientraw.txt
+average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes); Weather Display's list of the fields of clientraw.txt
 (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock, 35 and 36 day and month, 141
 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes and of 5 seconds).
 """
@@ -79,7 +79,8 @@ def _realtime(line: str) -> list[str] | None:
     if len(cells) < 17 or not _REALTIME.match(line) or cells[13] not in _UNITS:
         return None
     warm = {"C": "degC", "F": "degF"}.get(cells[14], "")
-    return [cells[0], cells[1], cells[5], cells[6], cells[7], cells[2] if warm else "", _UNITS[cells[13]], warm]
+    gust = cells[40] if len(cells) > 40 else ""
+    return [cells[0], cells[1], cells[5], cells[6], gust, cells[7], cells[2] if warm else "", _UNITS[cells[13]], warm]
 
 
 def _clientraw(line: str) -> list[str] | None:
@@ -126,7 +127,10 @@ _KINDS = (
     ),
     _Lines(
         about="Cumulus' realtime.txt",
-        names=("date", "time", "wind speed average", "gust latest", "wind direction [deg]", "air temperature"),
+        names=(
+            "date", "time", "wind speed average", "wind speed of latest samples", "gust", "wind direction [deg]",
+            "air temperature",
+        ),
         row=_realtime,
     ),
     _Lines(
@@ -163,8 +167,8 @@ def as_table(source: TextFile) -> TableText | None:
         if len(units) != 1:
             return None
         speed, warm = units.pop()
-        names[2:4] = [f"{name} [{speed}]" for name in names[2:4]]
-        names[5] = f"{names[5]} [{warm}]" if warm else names[5]
+        names[2:5] = [f"{name} [{speed}]" for name in names[2:5]]
+        names[6] = f"{names[6]} [{warm}]" if warm else names[6]
         found = [row[:-2] for row in found]
     return table(source, names, found, kind="published-lines", what=kind.about, left_out=other)
 

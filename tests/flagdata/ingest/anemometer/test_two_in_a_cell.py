@@ -35,3 +35,39 @@ def test_a_column_of_points_beside_its_speed_is_left_as_it_is(log_file: Write) -
     rows = "".join(f"2026-05-01T12:00:{at:02d}Z,WSW,3.5\n" for at in range(12))
     channels = read_log(log_file(f"time,Wind,Wind speed (m/s)\n{rows}")).series.channels
     np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 247.5)
+
+
+def _pairs(heading: str, cells: list[str], separator: str = ";") -> str:
+    rows = "".join(f"2026-05-01 12:{at:02d}{separator}{cells[at % len(cells)]}\n" for at in range(12))
+    return f"{heading}\n{rows}"
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "first"),
+    [
+        ("time;velocità/direzione", ["2.5/40", "3.5/30"], (2.5, 40.0)), ("time;speed/dir", ["12/40"], (12.0, 40.0)),
+        ("time;Richtung/Geschwindigkeit", ["40/12"], (12.0, 40.0)), ("time;wind", ["2.5/40", "3.5/340"], (2.5, 40.0)),
+        ("time;wind", ["40/2.5", "340/3.5"], (2.5, 40.0)), ("time;wind", ["1,5/40", "2,5/50"], (1.5, 40.0)),
+        ("time;wind speed and direction", ["2.5/40"], (2.5, 40.0)), ("time;wind", ["40/12"], (12.0, 40.0)),
+    ],
+)  # fmt: skip
+def test_two_numbers_are_told_apart_by_the_headings_order_or_their_values(
+    log_file: Write, heading: str, cells: list[str], first: tuple[float, float]
+) -> None:
+    channels = read_log(log_file(_pairs(heading, cells)), WindOptions(unit="m/s", zone="UTC")).series.channels
+    assert channels["wind_speed"][0] == first[0]
+    assert np.rad2deg(channels["wind_direction"][0]) == pytest.approx(first[1])
+
+
+@pytest.mark.parametrize("stamp", ["yyyy-mm-dd hh:mm", "AAAA-MM-GG HH:MM", "JJJJ-MM-TT hh:mm"])
+def test_a_heading_that_is_the_format_of_the_stamps_is_no_direction(log_file: Write, stamp: str) -> None:
+    text = _pairs(f"{stamp};value", ["1.5/50", "0.7/279", "2.0/310"])
+    log = read_log(log_file(text), WindOptions(unit="m/s", zone="UTC"))
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"]), [50, 279, 310] * 4)
+    np.testing.assert_allclose(log.series.channels["wind_speed"], [1.5, 0.7, 2.0] * 4)
+    assert any("'value' is a wind" in finding.what for finding in log.findings if finding.kind == "heading-doubtful")
+
+
+def test_fractions_below_a_heading_that_says_nothing_are_no_wind(log_file: Write) -> None:
+    text = _pairs("time;done;wind speed (m/s)", ["1.5/340;4.0", "2.5/360;5.0"])
+    assert "wind_direction" not in read_log(log_file(text), WindOptions(zone="UTC")).series.channels

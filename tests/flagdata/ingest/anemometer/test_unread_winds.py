@@ -1,0 +1,93 @@
+"""Columns of the wind that are not read, and lines of stations' other winds, are named with the line that reads them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.ingest.anemometer import WindOptions, read_log
+
+Write = Callable[[str], Path]
+
+
+def _note(path: Path, **options: object) -> str:
+    findings = read_log(path, WindOptions(**options)).findings  # type: ignore[arg-type]
+    return " ".join(finding.what for finding in findings if finding.kind == "columns-not-read")
+
+
+def _table(*extra: str, unit: str = "") -> str:
+    heading = ",".join(["time", f"wind speed{unit}", *extra])
+    rows = (f"2026-05-01T12:{at:02d}:00Z,{3 + at % 4}.5{f',{5 + at % 3}.25' * len(extra)}\n" for at in range(12))
+    return f"{heading}\n{''.join(rows)}"
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "max wind", "gust", "Gust (km/h)", "wind_gust_max_10min", "WSpeed_Max", "wind_speed_min", "wind_speed_std",
+        "WindGust", "wind_force_avg_10min", "Böe", "rafale", "wind speed sd",
+    ],
+)  # fmt: skip
+def test_a_column_of_the_wind_that_is_not_read_is_named(log_file: Write, heading: str) -> None:
+    assert repr(heading) in _note(log_file(_table(heading)), unit="m/s")
+
+
+@pytest.mark.parametrize("heading", ["max temp", "window state", "battery min", "humidity max", "Windchill"])
+def test_a_column_of_another_quantity_is_not_named_among_them(log_file: Write, heading: str) -> None:
+    assert "of the wind" not in _note(log_file(_table(heading)), unit="m/s")
+
+
+def test_one_note_names_all_and_has_the_line_that_reads_the_highest(log_file: Write) -> None:
+    path = log_file(_table("wind_min", "wind_std", "wind_gust", unit=" [km/h]"))
+    note = _note(path)
+    assert "'wind_min', 'wind_std', 'wind_gust' speak of the wind" in note
+    line = re.search(r'--columns "([^"]+)"', note)
+    assert line is not None
+    channels = read_log(path, WindOptions(columns=line[1])).series.channels
+    np.testing.assert_allclose(channels["wind_speed"] * 3.6, [5.25, 6.25, 7.25] * 4)
+
+
+def test_an_interval_of_minutes_is_no_minimum(log_file: Write) -> None:
+    assert '4=wind_speed[m/s]"' in _note(log_file(_table("wind_force_10min", "wind_gust_10min")), unit="m/s")
+
+
+def test_columns_that_the_user_names_are_left_without_a_note(log_file: Write) -> None:
+    assert _note(log_file(_table("gust")), columns="time,wind_speed[m/s]") == ""
+
+
+@pytest.mark.parametrize("name", ["wind_heading", "Wind Course", "windHeading"])
+def test_the_heading_of_a_wind_in_degrees_is_its_direction_with_a_warning(log_file: Write, name: str) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{at},{200 + 22.5 * (at % 3)}\n" for at in range(12))
+    log = read_log(log_file(f"time,wind_speed_avg,{name}\nutc,km/h,degrees\n{rows}"))
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"]), [200, 222.5, 245] * 4)
+    assert any("comes from" in finding.what and repr(name) in finding.what for finding in log.findings)
+
+
+def test_the_heading_of_a_boat_is_no_direction_of_the_wind(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{at},{200 + at}\n" for at in range(12))
+    log = read_log(log_file(f"time,wind speed (m/s),heading (deg)\n{rows}"))
+    assert "wind_direction" not in log.series.channels
+
+
+def test_the_latest_speed_and_the_gust_of_a_station_program_are_named(log_file: Write) -> None:
+    fields = [*"0123456789"] * 6
+    fields[:15] = ["17/05/26", "22:00:00", "14.1", "71", "8.9", "17.3", "25.6", "231", "0", "0", "1", "W", "3", "kts", "C"]
+    fields[40] = "31.5"
+    note = _note(log_file(" ".join(fields) + "\n"), zone="UTC")
+    assert "latest" in note
+    assert "gust" in note
+    line = re.search(r'--columns "([^"]+)"', note)
+    assert line is not None
+    gust = read_log(log_file(" ".join(fields) + "\n"), WindOptions(zone="UTC", columns=line[1])).series
+    np.testing.assert_allclose(gust.channels["wind_speed"], 31.5 * 1852 / 3600)
+
+
+def test_the_gust_of_weather_displays_line_is_named(log_file: Write) -> None:
+    fields = ["0"] * 150
+    fields[:7] = ["12345", "5.0", "8.5", "232", "12.3", "77", "1012.4"]
+    fields[29:32], fields[35:37], fields[141] = ["22", "00", "00"], ["17", "5"], "2026"
+    assert "gust" in _note(log_file(" ".join(fields) + "\n"), zone="UTC")
