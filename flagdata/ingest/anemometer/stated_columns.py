@@ -290,17 +290,31 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     """The option with which the user says what the columns are, as far as they are known; "?" where they are not."""
     width = layout.number_of_columns()
     known = _known(layout, time, winds)
+    speeds = [entry for entry in known.values() if entry.split("[")[0] in (*SPEEDS, *COMPONENTS)]
+    if speeds:  # weather of a unit that nothing tells is not to be asked for with the wind
+        known = {at: entry for at, entry in known.items() if not entry.endswith("[?]") or _of_wind_or_time(entry)}
     named = "?" in known.values() or any("wind" in entry for entry in known.values())
     if width > _WIDE or not named:
         listed = [f"{at + 1}={entry}" for at, entry in sorted(known.items()) if "?" not in entry.split("[")[0]]
         entries = {entry.split("[")[0] for entry in known.values()}
         listed += ["?=time"] if time is None and not {"time", "date"} & entries else []
-        listed += ["?=wind_speed[?]", "?=wind_direction[deg]"] if not winds else []
+        directed = any("wind_direction" in entry for entry in known.values())
+        listed += ["?=wind_speed[?]"] if not winds and not speeds else []
+        listed += ["?=wind_direction[deg]"] if not winds and not speeds and not directed else []
         line = ",".join(listed)
     else:
         line = ",".join(known.get(at, "") for at in range(width))
+    others = [
+        name for at, name in enumerate(layout.names) if at not in known
+        and understand(name, layout.units[at]).channel in (entry.split("[")[0] for entry in speeds)
+    ]  # fmt: skip
+    further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
-    return f'say what the columns are: --columns "{line}" {example} (the first row is {shown(layout)})'
+    return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
+
+
+def _of_wind_or_time(entry: str) -> bool:
+    return "wind" in entry or entry.startswith(("time", "date"))
 
 
 def read_also(

@@ -20,6 +20,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import stated_columns
 from flagdata.ingest.anemometer.exports import Assigned, column_findings, known_unit, stamp_format
 from flagdata.ingest.anemometer.headings import fits, interest, understand
+from flagdata.ingest.anemometer.instruments import find_winds
 from flagdata.ingest.anemometer.layout import lay_out
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
@@ -247,6 +248,19 @@ def _faults(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _offer(source: TextFile) -> str:
-    """The option that says what the columns are, as far as they are known, with "; or " behind it; "" for no table."""
+    """What reads a table whose fields no known program has, with "; or " behind it; "" for no table.
+
+    Where the words of the headings tell winds, they are read by these; else the option says what the columns are.
+    """
     layout = lay_out(source.head(HEAD_LINES), interest=interest)
-    return "" if layout is None else f"{stated_columns.offer(layout, find_time(layout), ())}; or "
+    if layout is None:
+        return ""
+    time = find_time(layout)
+    winds, _, _ = find_winds(layout, time=time.columns if time is not None else ())
+    offered = f"{stated_columns.offer(layout, time, winds)}; or "
+    if not winds:
+        return offered
+    unit_too = " --unit m/s (or km/h, mph, kn, after the program)" if any(wind.without_unit() for wind in winds) else ""
+    names = ", ".join(wind.label for wind in winds)
+    each = f", each of {names} by itself" if len(winds) > 1 else f", {names}"
+    return f"read it by the words of its headings{each}: --as delimited{unit_too}; or {offered}"

@@ -243,3 +243,34 @@ def test_a_direction_beside_components_is_named_when_left_out(read: Read) -> Non
     text += "".join(f"2026-05-01 12:00:{at:02d}+00:00,1.{at},-3.5,0.1,23{at}\n" for at in range(8))
     said = " ".join(f.what for f in read(text, unit="m/s").findings)
     assert "'Winddir' is left out beside the components" in said
+
+
+def _toa5(*heights: str) -> str:
+    columns = [f"{name}_{height}" for height in heights for name in ("WindSpeed_S", "WindDirection_S", "Humidity")]
+    head = ['"TOA5","a","CR1000X","1","x","CPU:a.CR1X","1","t"', ",".join(["TIMESTAMP", "RECORD", *columns])]
+    head += [",".join(["TS", "RN", *["", "Deg", ""] * len(heights)]), ",".join(["", "", *["Smp"] * len(columns)])]
+    rows = [
+        f'"2026-05-01 12:{at:02d}:00",{at},' + ",".join(f"{3 + n + at % 4}.5,{200 + at},4{at}" for n in range(len(heights)))
+        for at in range(10)
+    ]
+    return "\n".join([*head, *rows, ""])
+
+
+def test_a_line_that_is_offered_for_several_heights_is_taken_as_it_stands(log_file: Write) -> None:
+    path = log_file(_toa5("L", "U"))
+    fix = refused(path, zone="UTC").fix
+    line = re.search(r'--columns "([^"]+)"', fix)
+    assert line is not None
+    assert line[1].count("wind_speed") == 1
+    assert "'WindSpeed_S_U'" in fix
+    series = read_log(path, WindOptions(columns=line[1].replace("?", "m/s"), zone="UTC")).series
+    assert series.channels["wind_speed"].tolist() == [3.5 + at % 4 for at in range(10)]
+
+
+def test_a_program_of_unknown_names_is_read_by_its_headings_for_all_heights(log_file: Write) -> None:
+    path = log_file(_toa5("L", "U"))
+    assert "--as delimited --unit m/s" in refused(path, zone="UTC").fix
+    options = WindOptions(format="delimited", unit="m/s", zone="UTC")
+    assert anemometers(path, options) == ("WindSpeed_S_L", "WindSpeed_S_U")
+    upper = read_log(path, WindOptions(format="delimited", unit="m/s", zone="UTC", wind="WindSpeed_S_U")).series
+    assert upper.channels["wind_speed"].tolist() == [4.5 + at % 4 for at in range(10)]
