@@ -211,7 +211,7 @@ def understand(name: str, stated: str = "") -> Heading:
     misstated = _misstated(known, unit)
     unit = None if misstated else unit
     quantity, sure, used = _quantity(words, compact, unit, rest)
-    courses = {"course", "heading"} if known & _WIND else {"course"}
+    courses = {"course", "heading"} if known & WIND else {"course"}
     if quantity and known & _OTHER and not (quantity.endswith("direction") and known & courses):
         excluded = known & _OTHER - VERTICAL if quantity == "wind_z" else known & _OTHER
         if "wind" in quantity and excluded:
@@ -380,7 +380,7 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
     component = _component(words, si)
     if component is not None:
         return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
-    if known & _WIND and si in (None, "rad") and known & COURSES and not known - _WIND - _MEAN - COURSES - {"deg"}:
+    if known & WIND and si in (None, "rad") and known & COURSES and not known - WIND - _MEAN - COURSES - {"deg"}:
         return "wind_direction", True, known & COURSES
     if si in (None, "rad", "1") or windy:
         away = known & _DIRECTION

@@ -8,9 +8,10 @@
 
 Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
 Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (fields 6
-average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes); Weather Display's list of the fields of clientraw.txt
-(1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock, 35 and 36 day and month, 141
-the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes and of 5 seconds).
+average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes); Weather Display's
+list of the fields of clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the
+clock, 35 and 36 day and month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2
+minutes and of 5 seconds).
 """
 
 from __future__ import annotations

@@ -61,7 +61,8 @@ def remark(
     names = ", ".join(repr(layout.names[index]) for index in found[:_MOST])
     names += f" and {len(found) - _MOST} more" if len(found) > _MOST else ""
     many = len(found) > 1
-    what = f"column{'s' if many else ''} {names} {'speak' if many else 'speaks'} of the wind and {'are' if many else 'is'} not read"
+    what = f"columns {names} speak of the wind and are not read" if many else f"column {names} speaks of the wind"
+    what += "" if many else " and is not read"
     speeds = [index for index in found if _is_speed(layout, index)]
     speed = next((index for index in speeds if _words(layout, index) & _HIGHEST), next(iter(speeds), None))
     if speed is None or time is None or wind is None:
@@ -76,7 +77,7 @@ def _speaks_of_wind(layout: Layout, index: int) -> bool:
     words = words_of(layout.names[index])
     if set(words) & _NO_WIND:
         return False
-    if set(words) & GUSTS or _SPEAKS.search("_".join(words)):
+    if set(words) & GUSTS - {"spitze", "spitzen"} or _SPEAKS.search("_".join(words)):
         return True
     return "wind" in understand(layout.names[index], layout.units[index]).quantity
 

@@ -250,7 +250,8 @@ def _toa5(*heights: str) -> str:
     head = ['"TOA5","a","CR1000X","1","x","CPU:a.CR1X","1","t"', ",".join(["TIMESTAMP", "RECORD", *columns])]
     head += [",".join(["TS", "RN", *["", "Deg", ""] * len(heights)]), ",".join(["", "", *["Smp"] * len(columns)])]
     rows = [
-        f'"2026-05-01 12:{at:02d}:00",{at},' + ",".join(f"{3 + n + at % 4}.5,{200 + at},4{at}" for n in range(len(heights)))
+        f'"2026-05-01 12:{at:02d}:00",{at},'
+        + ",".join(f"{3 + n + at % 4}.5,{200 + at},4{at}" for n in range(len(heights)))
         for at in range(10)
     ]
     return "\n".join([*head, *rows, ""])

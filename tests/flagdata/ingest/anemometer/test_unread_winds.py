@@ -1,4 +1,4 @@
-"""Columns of the wind that are not read, and lines of stations' other winds, are named with the line that reads them."""
+"""Columns of the wind that are not read are named, with the line that reads them."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ def test_the_heading_of_a_boat_is_no_direction_of_the_wind(log_file: Write) -> N
 
 def test_the_latest_speed_and_the_gust_of_a_station_program_are_named(log_file: Write) -> None:
     fields = [*"0123456789"] * 6
-    fields[:15] = ["17/05/26", "22:00:00", "14.1", "71", "8.9", "17.3", "25.6", "231", "0", "0", "1", "W", "3", "kts", "C"]
     fields[40] = "31.5"
-    note = _note(log_file(" ".join(fields) + "\n"), zone="UTC")
+    line = f"17/05/26 22:00:00 14.1 71 8.9 17.3 25.6 231 0 0 1 W 3 kts C {' '.join(fields[15:])}\n"
+    note = _note(log_file(line), zone="UTC")
     assert "latest" in note
     assert "gust" in note
-    line = re.search(r'--columns "([^"]+)"', note)
-    assert line is not None
-    gust = read_log(log_file(" ".join(fields) + "\n"), WindOptions(zone="UTC", columns=line[1])).series
+    offered = re.search(r'--columns "([^"]+)"', note)
+    assert offered is not None
+    gust = read_log(log_file(line), WindOptions(zone="UTC", columns=offered[1])).series
     np.testing.assert_allclose(gust.channels["wind_speed"], 31.5 * 1852 / 3600)
 
 
