@@ -4,7 +4,7 @@ times of day whose date the user gives.
     epoch-us, epoch-ns          Unix time
     excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall clock
     datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
-    elapsed-s, -ms, -us, -min   since a start that the user gives; a counter of 32 bits in ms or us may run over
+    elapsed-s, -ms, -us, -min, -h, -d   since a start that the user gives; a counter of 32 bits in ms or us may run over
     %H:%M:%S and the like       of the day that the user gives, and those that follow
     %b %d %H:%M and the like    of the year of that day (see `yearless`)
 """
@@ -30,8 +30,15 @@ from flagdata.timebase import NANOSECONDS, iso
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}
 """Number of the day 1970-01-01."""
-_ELAPSED = {"elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": 60 * NANOSECONDS}
+_ELAPSED = {
+    "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": 60 * NANOSECONDS,
+    "elapsed-h": 3600 * NANOSECONDS, "elapsed-d": DAY,
+}  # fmt: skip
+_LONG = ("elapsed-min", "elapsed-h", "elapsed-d")
+"""Counts whose fractions are rounded seconds."""
 _OVERFLOW = {"elapsed-ms": 2**32 * 1_000_000, "elapsed-us": 2**32 * 1_000}
+UNITS = tuple(_ELAPSED)
+"""Formats of counts since a start."""
 FORMS = (*_EPOCH, *_SERIAL, *_ELAPSED)
 """Formats of this module that are names."""
 
@@ -87,10 +94,11 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
             ns=np.where(valid, ns, 0) * _EPOCH[form], utc=valid.copy(), valid=valid, distant=none, step=_EPOCH[form]
         )
     pointed = pc.replace_substring(text, ",", ".")
-    number = pc.match_substring_regex(pointed, r"^\d{1,15}(\.\d*)?([eE]\+?\d{1,2})?$")
+    number = pc.match_substring_regex(pointed, r"^\d{1,15}(\.\d*)?([eE][-+]?\d{1,2})?$")
     valid = number.to_numpy(zero_copy_only=False).astype(bool)
     value = pc.cast(pc.if_else(number, pointed, "0"), pa.float64()).to_numpy(zero_copy_only=False)
-    digits = int(pc.max(pc.binary_length(pc.replace_substring_regex(pointed, r"^[^.]*\.?", ""))).as_py() or 0)
+    fraction = pc.replace_substring_regex(pointed, r"^[^.]*\.?|[eE].*$", "")
+    digits = int(pc.max(pc.binary_length(fraction)).as_py() or 0)
     if form in _SERIAL:
         days = value - _SERIAL[form]
         valid = valid & (days > 7_305) & (days < 47_482)  # years 1990 to 2100, as for Unix time
@@ -103,7 +111,12 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     scale = _ELAPSED[form]
     valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)  # ten years
     ns = np.round(np.where(valid, value, 0.0) * scale).astype(np.int64)
-    return Stamps(ns=ns, utc=none, valid=valid, distant=none.copy(), step=max(1, scale // 10 ** min(digits, 9)))
+    step = max(1, scale // 10 ** min(digits, 9))
+    if form in _LONG and step < NANOSECONDS:
+        # Thirds and sixths of an hour are no decimal fractions: what is within the last digit of a second is one.
+        second = np.round(ns / NANOSECONDS).astype(np.int64) * NANOSECONDS
+        ns = np.where(np.abs(ns - second) <= step, second, ns)
+    return Stamps(ns=ns, utc=none, valid=valid, distant=none.copy(), step=step)
 
 
 def since_start(

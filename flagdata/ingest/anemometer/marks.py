@@ -24,6 +24,8 @@ NO_TIME_FIX = (
     "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; "
     "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
 )
+BURST = 5
+"""Lines from a single mark within which others are of its second: 4800 baud carry 5.8 sentences of 82 characters in it."""
 FEW = 10
 """Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
 DISORDER = 2 * NANOSECONDS
@@ -90,13 +92,16 @@ class TimeLine:
             once: whether the lines are one reading, which may have one instant.
 
         Raises:
-            TimeError: fewer than two marks, or no date.
+            TimeError: fewer than two marks, unless all lines are close to the one, or no date.
             UsageError: a date given that the stream contradicts, or does not need.
         """
         instants = set(self.clock.get("TAG", ()))
         if once and len(instants) == 1:
             time = np.full(len(lines), instants.pop(), dtype=np.int64)
             return Placed(time=time, spacing=1.0, marks=1, kind="TAG", findings=())
+        single = self._single()
+        if single is not None and _reach(lines, self.line[single][0]) <= BURST:
+            return self._of_one(single, lines, date=date, where=where)
         kind = self._kind(where)
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
@@ -142,6 +147,25 @@ class TimeLine:
             time=_interpolate(lines, at, marks), spacing=spacing, marks=len(marks), kind=kind, findings=tuple(found)
         )
 
+    def _single(self) -> str | None:
+        """The kind of the one mark of the stream; `None` where there are more, or none but a TAG block."""
+        if any(len(lines) > 1 for lines in self.line.values()):
+            return None
+        return next((kind for kind in _TRUST if kind in self.line), None)
+
+    def _of_one(self, kind: str, lines: NDArray[np.int64], *, date: dt.date | None, where: str) -> Placed:
+        """Instants of a few lines about one mark: within the second before or behind it, in their order."""
+        at = np.array(self.line[kind], dtype=np.int64)
+        clock = np.array(self.clock[kind], dtype=np.int64)
+        mark = self._start(at, clock, np.zeros(1, dtype=np.int64), date, where) * DAY + int(clock[0])
+        pace = NANOSECONDS // (_reach(lines, int(at[0])) + 1)
+        what = (
+            f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
+            "about it, in their order"
+        )
+        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what),)
+        return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=found)
+
     def _kind(self, where: str) -> str:
         counts = {kind: len(lines) for kind, lines in self.line.items()}
         if max(counts.values(), default=0) < 2:
@@ -174,6 +198,11 @@ class TimeLine:
                 where=where, fix="leave out --date",
             )  # fmt: skip
         return start
+
+
+def _reach(lines: NDArray[np.int64], mark: int) -> int:
+    """How many lines the farthest of `lines` is from a mark."""
+    return int(np.abs(lines - mark).max()) if len(lines) else 0
 
 
 def _one_clock(

@@ -43,6 +43,8 @@ MOVING = 0.5
 """Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
 _OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
 """Older sentences → the wind they hold."""
+_NEWER = {"apparent_wind": "MWV,R", "theoretical_wind": "MWV,T", "wind": "MWD"}
+"""The sentences of the same winds that are read before them."""
 WINDS = ("MWV", "MWD", *_OTHERS)
 _CHANNELS = (
     "apparent_wind_speed", "apparent_wind_direction", "theoretical_wind_speed", "theoretical_wind_direction",
@@ -68,6 +70,7 @@ class _Stream:
     unstated: int = 0
     speeds: list[float] = field(default_factory=list)
     others: list[tuple[Sentence, int]] = field(default_factory=list)
+    beside: Counter[str] = field(default_factory=Counter)
 
 
 class Nmea:
@@ -188,6 +191,7 @@ def _take_others(stream: _Stream) -> None:
     for sentence, at in stream.others:
         kind = _OTHERS[sentence.kind]
         if f"{kind}_speed" in known:
+            stream.beside[sentence.kind] += 1
             continue
         added = True
         (_mda if kind == "wind" else _vwr)(stream, sentence, at)
@@ -367,14 +371,12 @@ def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
 
 def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
     count = len(stream.line)
-    found = [
-        Finding(
-            kind="time-interpolated", severity=Severity.WARNING, count=count, value=placed.spacing,
-            what=f"{count} wind sentences carry no time: interpolated between {placed.marks} {placed.kind} marks "
-            f"{placed.spacing:g} s apart",
-        ),
-        *placed.findings,
-    ]  # fmt: skip
+    found = list(placed.findings)
+    if placed.marks > 1:
+        what = f"{count} wind sentences carry no time: interpolated between {placed.marks} {placed.kind} marks "
+        what += f"{placed.spacing:g} s apart"
+        kind = "time-interpolated"
+        found.insert(0, Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=what))
 
     def note(places: list[int], kind: str, severity: Severity, what: str) -> None:
         if places:
@@ -394,6 +396,9 @@ def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
     if stream.unstated:
         text = f"{stream.unstated} MWV sentences without a status; taken as valid"
         found.append(Finding(kind="no-status", severity=Severity.WARNING, count=stream.unstated, what=text))
+    for kind, number_of in stream.beside.items():
+        text = f"{number_of} {kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
+        found.append(Finding(kind="sentences-not-read", severity=Severity.NOTE, count=number_of, what=text))
     if stream.undirected:
         text = f"{stream.undirected} MWD sentences without a direction: no wind over ground, not read"
         found.append(Finding(kind="mwd-without-direction", severity=Severity.NOTE, count=stream.undirected, what=text))

@@ -15,6 +15,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer import counted
@@ -43,6 +45,8 @@ _FREE = ("date", "time")
 _SITE = "site"
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
 _ENTRY = re.compile(r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL)
+_COUNT_AND_WIND, _ROWS, _UNEVEN = 2, 4, 0.01
+"""Columns and steps from which a count is told, and the share of a step by which others may differ."""
 _WIDE = 12
 """Columns up to which an offer lists all of them."""
 
@@ -310,7 +314,24 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     ]  # fmt: skip
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
+    steady = _steady(layout) if time is None and "time[?]" in known.values() else None
+    if steady is not None:
+        units = ", ".join(counted.UNITS[:-1]) + f" or {counted.UNITS[-1]}"
+        counts = f"; where column {steady + 1} is the time since a start, write {units} in time[?] and add --start TIME"
+        further = counts + further
     return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
+
+
+def _steady(layout: Layout) -> int | None:
+    """The first column, where it has no heading and rises by a steady step, as the time since a start does."""
+    if layout.names[0] or layout.number_of_columns() < _COUNT_AND_WIND:
+        return None
+    value = numbers(layout.column(0), decimal=layout.decimal).value
+    step = np.diff(value)
+    if len(step) < _ROWS or not np.all(np.isfinite(step)) or value[0] < 0:
+        return None
+    usual = float(np.median(step))
+    return 0 if usual > 0 and bool(np.all(np.abs(step - usual) <= _UNEVEN * usual)) else None
 
 
 def _of_wind_or_time(entry: str) -> bool:
@@ -379,6 +400,9 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     """Entries of columns by their index."""
     found = _understood(time, winds)
     timed = time is not None
+    steady = None if timed else _steady(layout)
+    if steady is not None:
+        found[steady] = "time[?]"
     for at, name in enumerate(layout.names):
         if at in found:
             continue

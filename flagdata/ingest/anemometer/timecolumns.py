@@ -347,7 +347,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         yield TimeChoice(
             columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
             doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely})",
-            fix=f"say what it counts, elapsed-s, elapsed-ms or elapsed-us ({likely}), and --start TIME",
+            fix=f"say what it counts, {', '.join(counted.UNITS)} ({likely}), and --start TIME",
         )  # fmt: skip
         return
     yield choice

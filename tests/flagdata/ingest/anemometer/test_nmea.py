@@ -10,7 +10,7 @@ from operator import xor
 import numpy as np
 import pytest
 
-from flagdata.errors import UsageError
+from flagdata.errors import TimeError, UsageError
 from flagdata.ingest.anemometer.sentences import ChecksumError, checksum, clock, split, tag_time
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
@@ -209,3 +209,36 @@ def test_a_stream_of_two_kinds_of_wind_says_how_many_of_each_and_how_often(read:
 def test_a_stream_of_one_kind_of_wind_needs_no_such_count(read: Read) -> None:
     log = read(stream("GPZDA,120000.00,01,05,2026,00,00", "WIMWV,010.0,R,5.0,M,A", "GPZDA,120002.00,01,05,2026,00,00"))
     assert "wind-kinds" not in {f.kind for f in log.findings}
+
+
+def _signed(*bodies: str) -> str:
+    return "".join(f"${body}*{checksum(body):02X}\n" for body in bodies)
+
+
+def test_sentences_that_others_stand_for_are_counted(read: Callable[..., WindLog]) -> None:
+    rows: list[str] = []
+    for at in range(6):
+        rows += [f"GPZDA,1200{2 * at:02d},01,05,2026,00,00", f"IIMWV,31{at},T,08.{at}0,N,A"]
+        rows += [f"IIVWT,04{at},L,08.{at}0,N,04.17,M,,"] * 2
+    found = {f.kind: f for f in read(_signed(*rows)).findings}
+    assert found["sentences-not-read"].count == 12
+    assert "12 VWT" in found["sentences-not-read"].what
+    assert "MWV,T" in found["sentences-not-read"].what
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_one_time_gives_a_few_readings_its_second(read: Callable[..., WindLog], first: bool) -> None:
+    winds = ["WIMWV,080.5,R,10.0,N,A", "WIMWV,120.0,T,12.0,N,A", "WIMWV,081.0,R,11.0,N,A"]
+    stamp = ["GPZDA,120000,01,05,2026,00,00"]
+    log = read(_signed(*(stamp + winds if first else winds + stamp)))
+    away = (log.series.time - 1_777_636_800 * 10**9) / 1e9
+    assert np.all(np.diff(away) > 0)
+    assert np.all(np.abs(away) < 1)
+    assert np.all(away > 0) if first else np.all(away < 0)
+    assert "one-time" in {finding.kind for finding in log.findings}
+
+
+def test_one_time_of_a_long_stream_is_not_enough(read: Callable[..., WindLog]) -> None:
+    rows = [f"WIMWV,0{at}.5,R,1{at % 9}.0,N,A" for at in range(10, 40)]
+    with pytest.raises(TimeError, match="only one time"):
+        read(_signed(*rows, "GPZDA,120000,01,05,2026,00,00"))
