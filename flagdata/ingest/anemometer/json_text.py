@@ -22,6 +22,7 @@ from typing import Any
 
 from flagdata.errors import LimitError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import coverage_json
 from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.source import TableText, TextFile
@@ -170,6 +171,10 @@ def _whole(source: TextFile) -> Any:
 
 def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
     """Rows of an object that holds its columns as lists of one length, with their units in a member "…_units"."""
+    covered = coverage_json.columns(item)
+    if covered is not None:
+        cells = zip(*covered[1], strict=True)
+        return [{name: _text(value) for name, value in zip(covered[0], row, strict=True)} for row in cells]
     for name, member in [("", item), *item.items()]:
         lists = {k: v for k, v in member.items() if isinstance(v, list)} if isinstance(member, dict) else {}
         if len(lists) < 2 or len({len(values) for values in lists.values()}) > 1:

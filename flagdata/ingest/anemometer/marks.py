@@ -25,7 +25,7 @@ NO_TIME_FIX = (
     "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
 )
 BURST = 5
-"""Lines from a single mark within which others are of its second: 4800 baud carry 5.8 sentences of 82 characters in it."""
+"""Lines from a single mark within which others are of its second: 4800 baud carry 5.8 sentences of 82 characters."""
 FEW = 10
 """Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
 DISORDER = 2 * NANOSECONDS
