@@ -24,8 +24,8 @@ NO_TIME_FIX = (
     "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; "
     "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
 )
-BURST = 5
-"""Lines from a single mark within which others are of its second: 4800 baud carry 5.8 sentences of 82 characters."""
+BURST = 4
+"""Lines about a single mark that are of its second: 4800 baud carry five sentences of 82 characters, the mark too."""
 FEW = 10
 """Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
 DISORDER = 2 * NANOSECONDS
@@ -163,7 +163,8 @@ class TimeLine:
             f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
             "about it, in their order"
         )
-        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what),)
+        fix = "if they came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
+        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what, fix=fix),)
         return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=found)
 
     def _kind(self, where: str) -> str:
