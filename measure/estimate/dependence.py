@@ -73,6 +73,51 @@ class Errors:
         )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Told:
+    """What a model says of films.
+
+    Attributes:
+        names: of the targets.
+        logits: (film, window, draw, target).
+        known: (film, target) the truth.
+        errors: (film, window, target), as the module's text says.
+    """
+
+    names: tuple[str, ...]
+    logits: NDArray[np.float64]
+    known: NDArray[np.float64]
+    errors: NDArray[np.float64]
+
+
+def told(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed: int) -> Told:
+    """What a model says of films whose truth is known, one film a simulation.
+
+    Args:
+        films: all of the same number of windows.
+        draws: of each window's posterior.
+
+    Raises:
+        InputError: films that do not state the truth.
+    """
+    scaling = model.learners[0].scaling
+    logits: list[NDArray[np.float64]] = []
+    parameters: list[dict[str, float]] = []
+    for number, film in enumerate(films):
+        found = model.logits(
+            model.embeddings(model.inputs(film.windows)), seed=child_seed(seed, "film", number), draws=draws
+        )
+        logits.append(found.double().cpu().numpy())
+        parameters.append(film.parameters)
+    known = truth(columns_of(parameters), scaling.names)
+    place = scaling.learned(torch.from_numpy(known)).double().numpy()
+    centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
+    return Told(
+        names=scaling.quantities, logits=np.array(logits), known=known,
+        errors=errors_of((np.array(logits) - centre) / spread, (place - centre) / spread, scaling.quantities),
+    )  # fmt: skip
+
+
 def errors(model: Estimator, films: Iterable[LongFilm], *, seed: int = 0) -> Errors:
     """Errors of the windows of films whose truth is known, one film a simulation.
 
@@ -82,22 +127,10 @@ def errors(model: Estimator, films: Iterable[LongFilm], *, seed: int = 0) -> Err
     Raises:
         InputError: fewer than ten films, or films that do not state the truth.
     """
-    scaling = model.learners[0].scaling
-    logits: list[NDArray[np.float64]] = []
-    parameters: list[dict[str, float]] = []
-    for number, film in enumerate(films):
-        told = model.logits(
-            model.embeddings(model.inputs(film.windows)), seed=child_seed(seed, "film", number), draws=_DRAWS
-        )
-        logits.append(told.double().cpu().numpy())
-        parameters.append(film.parameters)
-    if len(logits) < 10:
-        raise InputError(f"{len(logits)} films", where="films", fix="give ten or more")
-    known = truth(columns_of(parameters), scaling.names)
-    centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
-    place = scaling.learned(torch.from_numpy(known)).double().numpy()
-    found = errors_of((np.array(logits) - centre) / spread, (place - centre) / spread, scaling.quantities)
-    return Errors(names=scaling.quantities, values=found)
+    found = told(model, films, draws=_DRAWS, seed=seed)
+    if len(found.known) < 10:
+        raise InputError(f"{len(found.known)} films", where="films", fix="give ten or more")
+    return Errors(names=found.names, values=found.errors)
 
 
 def columns_of(parameters: Sequence[dict[str, float]]) -> dict[str, NDArray[np.float64]]:

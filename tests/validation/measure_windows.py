@@ -11,8 +11,7 @@ FLAGDATA_WINDOWS_FILMS says how many films (300).
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +22,13 @@ from numpy.typing import NDArray
 from flagdata.console import progress
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, combined
-from measure.estimate.dependence import columns_of, of_model
-from measure.estimate.long_films import simulated
+from measure.estimate.dependence import Told, of_model, told
+from measure.estimate.long_films import LongFilm, simulated
 from models import estimator
 from models.estimator import Estimator
 from models.evaluation.bootstrap import Resamples
 from models.evaluation.calibration import LEVELS, Coverage, coverage, rank_histogram, tarp
 from models.evaluation.predictions import WIND, Predictions
-from models.targets import truth
 
 FILMS = int(os.environ.get("FLAGDATA_WINDOWS_FILMS", "300"))
 WINDOWS = 6
@@ -40,33 +38,20 @@ _DRAWS = 400
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Told:
-    """What the model says of films.
-
-    Attributes:
-        logits: (film, window, draw, target).
-        known: (film, target).
-        dataset: (film,) whose cloth it shows.
-    """
-
-    logits: Array
-    known: Array
-    dataset: NDArray[np.str_]
-
-
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Calibration of one window and of several, and how errors of windows correlate."""
     torch.set_num_threads(1)
     model = estimator.shipped()
-    told = _told(model, seed=seed)
-    answers = {count: _answers(model, told, count, seed=seed) for count in TOGETHER}
+    own, datasets = child_seed(seed, "measure-windows", "films"), list[str]()
+    films = _noted(simulated(model, count=FILMS, windows=WINDOWS, seed=own), datasets)
+    found = told(model, films, draws=_DRAWS, seed=own)
+    answers = {count: _answers(model, found, count, seed=seed) for count in TOGETHER}
     resamples = Resamples.of(answers[1].group, generator=stream(seed, "measure-windows", "bootstrap"))
-    dependence = of_model(model)
-    found = {
-        "model": model.name, "films": len(told.known), "windows": WINDOWS,
+    dependence, dataset = of_model(model), np.array(datasets)
+    sheet = {
+        "model": model.name, "films": len(found.known), "windows": WINDOWS,
         "dependence": {"wind": dependence.wind, "cloth": dependence.cloth, "source": dependence.source},
-        "correlation_by_distance": _correlations(model, told),
+        "correlation_by_distance": _correlations(found),
         "one_window": {
             "ranks": {name: _ranks(answers[1], name) for name in answers[1].targets},
             "tarp": _shares(
@@ -78,39 +63,30 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             for count, answer in answers.items()
         },
         "by_dataset": {
-            str(name): {str(count): _wind(answer, told.dataset == name) for count, answer in answers.items()}
-            for name in np.unique(told.dataset)
+            str(name): {str(count): _wind(answer, dataset == name) for count, answer in answers.items()}
+            for name in np.unique(dataset)
         },
     }  # fmt: skip
-    (out / "validate-measure-windows.md").write_text(page(found), encoding="utf-8")
-    return found
+    (out / "validate-measure-windows.md").write_text(page(sheet), encoding="utf-8")
+    return sheet
 
 
-def _told(model: Estimator, *, seed: int) -> Told:
-    logits: list[Array] = []
-    parameters: list[dict[str, float]] = []
-    dataset: list[str] = []
-    own = child_seed(seed, "measure-windows", "films")
+def _noted(films: Iterable[LongFilm], datasets: list[str]) -> Iterator[LongFilm]:
+    """The films, with progress; whose cloth each shows is noted."""
     with progress(FILMS, label="windows", unit="film") as advance:
-        for number, film in enumerate(simulated(model, count=FILMS, windows=WINDOWS, seed=own)):
-            found = model.logits(
-                model.embeddings(model.inputs(film.windows)), seed=child_seed(own, "film", number), draws=_DRAWS
-            )
-            logits.append(found.double().numpy())
-            parameters.append(film.parameters)
-            dataset.append(film.dataset)
+        for film in films:
+            yield film
+            datasets.append(film.dataset)
             advance(1)
-    known = truth(columns_of(parameters), model.learners[0].scaling.names)
-    return Told(logits=np.array(logits), known=known, dataset=np.array(dataset))
 
 
-def _answers(model: Estimator, told: Told, count: int, *, seed: int) -> Predictions:
+def _answers(model: Estimator, found: Told, count: int, *, seed: int) -> Predictions:
     """What is said of each film by its first windows together, the wind their mean."""
     learner = model.learners[0]
     names = learner.scaling.quantities
     own = np.array([name in OWN for name in names])
     draws = []
-    for number, logits in enumerate(told.logits[:, :count]):
+    for number, logits in enumerate(found.logits[:, :count]):
         winds, cloth = combined(
             logits, names=names, centre=learner.centre.double().numpy(), spread=learner.spread.double().numpy(),
             dependence=of_model(model), generator=stream(seed, "combine", number),
@@ -121,22 +97,18 @@ def _answers(model: Estimator, told: Told, count: int, *, seed: int) -> Predicti
         draws.append(learner.scaling.values(torch.from_numpy(whole)).numpy().mean(axis=0))
     samples = np.array(draws, dtype=np.float32)
     return Predictions(
-        label=f"{count} windows", targets=names, truth=told.known, mean=samples.mean(axis=1, dtype=np.float64),
+        label=f"{count} windows", targets=names, truth=found.known, mean=samples.mean(axis=1, dtype=np.float64),
         samples=samples, embedding=None, group=np.arange(len(samples)), parameters=0, milliseconds=0.0, note="",
     )  # fmt: skip
 
 
-def _correlations(model: Estimator, told: Told) -> list[float]:
+def _correlations(found: Told) -> list[float]:
     """Of the errors of the wind's logit, standardised, in windows that are 1, 2, … apart."""
-    column = model.learners[0].scaling.quantities.index(WIND)
-    place = model.learners[0].scaling.learned(torch.from_numpy(told.known)).double().numpy()[:, column]
-    draws = told.logits[..., column]
-    error = (draws.mean(axis=2) - place[:, None]) / draws.std(axis=2)
-    found = []
-    for apart in range(1, WINDOWS):
-        first, second = error[:, :-apart], error[:, apart:]
-        found.append(float((first * second).sum() / np.sqrt(np.square(first).sum() * np.square(second).sum())))
-    return found
+    error = found.errors[..., found.names.index(WIND)]
+    return [
+        float((first * second).sum() / np.sqrt(np.square(first).sum() * np.square(second).sum()))
+        for first, second in ((error[:, :-apart], error[:, apart:]) for apart in range(1, WINDOWS))
+    ]
 
 
 def _ranks(answer: Predictions, name: str) -> dict[str, Any]:
