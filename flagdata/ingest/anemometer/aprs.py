@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.restated import rows_of, table
+from flagdata.ingest.anemometer.restated import LOOKED_AT, rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 _VALUE = r"(?:\d{3}|\.{3}|\s{3})"
@@ -39,8 +39,6 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The wind and the weather of each report, after the receiver's stamp or else after its own time of day."""
-    from flagdata.ingest.anemometer.restated import LOOKED_AT  # it imports this module by name
-
     lines = [line for line in source.head(LOOKED_AT) if _REPORT.search(line)]
     stamped = sum(_BEFORE.match(line) is not None for line in lines) > len(lines) / 2
     found, other = rows_of(source, lambda line: _row(line, stamped=stamped))

@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import words_of
 from flagdata.ingest.anemometer.layout import Layout
-from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.midnight import parse_as
 from flagdata.ingest.anemometer.timechoice import (
     TWO_DIGITS,
     YEAR,
@@ -142,7 +142,7 @@ def _by_heading(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[Ti
             continue
         date = "".join(_SPELLED[part] for part in found.groups())
         for clock in clocks:
-            yield from _read(layout, columns, [index, clock], [f"{date} {form}" for form in CLOCKS], score=2.3)
+            yield from read(layout, columns, [index, clock], [f"{date} {form}" for form in CLOCKS], score=2.3)
 
 
 def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator[TimeChoice]:
@@ -157,7 +157,7 @@ def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator
             if first < 0 or taken[-1] >= len(columns) or not share(YEAR, columns[first + parts.index("%Y")]):
                 continue
             forms = [" ".join(form if part == "clock" else part for part in parts) for form in CLOCKS[:4]]
-            yield from _read(layout, columns, taken, forms, score=2.2)
+            yield from read(layout, columns, taken, forms, score=2.2)
 
 
 def _whole(cells: Sequence[str]) -> Sequence[str]:
@@ -231,15 +231,15 @@ def _counted(
         name = " ".join(words_of(heading))
         cells = [cell for cell in columns[index] if cell]
         if "year" in named and _HOURS_OF_YEAR.fullmatch(name) and whole_numbers(cells, 0, 8784):
-            yield from _read(layout, columns, [named["year"], index], ["%Y %E"], score=2.2)
+            yield from read(layout, columns, [named["year"], index], ["%Y %E"], score=2.2)
         for form, (words, most) in _OF_DAY.items():
             if not words.fullmatch(name) or not whole_numbers(cells, 0, most):
                 continue
             if {"year", "doy"} <= set(named):
-                yield from _read(layout, columns, [named["year"], named["doy"], index], [f"%Y %j {form}"], score=2.2)
+                yield from read(layout, columns, [named["year"], named["doy"], index], [f"%Y %j {form}"], score=2.2)
             if {"year", "month", "day"} <= set(named):
                 taken = [named["year"], named["month"], named["day"], index]
-                yield from _read(layout, columns, taken, [f"%Y %m %d {form}"], score=2.2)
+                yield from read(layout, columns, taken, [f"%Y %m %d {form}"], score=2.2)
             for date in dates:
                 try:
                     forms = [f"{date_form} {form}" for date_form in date_forms(layout, date, order)]
@@ -249,7 +249,7 @@ def _counted(
                         fix=error.fix,
                     )  # fmt: skip
                     continue
-                yield from _read(layout, columns, [date, index], forms, score=2.2)
+                yield from read(layout, columns, [date, index], forms, score=2.2)
 
 
 def _of_parts(
@@ -268,24 +268,24 @@ def _of_parts(
         whole = not share(_DECIMAL, columns[named["doy"]])
         date, of_date = f"%Y {'%j' if whole else '%J'}", [named["year"], named["doy"]]
         if not whole:
-            yield from _read(layout, columns, of_date, [date], score=2.1)
+            yield from read(layout, columns, of_date, [date], score=2.1)
             return
     elif {"hour", "minute"} <= set(named) and not {"year", "month", "doy"} & set(named):
         clock, of_clock = _clock(columns, named)
-        yield from _read(layout, columns, of_clock, [clock], score=1.0)
+        yield from read(layout, columns, of_clock, [clock], score=1.0)
         return
     else:
         return
     clock, of_clock = _clock(columns, named)
     if clock:
-        yield from _read(layout, columns, [*of_date, *of_clock], [f"{date} {clock}"], score=2.2)
+        yield from read(layout, columns, [*of_date, *of_clock], [f"{date} {clock}"], score=2.2)
         return
     for index, cells in enumerate(columns):
         filled = [cell for cell in cells if cell]
         if filled and index not in of_date and share(_CLOCK, filled):
             forms = [f"{date} {form}" for form in CLOCKS]
-            yield from _read(layout, columns, [*of_date, index], forms, score=2.1)
-    yield from _read(layout, columns, of_date, [date], score=0.9)
+            yield from read(layout, columns, [*of_date, index], forms, score=2.1)
+    yield from read(layout, columns, of_date, [date], score=0.9)
 
 
 def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:
@@ -299,13 +299,13 @@ def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mappi
         texts = [cell for at in of_clock for cell in columns[at] if cell]
         clock = next((form for form in CLOCKS if texts and fits(counted.parse(texts, form))), "")
     if "doy" in named and share(_DECIMAL, [cell for cell in columns[named["doy"]] if cell]):
-        yield from _read(layout, columns, [named["doy"]], ["%J"], score=1.9)
+        yield from read(layout, columns, [named["doy"]], ["%J"], score=1.9)
     elif "doy" in named and clock:
-        yield from _read(layout, columns, [named["doy"], *of_clock], [f"%j {clock}"], score=1.9)
+        yield from read(layout, columns, [named["doy"], *of_clock], [f"%j {clock}"], score=1.9)
     elif {"month", "day"} <= set(named) and clock:
         month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
         taken = [named["month"], named["day"], *of_clock]
-        yield from _read(layout, columns, taken, [f"{month} %d {clock}"], score=1.9)
+        yield from read(layout, columns, taken, [f"{month} %d {clock}"], score=1.9)
 
 
 def _beside_dates(
@@ -336,7 +336,7 @@ def _beside_dates(
                 fix=error.fix,
             )  # fmt: skip
             continue
-        yield from _read(layout, columns, [index, *of_clock], [f"{form} {clock}" for form in forms], score=2.2)
+        yield from read(layout, columns, [index, *of_clock], [f"{form} {clock}" for form in forms], score=2.2)
 
 
 def _clock(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> tuple[str, list[int]]:
@@ -372,13 +372,13 @@ def _pointed(cells: Sequence[str]) -> str:
     return "" if uneven[0] == uneven[1] else "%H.%M" if uneven[0] < uneven[1] else "%Q"
 
 
-def _read(
+def read(
     layout: Layout, columns: Sequence[Sequence[str]], taken: Sequence[int], forms: Sequence[str], *, score: float
 ) -> Iterator[TimeChoice]:
     """The time in these columns by the first of the formats that reads it."""
     texts = [" ".join(cells) for cells in zip(*(columns[index] for index in taken), strict=True) if all(cells)]
     for form in forms:
-        found = counted.parse(texts, form) if counted.needs_date(form) else parse_with_bare_dates(texts, form)[0]
+        found, _ = parse_as(texts, form)
         if fits(found):
             yield time_choice(layout, tuple(taken), form, found, score)
             return

@@ -10,9 +10,22 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.stamps import EPOCH, Stamps, parse
 
 _TIME = re.compile(r"%[HIMSpfT]")
+
+
+def parse_as(texts: Sequence[str] | pa.StringArray, form: str) -> tuple[Stamps, int]:
+    """Stamps of any format, counts and those without a date or a year included (`counted`), and how many bare dates
+    were read as midnight.
+
+    Raises:
+        UsageError: see `stamps.pattern`.
+    """
+    if form in counted.FORMS or counted.needs_date(form):
+        return counted.parse(texts, form), 0
+    return parse_with_bare_dates(texts, form)
 
 
 def parse_with_bare_dates(texts: Sequence[str] | pa.StringArray, form: str) -> tuple[Stamps, int]:

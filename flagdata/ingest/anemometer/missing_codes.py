@@ -61,6 +61,6 @@ def _numbers(layout: Layout, wind: Wind | None) -> list[float]:
             codes.extend(code for code in NO_ANGLE if code in known)
         for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
             others = known[known != code]
-            if channel == "wind_speed" and code in known and len(others) and code > 75 and 2 * others.max() < code:
+            if channel == "wind_speed" and code in known and len(others) and 2 * others.max() < code:
                 codes.append(code)
     return list(dict.fromkeys(codes))

@@ -17,7 +17,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from flagdata.ingest.anemometer.restated import table
+from flagdata.ingest.anemometer.restated import LOOKED_AT, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 Row = Mapping[str, str]
@@ -210,8 +210,6 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The table with unit and zone in its headings; `None` for rows whose own column states different units."""
-    from flagdata.ingest.anemometer.restated import LOOKED_AT  # it imports this module by name
-
     found = _find(source.head(LOOKED_AT))
     if found is None:
         return None

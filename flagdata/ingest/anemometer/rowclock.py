@@ -21,7 +21,7 @@ from flagdata.ingest.anemometer import counted, disorder, twelve, yearless
 from flagdata.ingest.anemometer.clock import ClockChoice
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.growing import Growing
-from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.midnight import parse_as
 from flagdata.ingest.anemometer.stamps import EPOCH, Stamps, is_date_alone
 from flagdata.ingest.anemometer.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.wall import offset_at, to_utc, zone_advice
@@ -71,9 +71,7 @@ class RowClock:
             texts = block.joined(self.columns)
         else:
             texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
-        if self.form in counted.FORMS or counted.needs_date(self.form):
-            return self._with_bare_hours(texts, counted.parse(texts, self.form))
-        stamps, bare = parse_with_bare_dates(texts, self.form)
+        stamps, bare = parse_as(texts, self.form)
         self.bare_dates += bare
         return self._with_bare_hours(texts, stamps)
 

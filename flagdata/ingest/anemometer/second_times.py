@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.headings import words_of
 from flagdata.ingest.anemometer.layout import Layout
-from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.midnight import parse_as
 from flagdata.ingest.anemometer.stamps import Stamps, is_date_alone
 from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, whole_numbers
 from flagdata.timebase import NANOSECONDS
@@ -104,9 +103,7 @@ def _whole(choice: TimeChoice) -> bool:
 
 def _read(layout: Layout, choice: TimeChoice) -> Stamps:
     texts = [" ".join(cells) for cells in zip(*(layout.column(at) for at in choice.columns), strict=True)]
-    form = choice.form or ""
-    own = form in counted.FORMS or counted.needs_date(form)
-    return counted.parse(texts, form) if own else parse_with_bare_dates(texts, form)[0]
+    return parse_as(texts, choice.form or "")[0]
 
 
 def _moves(found: Stamps) -> bool:

@@ -21,7 +21,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flagdata.ingest.anemometer.restated import rows_of, table
+from flagdata.ingest.anemometer.restated import LOOKED_AT, rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 _SHARE = 0.8
@@ -156,8 +156,6 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The wind and the weather of each line; `None` where the unit changes from line to line."""
-    from flagdata.ingest.anemometer.restated import LOOKED_AT  # it imports this module by name
-
     kind = _kind(source.head(LOOKED_AT))
     if kind is None:
         return None

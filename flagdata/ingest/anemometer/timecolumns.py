@@ -17,7 +17,7 @@ from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, ord
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
-from flagdata.ingest.anemometer.midnight import parse_with_bare_dates
+from flagdata.ingest.anemometer.midnight import parse_as, parse_with_bare_dates
 from flagdata.ingest.anemometer.stamps import Stamps
 from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice
 
@@ -81,7 +81,7 @@ def time_as(layout: Layout, columns: tuple[int, ...], form: str) -> TimeChoice |
     """
     texts = [" ".join(cells) for cells in zip(*(layout.column(index) for index in columns), strict=True)]
     texts = [text for text in texts if text.strip()]
-    found = counted.parse(texts, form) if counted.needs_date(form) else _parsed(texts, form)
+    found, _ = parse_as(texts, form)
     return time_choice(layout, columns, form, found, 2.0) if fits(found) else None
 
 
@@ -95,7 +95,7 @@ def _without_false_epochs(layout: Layout, choices: Sequence[TimeChoice]) -> list
     kept: list[TimeChoice] = []
     for choice in choices:
         if dated and choice.form in _EPOCHS:
-            ns = _parsed(_texts(layout, choice)[:20], choice.form).ns
+            ns = parse_as(_texts(layout, choice)[:20], choice.form)[0].ns
             years = {
                 1970 + int(value) for value in ns.astype("datetime64[ns]").astype("datetime64[Y]").astype(np.int64)
             }
@@ -107,10 +107,6 @@ def _without_false_epochs(layout: Layout, choices: Sequence[TimeChoice]) -> list
 
 def _texts(layout: Layout, choice: TimeChoice) -> list[str]:
     return [" ".join(cells) for cells in zip(*(layout.column(index) for index in choice.columns), strict=True)]
-
-
-def _parsed(texts: Sequence[str], form: str) -> Stamps:
-    return counted.parse(texts, form) if form in counted.FORMS else parse_with_bare_dates(texts, form)[0]
 
 
 def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:

@@ -10,11 +10,11 @@ import numpy as np
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted
 from flagdata.ingest.anemometer.cells import numbers
-from flagdata.ingest.anemometer.dateparts import CLOCKS
+from flagdata.ingest.anemometer.dateparts import CLOCKS, read
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.headings import names_time, words_of
 from flagdata.ingest.anemometer.layout import Layout
-from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, time_choice, whole_numbers
+from flagdata.ingest.anemometer.timechoice import SHARE, TimeChoice, fits, share, whole_numbers
 
 _NAME = r"(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?"
 _NAMED = re.compile(
@@ -56,12 +56,14 @@ def choices(
     for index in range(len(columns) - 2):
         parts = [[cell for cell in columns[at] if cell] for at in range(index, index + 3)]
         if all(parts) and all(share(*pair) for pair in zip((_MONTH, _DAY, _CLOCK), parts, strict=True)):
-            yield from _read(layout, columns, (index, index + 1, index + 2), [f"%b %d {clock}" for clock in CLOCKS])
+            taken, forms = (index, index + 1, index + 2), [f"%b %d {clock}" for clock in CLOCKS]
+            yield from read(layout, columns, taken, forms, score=_SCORE)
     for index, heading in enumerate(layout.names):
         if words_of(heading) in (["day"], ["day", "number"], ["day", "no"], ["day", "index"]):
             for clock in clocks:
                 if _counts_days(columns[index], columns[clock]):
-                    yield from _read(layout, columns, (index, clock), [f"%D {clock_form}" for clock_form in CLOCKS[:2]])
+                    forms = [f"%D {clock_form}" for clock_form in CLOCKS[:2]]
+                    yield from read(layout, columns, (index, clock), forms, score=_SCORE)
 
 
 def _dated(
@@ -88,18 +90,7 @@ def _dated(
             )  # fmt: skip
             return
         date = decision.directives().removesuffix(f"{sign}%Y") + end
-    yield from _read(layout, columns, taken, [f"{date} {clock}" for clock in CLOCKS])
-
-
-def _read(
-    layout: Layout, columns: Sequence[Sequence[str]], taken: tuple[int, ...], forms: Sequence[str]
-) -> Iterator[TimeChoice]:
-    texts = [" ".join(cells) for cells in zip(*(columns[at] for at in taken), strict=True) if all(cells)]
-    for form in forms:
-        found = counted.parse(texts, form)
-        if fits(found):
-            yield time_choice(layout, taken, form, found, _SCORE)
-            return
+    yield from read(layout, columns, taken, [f"{date} {clock}" for clock in CLOCKS], score=_SCORE)
 
 
 def _counts_days(days: Sequence[str], clock: Sequence[str]) -> bool:
