@@ -87,13 +87,16 @@ _HEADINGS = {
     "points-es": ("viento", "vento", "vent", "dirección", "direccion", "direzione"), "points-pt": ("vento", "direção"),
 }  # fmt: skip
 """Words of a heading that tell its language."""
-CALM = frozenset(
+STILL = frozenset(
     {
-        "calm", "still", "none", "variable", "vrb", "var", "calma", "windstille", "calme", "штиль", "cvr", "cv", "cal",
-        "calmo", "stil", "stille", "vindstille", "umlaufend", "variabel", "no wind", "windstil",
-        "静穏", "静风", "靜風", "無風", "无风", "静稳", "風向不定", "风向不定", "不定",
+        "c", "calm", "calm wind", "calm winds", "still", "calma", "calmo", "windstille", "calme", "штиль", "stil",
+        "stille", "vindstille", "windstil", "no wind", "静穏", "静风", "靜風", "無風", "无风", "静稳",
     }
 )  # fmt: skip
+"""Words for calm air, which stand for a speed of 0 and for no direction."""
+CALM = STILL | {
+    "none", "variable", "vrb", "var", "cvr", "cv", "cal", "umlaufend", "variabel", "風向不定", "风向不定", "不定",
+}  # fmt: skip
 """What stands in a column of points where there is no direction."""
 
 

@@ -92,7 +92,7 @@ SPELLINGS: dict[str, str] = {
     "meters/second": "m/s", "meter/second": "m/s", "metres/second": "m/s", "metre/second": "m/s", "metres/sec": "m/s",
     "0.1m/s": "dm/s", "0,1m/s": "dm/s", "cms-1": "cm/s", "cm.s-1": "cm/s", "cm/sec": "cm/s",
     "m+1s-1": "m/s", "meterspersecond": "m/s",
-    "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h", "kmh-1": "km/h", "km.h-1": "km/h",
+    "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h", "km/hour": "km/h", "kmh-1": "km/h", "km.h-1": "km/h",
     "kilometers/hour": "km/h", "kilometres/hour": "km/h",
     "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn", "nauticalmiles/hour": "kn",
     "mi/h": "mph", "mi/hr": "mph", "miles/hour": "mph", "mile/hour": "mph", "milesperhour": "mph",

@@ -4,7 +4,7 @@
 # pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -26,6 +26,7 @@ class Cell(IntEnum):
     MISSING = 1
     UNREADABLE = 2
     INFINITE = 3
+    CALM = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +34,7 @@ class Numbers:
     """A column.
 
     Attributes:
-        value: (n,) float64, NaN unless `state` is NUMBER.
+        value: (n,) float64, NaN unless `state` is NUMBER, or CALM with 0.
         state: (n,) uint8 of `Cell`.
     """
 
@@ -42,7 +43,12 @@ class Numbers:
 
 
 def numbers(
-    cells: Sequence[str] | pa.StringArray, *, decimal: str = ".", missing: Sequence[str] = (), suffix: str = ""
+    cells: Sequence[str] | pa.StringArray,
+    *,
+    decimal: str = ".",
+    missing: Sequence[str] = (),
+    suffix: str = "",
+    zeros: Collection[str] = (),
 ) -> Numbers:
     """Read a column of cells.
 
@@ -50,6 +56,7 @@ def numbers(
         decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
         suffix: what stands behind each number, such as its unit; a number without it is unreadable.
+        zeros: words that stand for 0, lower-case; those of `missing` go before them.
     """
     text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
     if suffix:
@@ -67,6 +74,8 @@ def numbers(
         absent = pc.is_in(lower, pa.array([*MISSING, *missing], pa.string()))
         endless = pc.match_substring_regex(lower, _INFINITE)
         state[~_mask(readable)] = Cell.UNREADABLE
+        if zeros:
+            state[_mask(pc.is_in(lower, pa.array(sorted(zeros), pa.string())))] = Cell.CALM
         state[_mask(pc.or_(absent, pc.match_substring_regex(written, MISSING_SIGNS)))] = Cell.MISSING
         state[_mask(endless)] = Cell.INFINITE
         parsed = pc.cast(pc.if_else(readable, text, None), pa.float64())
@@ -76,6 +85,7 @@ def numbers(
     for code in _numeric(missing):
         state[(value == code) & (state == Cell.NUMBER)] = Cell.MISSING
     value[state != Cell.NUMBER] = np.nan
+    value[state == Cell.CALM] = 0.0
     return Numbers(value=value, state=state)
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import platform
+from flagdata.ingest.anemometer import devices, filled_later, platform, site_labels, unread_by_recipe
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.draft import Draft, draft
 from flagdata.ingest.anemometer.headings import interest, understand
 from flagdata.ingest.anemometer.layout import cut, lay_out
-from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.rowclock import Given
@@ -67,7 +68,11 @@ class Delimited:
             raise UsageError(
                 f"the recipe {recipe.name} is for host-stamped lines", where=where, fix="use --as host-stamped"
             )
-        return _read(source, recipe, options, where)
+        reading = _read(source, recipe, options, where)
+        if options.recipe not in recipes.SENSORS.names():  # whoever writes a recipe names what is wanted
+            return reading
+        mixed = devices.check(source, source.head(HEAD_LINES), reading, recipe, options, where)
+        return reading.with_findings((*_not_read(unread_by_recipe.remarks(source, recipe)), *mixed))
 
     def _by_draft(self, source: TextFile, options: WindOptions, where: str) -> Reading:
         proposal = drafted(source, options)
@@ -79,11 +84,11 @@ class Delimited:
             what = "; ".join(doubt.what for doubt in proposal.doubts)
             open_needs = [need.fix for need in proposal.needs if need.without(options)]
             raise InputError(what, where=where, fix="; ".join([*(doubt.fix for doubt in proposal.doubts), *open_needs]))
-        if len(proposal.winds) > 1 and options.wind is None:
-            names = ", ".join(proposal.winds)
+        winds = proposal.winds if options.wind is None else site_labels.of_column(proposal.winds, options.wind)
+        if len(winds) > 1:
             raise InputError(
-                f"the file holds {len(proposal.winds)} anemometers: {names}", where=where,
-                fix=f"name the one to read: --wind {_argument(proposal.winds[0])}; ingest takes each by itself",
+                f"the file holds {len(winds)} anemometers: {', '.join(winds)}", where=where,
+                fix=f"name the one to read: --wind {in_shell(winds[0])}; ingest takes each by itself",
             )  # fmt: skip
         recipe = recipes.parse(proposal.toml, where=f"the draft for {where}")
         try:
@@ -99,10 +104,9 @@ class Delimited:
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in proposal.warnings
         ]
-        if proposal.remarks:
-            text = "; ".join(proposal.remarks)
-            found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, what=text))
-        findings = (*reading.findings, *found)
+        found += _not_read(proposal.remarks)
+        lines = source.head(HEAD_LINES)
+        findings = (*reading.findings, *found, *devices.check(source, lines, reading, recipe, options, where))
         return replace(reading, findings=findings, drafted=proposal.toml, understood=proposal.understood)
 
 
@@ -124,7 +128,8 @@ def guess(proposal: Draft) -> Guess:
 def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     """The draft of a file's recipe, completed by what the user says."""
     lines = tuple(source.head(HEAD_LINES))
-    lines = (*lines, *_of_later_sites(source, lines))
+    if len(lines) == HEAD_LINES:
+        lines = (*lines, *_of_later_sites(source, lines), *filled_later.rows(source, lines))
     return draft(
         lines, unit=options.unit, order=options.date_order, wind=options.wind, columns=options.columns,
         where=str(source.path),
@@ -133,7 +138,7 @@ def drafted(source: TextFile, options: WindOptions) -> Draft | None:
 
 def _of_later_sites(source: TextFile, lines: tuple[str, ...]) -> tuple[str, ...]:
     """Rows of sites that follow the first lines, where a column has a site's heading and these hold one site alone."""
-    layout = lay_out(lines, interest=interest) if len(lines) == HEAD_LINES else None
+    layout = lay_out(lines, interest=interest)
     one = site_of_all(layout, apart=()) if layout is not None else None
     if layout is None or one is None or one[0] in layout.unit_columns:
         return ()
@@ -153,18 +158,19 @@ def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:
     """Labels of all anemometers of a file whose column tells sites apart, those beyond its first lines included."""
     if proposal.site is None:
         return proposal.winds
-    rests = {label.partition(":")[2] for label in proposal.winds}
-    known = {label.partition(":")[0] for label in proposal.winds}
+    known = {site_labels.site_of(text, proposal.parts)[0] for text in proposal.winds}
     for first, lines in source.blocks():
         for line in lines[HEAD_LINES:] if first == 1 else lines:
             cells = cut(line, proposal.delimiter)
             if len(cells) > proposal.site and cells[proposal.site]:
                 known.add(cells[proposal.site])
-    return tuple(f"{site}:{rest}" if rest else site for site in sorted(known) for rest in sorted(rests))
+    return tuple(site_labels.label_of(site, part) for site in sorted(known) for part in sorted(proposal.parts))
 
 
-def _argument(text: str) -> str:
-    return text if text.isalnum() else f"'{text}'"
+def _not_read(remarks: Sequence[str]) -> tuple[Finding, ...]:
+    """The finding that tells columns which were not read, if there are any."""
+    what = "; ".join(remarks)
+    return (Finding(kind="columns-not-read", severity=Severity.NOTE, what=what),) if remarks else ()
 
 
 def _read(source: TextFile, recipe: Recipe, options: WindOptions, where: str) -> Reading:

@@ -84,7 +84,7 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
         doubt = f"is stated in degrees, but holds numbers from {low:g} to {high:g}: likely radians"
         return Judged(unit=unit, told=told, may_be=("rad",), doubt=doubt)
     if north and not heading.towards and set(words_of(heading.name)) & COURSES:
-        doubt = "is taken as where the wind comes from; if it is where it blows to, --columns has wind_direction_to"
+        doubt = "is taken as where the wind comes from"
         return Judged(unit=unit, told=told, doubt=doubt)
     return Judged(unit=unit, told=told)
 

@@ -17,6 +17,8 @@ import numpy as np
 from flagdata.ingest.anemometer import (
     counted,
     missing_codes,
+    quality_columns,
+    site_labels,
     stated_columns,
     stated_rate,
     unitcheck,
@@ -37,7 +39,7 @@ from flagdata.ingest.anemometer.instruments import (
 )
 from flagdata.ingest.anemometer.layout import Layout, lay_out
 from flagdata.ingest.anemometer.no_speeds import beaufort, counts
-from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.rows_above import rows_above
 from flagdata.ingest.anemometer.sites import site_of_all, sites
@@ -98,6 +100,7 @@ class Draft:
         unsure: labels of the anemometers that may be something else, such as the speed of a vehicle.
         winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
         site: index of the column that tells sites apart, `None` where there is one site.
+        parts: labels of the anemometers of one row, "" for one alone (see `site_labels.columns`).
         delimiter: of the cells.
         of_earth: whether the components of the wind are towards east (x) and north (y).
     """
@@ -111,6 +114,7 @@ class Draft:
     unsure: tuple[str, ...] = ()
     winds: tuple[str, ...] = ()
     site: int | None = None
+    parts: tuple[str, ...] = ("",)
     delimiter: str = ","
     of_earth: bool = False
 
@@ -140,6 +144,7 @@ def draft(
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
+    named = False
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
         time, winds, remarks, warnings = known.time, (known.wind,), (), ()
@@ -152,26 +157,30 @@ def draft(
         if time is not None:
             mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
-        of_site = mixed is not None and wind is not None and (wind.isdigit() or wind.partition(":")[0] in mixed[1])
-        if wind is not None and not of_site and wind not in {one.label for one in winds}:
-            said, odd = named_wind(layout, wind, time=of_time, told=unit)
-            winds, warnings = (*winds, *said), (*warnings, *odd)
+        for part in () if wind is None else site_labels.parts(wind, mixed[1] if mixed is not None else ()):
+            if part in {one.label for one in winds}:
+                break
+            said, odd = named_wind(layout, part, time=of_time, told=unit)
+            winds, warnings, named = (*winds, *said), (*warnings, *odd), bool(said)
+            if said:
+                break
         if time is None and not winds:
             return None
+    parts: tuple[str, ...] = ("",)
     if mixed is not None:
-        winds = tuple(
-            replace(one, site=(mixed[0], site), label=site if len(winds) == 1 else f"{site}:{one.label}")
-            for one in winds for site in mixed[1]
-        )  # fmt: skip
+        layout = replace(layout, site=mixed[0])
+        parts = site_labels.columns(winds, named=named)
+        winds = site_labels.of_sites(winds, *mixed, named=named)
     labels = tuple(one.label for one in winds)
-    chosen = next((one for one in winds if one.label == wind), None)
+    of_all = mixed is not None and wind in parts
+    chosen = next((one for one in winds if one.label == wind or (of_all and one.label.endswith(f":{wind}"))), None)
     doubts = list(_doubts(lines, layout, time, winds, chosen))
     doubts += _below_zero(layout, time, winds) if columns is None and wind is None else []
     if wind is not None and chosen is None and mixed is not None and winds:
         # A site that the first rows do not hold.
-        label, _, rest = wind.partition(":")
-        like = next((one for one in winds if not rest or one.label.endswith(f":{rest}")), winds[0])
-        chosen = replace(like, label=wind, site=(mixed[0], label))
+        site, part = site_labels.site_of(wind, parts)
+        like = next((one for one in winds if not part or one.label.endswith(f":{part}")), winds[0])
+        chosen = replace(like, label=wind, site=(mixed[0], site))
     elif wind is not None and chosen is None:
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
@@ -187,8 +196,11 @@ def draft(
     if time is not None and time.remark is not None:
         warnings = (*warnings, time.remark)
     if columns is None and chosen is not None:
+        taken = {*of_time, *(column.index for one in winds for column in one.columns.values())}
+        warnings = (*warnings, *quality_columns.warnings(layout, taken=taken))
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
+        remarks = (*remarks, *unread.otherwise(layout, time, chosen))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
@@ -196,7 +208,7 @@ def draft(
         warnings=warnings,
         doubts=tuple(doubts), needs=_needs(lines, layout, time),
         unsure=tuple(one.label for one in winds if not one.sure),
-        winds=labels, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+        winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth,
     )  # fmt: skip
 
@@ -275,7 +287,7 @@ def _doubts(
             break
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
-        fix = f"if it is the wind, name it: --wind '{unsure[0]}'"
+        fix = f"if it is the wind, name it: --wind {in_shell(unsure[0])}"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         found.append(Doubt(what=what, fix=fix))

@@ -216,6 +216,8 @@ def understand(name: str, stated: str = "") -> Heading:
         excluded = known & _OTHER - VERTICAL if quantity == "wind_z" else known & _OTHER
         if "wind" in quantity and excluded:
             quantity, sure = "", False
+    if quantity == "wind_speed" and len(along := known & {"x", "y", "z"}) == 1:
+        quantity, sure = _COMPONENTS[next(iter(along))], bool(known & WIND)
     if quantity.endswith("wind_speed") and known & _AXES:
         quantity, sure = "", False
     left = list(words)

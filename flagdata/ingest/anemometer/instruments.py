@@ -121,7 +121,8 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
     for index, heading in enumerate(headings):
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
-        parsed = numbers(layout.column(index), decimal=layout.decimal)
+        calm = compass.STILL if heading.quantity.endswith("wind_speed") else ()
+        parsed = numbers(layout.column(index), decimal=layout.decimal, zeros=calm)
         points = compass_unit(layout, index) if may_be_points(heading) else None
         if points is not None:
             found.values[index] = degrees(layout, index, points)
@@ -131,15 +132,10 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
             )
         elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE and not _few_words(found, index, parsed):
             if heading.quantity.endswith("direction") and may_be_two(layout, index):
-                fix = (
-                    f"say which: --columns, {heading.name}=wind_direction[points-de] (O is east) or [points-es] (west)"
-                )
-                found.remarks.append(
-                    f"column {heading.name!r} holds points whose O may be east or west: left out; {fix}"
-                )
+                found.remarks.append(f"column {heading.name!r} holds points whose O may be east or west: left out")
                 continue
             found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
-        elif bool((parsed.state == Cell.NUMBER).any()):
+        elif bool(np.isfinite(parsed.value).any()):
             found.values[index] = parsed.value
         elif not heading.spread:
             found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
@@ -152,9 +148,10 @@ def _few_words(found: _Found, index: int, parsed: Numbers) -> bool:
     """Whether a column holds numbers, and a few words that say why there is none; of a wind, that is said."""
     cells = found.layout.column(index)
     listed = codes.words(cells, parsed)
-    if listed and "wind" in found.headings[index].quantity:
+    told = [word for word in listed if word.lower() not in compass.STILL]
+    if told and "wind" in found.headings[index].quantity:
         found.warnings.append(
-            f"column {found.headings[index].name!r} holds {', '.join(map(repr, listed))} in some of the first "
+            f"column {found.headings[index].name!r} holds {', '.join(map(repr, told))} in some of the first "
             f"{len(cells)} rows, where others hold numbers: taken for no value"
         )
     return bool(listed)

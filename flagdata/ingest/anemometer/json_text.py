@@ -22,7 +22,7 @@ from typing import Any
 
 from flagdata.errors import LimitError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import coverage_json
+from flagdata.ingest.anemometer import json_measures, json_series
 from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.source import TableText, TextFile
@@ -86,10 +86,13 @@ def as_table(source: TextFile) -> TableText | None:
         LimitError: more than `WIDEST` columns.
     """
     whole = _whole(source)
-    columns = _columns(whole) if isinstance(whole, dict) else None
+    series = json_series.table(whole)
+    columns = None if series is None else [{name: _text(value) for name, value in row.items()} for row in series]
+    if columns is None and isinstance(whole, dict):
+        columns = _columns(whole)
     before: list[tuple[str, str]] = []
-    if isinstance(whole, dict) and columns is not None:
-        before = [(key, _text(value)) for key, value in whole.items() if not isinstance(value, dict | list)]
+    if columns is not None:
+        before = [(key, _text(value)) for key, value in _of_all(whole).items() if not isinstance(value, dict | list)]
     table: list[dict[str, str]] = []
     names: dict[str, None] = {}
     broken = 0
@@ -124,6 +127,13 @@ def as_table(source: TextFile) -> TableText | None:
         found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=broken, what=text))
     lines = tuple(out.getvalue().splitlines())
     return TableText.of(source, lines, found)
+
+
+def _of_all(whole: Any) -> dict[str, Any]:
+    """The members of an object, or those that all objects of a list have in common."""
+    if isinstance(whole, dict):
+        return whole
+    return {key: value for key, value in whole[0].items() if all(item.get(key) == value for item in whole)}
 
 
 def _once(table: Sequence[dict[str, str]]) -> tuple[list[dict[str, str]], int]:
@@ -171,10 +181,6 @@ def _whole(source: TextFile) -> Any:
 
 def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
     """Rows of an object that holds its columns as lists of one length, with their units in a member "…_units"."""
-    covered = coverage_json.columns(item)
-    if covered is not None:
-        cells = zip(*covered[1], strict=True)
-        return [{name: _text(value) for name, value in zip(covered[0], row, strict=True)} for row in cells]
     for name, member in [("", item), *item.items()]:
         lists = {k: v for k, v in member.items() if isinstance(v, list)} if isinstance(member, dict) else {}
         if len(lists) < 2 or len({len(values) for values in lists.values()}) > 1:
@@ -211,19 +217,32 @@ def _items(whole: Any) -> list[Any]:
     The list may lie in an object within ("observations": {"header": …, "data": [ … ]}).
     """
     if isinstance(whole, list):
-        return whole
+        return json_measures.by_station(whole)
+    timed = json_measures.by_time(whole)
+    if timed is not None:
+        return timed
     level = [whole]
     for _ in range(_DEEPEST):
         lists = [
             member for item in level for member in item.values()
             if isinstance(member, list) and len(member) > 1 and {type(item) for item in member} in ({dict}, {list})
         ]  # fmt: skip
+        # Beside readings there may be a list of stations, which has no times.
+        lists = [one for one in lists if _timed(one)] or lists
         if len(lists) == 1:
-            return lists[0]
+            return json_measures.by_station(lists[0])
         level = [member for item in level for member in item.values() if isinstance(member, dict)]
         if lists or not level:
             break
     return [whole]
+
+
+def _timed(items: Sequence[Any]) -> bool:
+    """Whether the first of the items of a list holds a stamp among its plain members."""
+    first = items[0]
+    return isinstance(first, dict) and any(
+        isinstance(value, str) and cell_kind(value) == "stamp" for value in first.values()
+    )
 
 
 def _listed(row: list[Any]) -> dict[str, str] | None:
@@ -286,8 +305,13 @@ def _fill(found: dict[str, str], name: str, value: Any, depth: int) -> None:
             path = value["path"]
             _fill(found, _SIGNAL_K.get(path, path), value["value"], depth + 1)
             return
-        for key, inner in value.items():
+        measured = json_measures.plain(value, name) if name else None
+        for key, inner in ({} if measured is None else measured).items():
+            _fill(found, key, inner, depth + 1)
+        for key, inner in (value if measured is None else {}).items():
             _fill(found, f"{name}.{key}" if name else str(key), inner, depth + 1)
+    elif isinstance(value, list) and (named := json_measures.by_name(value)) is not None:
+        _fill(found, name, named, depth + 1)
     elif isinstance(value, list):
         for number, inner in enumerate(value, start=1):
             named = len(value) == 1 or (isinstance(inner, dict) and set(inner) == {"path", "value"})

@@ -12,15 +12,15 @@ _GUST = (
     r"vindkast|széllökés|rafal[ăa]|ριπή|משב|sunek|udar"
 )
 _SPEED = (
-    r"风速|風速|풍속|скорость\s*ветра|швидкість\s*вітру|скорост\s*на\s*вятъра|prędkość\s*wiatru|rychlost\s*větru|"
-    r"rýchlosť\s*vetra|r[üu]zgar[\s_]*h[ıi]z[ıi]|kecepatan\s*angin|tuulen\s*(?:keski)?nopeus|tuule\s*kiirus|"
+    r"风速|風速|풍속|скорость\s*ветра|швидкість\s*вітру|скорост\s*на\s*вятъра|pr[ęe]dko[śs][ćc][\s_]*wiatru|rychlost[\s_]*v[ěe]tru|"
+    r"r[ýy]chlos[ťt][\s_]*vetra|r[üu]zgar[\s_]*h[ıi]z[ıi]|kecepatan\s*angin|tuulen\s*(?:keski)?nopeus|tuule\s*kiirus|"
     r"vindhastighe[dt]|vindstyrka|middelvind|medelvind|szélsebesség|vitez[aă]\s*v[aâ]ntului|hitrost\s*vetra|"
     r"brzina\s*vjetra|ταχύτητα\s*(?:του\s*)?ανέμου|מהירות\s*ה?רוח|سرعة\s*الرياح|tốc\s*độ\s*gió|vēja\s*ātrums|"
     r"vėjo\s*greitis|velocita\s*vento|velocidad\s*viento"
 )
 _DIRECTION = (
-    r"风向|風向|풍향|направление\s*ветра|напрям(?:ок)?\s*вітру|посока\s*на\s*вятъра|kierunek\s*wiatru|směr\s*větru|"
-    r"smer\s*vetra|r[üu]zgar[\s_]*y[öo]n[üu]|arah\s*angin|tuulen\s*suun\w*|tuule\s*suund|vindretning|vindriktning|"
+    r"风向|風向|풍향|направление\s*ветра|напрям(?:ок)?\s*вітру|посока\s*на\s*вятъра|kierunek[\s_]*wiatru|sm[ěe]r[\s_]*v[ěe]tru|"
+    r"smer[\s_]*vetra|r[üu]zgar[\s_]*y[öo]n[üu]|arah\s*angin|tuulen\s*suun\w*|tuule\s*suund|vindretning|vindriktning|"
     r"szélirány|direc[tț]i[ae]\s*v[aâ]ntului|smjer\s*vjetra|(?:διεύθυνση|κατεύθυνση)\s*(?:του\s*)?ανέμου|"
     r"כיוון\s*ה?רוח|اتجاه\s*الرياح|hướng\s*gió|vēja\s*virziens|vėjo\s*kryptis"
 )
@@ -35,6 +35,7 @@ _STATION = (
 _WORDS = tuple(
     (re.compile(pattern, re.IGNORECASE), word)
     for pattern, word in (
+        (r"godzina[\s_]*pomiaru", "hour"), (r"data[\s_]*pomiaru", "date"),
         (_STATION, "station"), (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
         (r"平均|평균", "mean"), (r"[\d一二三五十]+\s*(?:分[鐘钟間间]?|분)", "10 min"),
         (r"\((?:十六|16)?\s*方位[點点]?\)", ""),
@@ -48,7 +49,7 @@ _WORDS = tuple(
 
 
 _ASCII = re.compile(
-    r"angin|poryw|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|vjetra|vetra|vantului|viento|vento",
+    r"angin|poryw|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|wiatru|pomiaru|vetru|vjetra|vetra|vantului|viento|vento",
     re.IGNORECASE,
 )
 """What there is of these words in letters of ASCII."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flagdata.compass import CALM
+from flagdata.ingest.anemometer.headings import names_time
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.rows import blank_cells
 from flagdata.units import UNITS, spelled
@@ -21,7 +22,7 @@ _LEAST = 3
 _CANDIDATES = (";", "\t", ",", "|", " ")
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 _STAMP = re.compile(
-    r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,]+\d{1,2}(:\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
+    r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,_-]+\d{1,2}([:-]\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
     r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?|(?<=\d) [A-Z]{3,4})?"
     r"|(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}(?::\d{2}(?::\d{2})?)?"
 )
@@ -67,6 +68,7 @@ class Layout:
         unit_columns: of the columns, the index of the next one where that spells their unit in every row; else `None`.
         strange: what of the heading is not understood.
         short: how many columns the heading names, where rows have more and it is taken for the first of them; else 0.
+        site: index of the column that tells sites apart, once it is known.
     """
 
     delimiter: str
@@ -82,6 +84,7 @@ class Layout:
     unit_columns: tuple[int | None, ...] = ()
     strange: tuple[str, ...] = ()
     short: int = 0
+    site: int | None = None
 
     def column(self, index: int) -> list[str]:
         """Cells of a column, trimmed, without the unit behind their numbers."""
@@ -119,7 +122,7 @@ def _lay_out(
     if delimiter is None:
         return None
     table = [(number, cut(line, delimiter)) for number, line in filled]
-    width = _width([cells for _, cells in table[-tail:]])
+    width = _width([cells for _, cells in table[-tail:]], [cells for _, cells in table[:-tail]])
     typed = _typed([cells for _, cells in table[-tail:] if len(_trimmed(cells, width)) == width], width)
     if width < 2 or not typed:
         return None
@@ -141,6 +144,8 @@ def _lay_out(
     full = Counter(len(cells) for (_, cells), fit in zip(table, fits, strict=True) if fit).most_common(1)[0][0]
     names, units, at, by_name, strange = _heading(lines, start, delimiter, (width, full), interest)
     short = _short(lines, at, delimiter, width)
+    if _leaves_out_the_last(names, rows):
+        names, short = (*names[1:], ""), width - 1
     if short and _shifted(table, names, kept, short, interest):
         strange = (*strange, f"line {(at or 0) + 1} names {short} columns, but rows have {width}, and do not fit it")
         names, units, at, by_name, short = ("",) * width, ("",) * width, None, False, 0
@@ -174,6 +179,17 @@ def _short(lines: Sequence[str], at: int | None, delimiter: str, width: int) -> 
         return 0
     found = len(cut(lines[at].lstrip("\ufeff"), delimiter))
     return found if 1 < found < width - 1 else 0  # one less is a heading of R, which leaves out that of the row names
+
+
+def _leaves_out_the_last(names: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Whether a heading with one name less than the rows have cells does not name the last column, as R the first.
+
+    Its first name is that of a time, which stands in the first column of the rows and not in the second.
+    """
+    if len(names) < 2 or names[0] or not names_time(names[1]):
+        return False
+    first, second = (sum(cell_kind(row[index]) == "stamp" for row in rows) for index in (0, 1))
+    return first > 0.5 * len(rows) > second
 
 
 def _shifted(
@@ -235,7 +251,7 @@ def _unit_behind(text: str) -> str:
 
 def _suffix(cells: Sequence[str]) -> str:
     """The unit behind the numbers of a column; "" where nine of ten do not share one."""
-    known = [cell.strip() for cell in cells if cell_kind(cell) != "missing"]
+    known = [cell.strip() for cell in cells if _kind(cell) != "missing"]
     if not known or not _unit_behind(known[0]):
         return ""
     suffix, count = Counter(map(_unit_behind, known)).most_common(1)[0]
@@ -285,17 +301,27 @@ def _delimiter(lines: Sequence[str]) -> str | None:
     return best[1] if best is not None and best[0] > 0.1 else None
 
 
-def _width(table: Sequence[Sequence[str]]) -> int:
-    """The usual number of cells, less those at the end that are always empty."""
+def _width(table: Sequence[Sequence[str]], above: Sequence[Sequence[str]] = ()) -> int:
+    """The usual number of cells of a table, less those at the end that are empty in all its rows and in those above.
+
+    A sensor that fails, or a remark that nobody writes any more, leaves the last column empty from then on.
+    """
     counts = Counter(len(cells) for cells in table)
     if not counts:
         return 0
     usual = max(counts.items(), key=lambda item: (item[1], item[0]))[0]
     rows = [cells for cells in table if len(cells) == usual]
+    rows += [cells for cells in above if len(cells) == usual and _of_numbers(cells)]
     width = usual
     while width > 1 and all(not cells[width - 1].strip() for cells in rows):
         width -= 1
     return width
+
+
+def _of_numbers(cells: Sequence[str]) -> bool:
+    """Whether a line holds numbers and stamps in half of its filled cells or more, as rows do and headings do not."""
+    kinds = Counter(_kind(cell) for cell in cells)
+    return kinds["number"] + kinds["stamp"] >= max(1, kinds["text"])
 
 
 def _trimmed(cells: Sequence[str], width: int) -> list[str]:
@@ -317,7 +343,7 @@ def _typed(rows: Sequence[Sequence[str]], width: int) -> list[int]:
 
 
 def _kind(cell: str) -> CellKind:
-    """What a cell of a row seems to hold; a word for calm air is a missing number or direction."""
+    """What a cell of a row seems to hold; a word for calm air is as good as a missing number or direction."""
     return "missing" if cell.strip().lower() in CALM else cell_kind(cell)
 
 

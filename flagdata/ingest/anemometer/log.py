@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import (
-    metar_bulletins,
+    bulletins,
     platform,
     possible,
     quality,
@@ -65,8 +65,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         source, options = untimed.dated(source, options.date), replace(options, date=None)
     elif recipe is None and options.columns is None and spelled_stamps.spelled(source.head()):
         source, options = spelled_stamps.restamped(source, options.date_order), replace(options, date_order=None)
-    if recipe is None and metar_bulletins.matches(source.head()):
-        source, options = metar_bulletins.dated(source, options.date), replace(options, date=None)
+    if recipe is None and bulletins.matches(source.head()):
+        source, options = bulletins.dated(source, options.date), replace(options, date=None)
     source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()

@@ -47,16 +47,24 @@ def as_table(source: TextFile) -> TableText | None:
     return tabled(source, found, left_out=other)
 
 
-def tabled(source: TextFile, found: Sequence[Sequence[str]], *, left_out: int) -> TableText | None:
-    """Rows as `row_of` makes them as a table; `None` where there is none."""
+def tabled(
+    source: TextFile, found: Sequence[Sequence[str]], *, left_out: int, what: str = "METAR reports"
+) -> TableText | None:
+    """Rows as `row_of` makes them as a table; `None` where there is none.
+
+    Args:
+        left_out: reports that cannot be read.
+        what: the reports are.
+    """
     units = sorted({row[-1] for row in found})
     named = units[0] if len(units) == 1 else "m/s"
     rows = [list(row[:5]) if row[-1] == named else _in_si(row) for row in found]
     # The last column is filled in every row: most reports have no gust, and a table ends where its rows do.
     rows = [[when, *wind, station] for when, station, *wind in rows]
+    kind = "metar-reports" if "METAR" in what else "synop-reports"
     names = ["time [UTC]", f"wind speed [{named}]", "wind direction [deg]", f"gust [{named}]", "station"]
-    what = "METAR reports" if len(units) == 1 else f"METAR reports in {' and '.join(units)}, all put in m/s"
-    return table(source, names, rows, kind="metar-reports", what=what, left_out=left_out)
+    what = f"the wind of {what}" if len(units) == 1 else f"the wind of {what} in {' and '.join(units)}, all put in m/s"
+    return table(source, names, rows, kind=kind, what=what, left_out=left_out)
 
 
 def _in_si(row: Sequence[str]) -> list[str]:

@@ -31,7 +31,7 @@ def _near_a_thousand(layout: Layout, wind: Wind | None) -> bool:
 
 
 def _words(layout: Layout, wind: Wind | None) -> list[str]:
-    """The few words for no value in the columns of a wind."""
+    """The few words for no value in the columns of a wind; those for calm air are none (see `calm`)."""
     found: dict[str, None] = {}
     columns = wind.columns.values() if wind is not None else ()
     calm = compass.CALM if any(column.unit in compass.BY_UNIT for column in columns) else frozenset[str]()
@@ -43,7 +43,7 @@ def _words(layout: Layout, wind: Wind | None) -> list[str]:
             continue
         cells = layout.column(column.index)
         found.update(dict.fromkeys(word.lower() for word in words(cells, numbers(cells, decimal=layout.decimal))))
-    return list(found)
+    return [word for word in found if word not in compass.STILL]
 
 
 def _numbers(layout: Layout, wind: Wind | None) -> list[float]:

@@ -36,6 +36,8 @@ _SHORT = re.compile(r"(?<![A-Za-z\d])W(?:S|SPD?|DS?P)(?![A-Za-z])", re.IGNORECAS
 """How a name says the speed of the wind shortly: WS_ms_Avg, ws, WSP."""
 _MOST = 500
 """Names of quantities beyond which a column of words is something else."""
+_SITE = "site"
+"""Heading of the column of a stamp that tells sites apart."""
 _SHARE = 0.9
 _FEW = 0.3
 """Share of numbers among the values of a column that its heading calls values; the others are of other quantities."""
@@ -73,7 +75,7 @@ def as_table(source: TextFile) -> TableText | None:
     if shape is None:
         return None
     names = [shape.layout.names[index] or "time" for index in shape.time]
-    names += [] if shape.site is None else ["site"]
+    names += [] if shape.site is None else [_SITE]
     short = [0]
     return wide(source, names, _records(source, shape, short), what="values beside their names", left_out=short)
 
@@ -104,7 +106,8 @@ def wide(
         and 2 * sum(1 for row in together.values() if name in row and not set(speeds).isdisjoint(row)) < counts[name]
     ]  # fmt: skip
     if apart or held:
-        rows = list(_told_last(known, speeds, [name for name in names if name not in speeds], apart=apart))
+        others = [name for name in names if name not in speeds]
+        rows = list(_told_last(known, speeds, others, apart=apart, sites=tuple(stamps[-1:]) == (_SITE,)))
         heading = [*stamps, *(["sensor", "wind speed"] if apart else speeds)]
         heading += [name for name in names if name not in speeds]
     else:
@@ -119,21 +122,27 @@ def wide(
 
 
 def _told_last(
-    known: Sequence[Record], speeds: Sequence[str], others: Sequence[str], *, apart: bool
+    known: Sequence[Record], speeds: Sequence[str], others: Sequence[str], *, apart: bool, sites: bool
 ) -> Iterator[list[str]]:
-    """A row for each speed, with the value of each other name that stood last before it or shares its stamp."""
-    last: dict[str, str] = {}
+    """A row for each speed, with the value of each other name that stood last before it or shares its stamp.
+
+    Args:
+        apart: whether the speeds are of several sensors, one a row.
+        sites: whether the last part of a stamp is the site; values are then of the same site.
+    """
+    last: dict[tuple[str, str], str] = {}
     at_once: dict[tuple[str, ...], dict[str, str]] = {}
     for record in known:
         at_once.setdefault(record.stamp, {})[record.name] = record.value
     for record in known:
+        site = record.stamp[-1] if sites else ""
         if record.name not in speeds:
-            last[record.name] = record.value
+            last[site, record.name] = record.value
             continue
         now = at_once[record.stamp]
         own = [record.name, record.value] if apart else [record.value if name == record.name else now.get(name, "")
                                                         for name in speeds]  # fmt: skip
-        yield [*record.stamp, *own, *(now.get(name, last.get(name, "")) for name in others)]
+        yield [*record.stamp, *own, *(now.get(name, last.get((site, name), "")) for name in others)]
 
 
 def _is_speed(name: str) -> bool:
@@ -148,7 +157,8 @@ def _shape(lines: Sequence[str]) -> _Shape | None:
     if layout is None:
         return None
     width = layout.number_of_columns()
-    for column in range(width):
+    # Names come again and again: of several columns that hold them, the one with the fewest.
+    for column in sorted(range(width), key=lambda at: len(set(layout.column(at)))):
         names = {cell for cell in layout.column(column) if cell_kind(cell) == "text"}
         speed = next(filter(_is_speed, sorted(names)), None)
         if (

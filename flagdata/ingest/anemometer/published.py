@@ -5,8 +5,10 @@ NOAA NDBC, "Measurement Descriptions and Units" (UTC, m/s; 99, 999 and MM missin
 10-minute wind (m/s, -999 missing; UTC, of 10 minutes before 2000 CET); KNMI, headings of its files (0.1 m/s, hour 24
 ends the day, UT; direction 0 calm, 990 variable); Météo-France, descriptions of SYNOP (UTC, m/s, K, Pa; mq missing) and
 of hourly data (m/s; its zone is not stated); AEMET OpenData, metadata (m/s; daily directions in tens of degrees, 99
-variable, 88 none); Meteostat, "Hourly Data" (km/h); WeeWX, "Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar;
-17: m/s, °C, mbar), which wview's archive shares.
+variable, 88 none); MeteoSwiss, "Open Data: automatic weather stations", parameters, and legends of IDAweb and VQHA80
+(UTC; fkl, fk1 in m/s, fu3 in km/h, of 10 minutes (z), an hour (h) or a day (d); "-" missing); Meteostat, "Hourly Data"
+(km/h); WeeWX, "Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's archive
+shares.
 """
 
 from __future__ import annotations
@@ -89,6 +91,13 @@ def _knmi(row: Row) -> str:
     return f"{instant:%Y-%m-%dT%H:%M:%S}Z"
 
 
+def _swiss(row: Row) -> str:
+    """The instant of a row of MeteoSwiss, written as digits alone or as 01.05.2026 12:00."""
+    text = next((row[name] for _, name in _SWISS_HEADS if name in row), "").strip()
+    match = re.fullmatch(r"(\d\d)\.(\d\d)\.(\d{4}) (\d\d):(\d\d)", text)
+    return _digits("")({"": text if match is None else "".join(match.group(3, 2, 1, 4, 5))})
+
+
 def _decimal_point(cell: str) -> str:
     return re.sub(r"^(-?\d+),(\d+)$", r"\1.\2", cell.strip())
 
@@ -98,6 +107,22 @@ def _need(*names: str) -> frozenset[str]:
 
 
 _WEATHER_OF_BUOYS = {"ATMP": "air temperature [degC]", "PRES": "air pressure [hPa]", "BAR": "air pressure [hPa]"}
+_SWISS_HEADS = (
+    ("station_abbr", "reference_timestamp"),
+    ("stn", "time"),
+    ("abbr", "time"),
+    ("Station/Location", "Date"),
+)
+"""Headings of the station and of the time in tables of MeteoSwiss."""
+_SWISS = tuple(
+    (f"{speed}{span}0", f"{away}{span}0", f"{speed}{span}1", unit)
+    for speed, away, unit in (
+        ("fkl010", "dkl010", "m/s"), ("fk1tow", "dv1tow", "m/s"),
+        ("fu3010", "dkl010", "km/h"), ("fu3tow", "dv1tow", "km/h"),
+    )
+    for span in "zhd"
+)  # fmt: skip
+"""Headings of the wind's speed, its direction and its gust, and the unit of the speeds; m/s goes first."""
 _NO_BUOY = frozenset({"99", "99.0", "99.00", "999", "999.0", "999.00", "9999", "9999.0", "MM"})
 _PUBLISHED = (
     _Published(
@@ -178,6 +203,19 @@ _PUBLISHED = (
         },
         missing={"dir": frozenset({"99", "88"})}, clean=_decimal_point,
     ),
+    *(
+        _Published(
+            about="MeteoSwiss's table of stations",
+            needs=tuple(_need(station, time, speed) for station, time in _SWISS_HEADS),
+            columns={
+                **{station: "station" for station, _ in _SWISS_HEADS}, speed: f"wind speed [{unit}]",
+                away: "wind direction [deg]", gust: f"gust [{unit}]", "tre200s0": "air temperature [degC]",
+                "ure200s0": "relative humidity [%]", "prestas0": "air pressure [hPa]",
+            },
+            stamp=_swiss,
+        )
+        for speed, away, gust, unit in _SWISS
+    ),
     _Published(
         about="Meteostat's hourly data",
         needs=(_need("temp", "dwpt", "rhum", "wdir", "wspd", "pres"),),
@@ -189,8 +227,13 @@ _PUBLISHED = (
     ),
 )  # fmt: skip
 _DATES = frozenset(
-    {"#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH", "eor"}
+    {
+        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH", "eor",
+        "reference_timestamp", "time", "Date",
+    }
 )  # fmt: skip
+_NAMED = 40
+"""Columns that are named where they are left out."""
 _US_UNITS = {"1": ("mph", "degF", "inHg"), "16": ("km/h", "degC", "hPa"), "17": ("m/s", "degC", "hPa")}
 _WEEWX = _need("dateTime", "usUnits", "windSpeed")
 
@@ -222,7 +265,7 @@ def as_table(source: TextFile) -> TableText | None:
     rows = list(_rows(source, found, taken, other))
     left = [name for name in found.names if name and name not in taken and name not in _DATES]
     what = (
-        f"{kind.about}; {len(left)} of its columns are left out, among them {', '.join(left[:5])}"
+        f"{kind.about}; {len(left)} of its columns are left out, among them {', '.join(left[:_NAMED])}"
         if left
         else kind.about
     )

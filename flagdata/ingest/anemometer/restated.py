@@ -19,6 +19,7 @@ from flagdata.ingest.anemometer.source import TableText, TextFile
 KINDS = (
     "flagdata.ingest.anemometer.expedition",
     "flagdata.ingest.anemometer.metar",
+    "flagdata.ingest.anemometer.synop",
     "flagdata.ingest.anemometer.global_hourly",
     "flagdata.ingest.anemometer.published",
     "flagdata.ingest.anemometer.station_lines",
@@ -30,6 +31,7 @@ KINDS = (
     "flagdata.ingest.anemometer.quoted_commas",
     "flagdata.ingest.anemometer.wrapped",
     "flagdata.ingest.anemometer.two_in_a_cell",
+    "flagdata.ingest.anemometer.influx",
     "flagdata.ingest.anemometer.name_value",
     "flagdata.ingest.anemometer.labelled",
     "flagdata.ingest.anemometer.blocks",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flagdata.ingest.anemometer import metar_bulletins
+from flagdata.ingest.anemometer import bulletins, site_labels
 from flagdata.ingest.anemometer.delimited import drafted, guess, sites
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.restated import restate
@@ -22,7 +22,7 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
         FlagdataError: the file cannot be read as text.
     """
     options = options or WindOptions()
-    if options.wind is not None or options.recipe is not None or options.format not in (None, "delimited"):
+    if options.recipe is not None or options.format not in (None, "delimited"):
         return ()
     source = _table(Path(path), options)
     if options.format is None and options.columns is None:
@@ -33,6 +33,8 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     if proposal is None or proposal.unsure:
         return ()  # which of them is a wind is the user's to say
     labels = sites(source, proposal)
+    if options.wind is not None:
+        labels = site_labels.of_column(labels, options.wind)
     return labels if len(labels) > 1 else ()
 
 
@@ -49,6 +51,6 @@ def completed(path: Path | str, options: WindOptions) -> Guess | None:
 def _table(path: Path, options: WindOptions) -> TextFile:
     """The file as a table, where it can be restated as one; bulletins need the day that the user gives."""
     source = open_text(path, limits=options.limits, encoding=options.encoding)
-    if options.date is not None and metar_bulletins.matches(source.head()):
-        return metar_bulletins.dated(source, options.date)
+    if options.date is not None and bulletins.matches(source.head()):
+        return bulletins.dated(source, options.date)
     return restate(source)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 
 from flagdata.ingest.anemometer.angles import compass_unit
@@ -12,21 +13,29 @@ _SITES = frozenset(
     {
         "station", "site", "stid", "id", "sensor", "device", "node", "location", "logger", "mast", "turbine", "address",
         "instrument", "stn", "icao", "standort", "deveui", "serial", "name", "anemometer", "unit", "plot", "city",
+        "wea", "wka", "anlage", "aerogenerador", "eolienne", "éolienne",
         "town", "place", "stadt", "ort", "messstelle", "messstation", "wetterstation", "stationsname", "ville", "lieu",
         "poste", "ciudad", "lugar", "estacion", "estación", "cidade", "estacao", "estação", "stazione", "citta",
         "città", "località", "stad", "plaats", "weerstation", "stasjon", "stacja", "miasto", "buoy", "boya", "wtg",
-        "turb",
+        "turb", "mac", "imei", "eui", "uuid", "gerät", "geraet", "gerat", "knoten", "dispositivo", "nodo", "appareil",
+        "capteur", "dispositif", "noeud", "nœud", "apparaat", "enhet", "enhed", "urządzenie", "czujnik", "aparelho",
+        "strumento", "beacon", "mote", "probe",
     }
 )  # fmt: skip
 _STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})
-"""Words of a heading whose cells, where they are words, are places, though each has one row."""
+"""Words of a heading whose cells, where they are words or long numbers, are places, though each has one row."""
+_DIGITS = 5
+"""Digits of the numbers by which the WMO and others call stations."""
 _MOST = 1000
 """Sites beyond which a column of words is something else."""
 _FEWEST, _SHARE = 3, 0.6
 """Rows of a site, and the share of the sites that a stamp holds, by which words alone tell sites apart."""
 _AT_ONCE = 3
 """Rows of one stamp, all of other words, from which on they are sites though each has that row alone."""
-_NUMBERED = frozenset({"code", "number", "no", "nr", "num"})
+_ADDRESS = re.compile(r"(?:[0-9a-f]{2}[:-]){5,7}[0-9a-f]{2}|(?=.*[a-f])(?:[0-9a-f]{12}|[0-9a-f]{16})", re.IGNORECASE)
+"""Addresses of network cards and radio nodes (EUI-48, EUI-64), which are sites whatever their column is called."""
+_RELAYS = frozenset({"gateway", "gateways", "gw", "gtw", "rx", "receiver", "router", "bridge", "bssid"})
+_NUMBERED = frozenset({"code", "number", "no", "nr", "num", "dev", "end"})
 """Words beside which a heading is still that of a site."""
 
 
@@ -36,22 +45,31 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
     Its heading is that of a site; or the rows of different sites share their stamps.
     """
     shared = len(set(stamps)) < len(stamps)
+    apart_by: list[tuple[int, tuple[str, ...]]] = []
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
-        if index in time or not words & _SITES or understand(name).quantity:
-            continue
         cells = layout.column(index)
         kinds = sorted({cell for cell in cells if cell})
+        addresses = _addresses(words, kinds)
+        if index in time or not (words & _SITES or addresses) or understand(name).quantity:
+            continue
         if not 2 <= len(kinds) <= _MOST:
             continue
-        if words & _STATIONS and words <= _STATIONS | _NUMBERED and all(cell_kind(kind) == "text" for kind in kinds):
+        if words & _STATIONS and words <= _STATIONS | _NUMBERED and all(_is_place(kind) for kind in kinds):
             return index, tuple(kinds)
-        if words <= _SITES | _NUMBERED and len(cells) >= 3 * len(kinds):
+        if (words <= _SITES | _NUMBERED or addresses) and len(cells) >= 3 * len(kinds):
             return index, tuple(kinds)
         apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
         if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
-            return index, tuple(kinds)
+            apart_by.append((index, tuple(kinds)))
+    if apart_by:  # a number that each row has for itself tells rows apart, too, but no sites
+        return min(apart_by, key=lambda column: len(column[1]))
     return _in_every_stamp(layout, time, stamps) if shared else None
+
+
+def _is_place(cell: str) -> bool:
+    """Whether a cell is a word, or a number as stations are called by."""
+    return cell_kind(cell) == "text" or (cell.isdigit() and len(cell) >= _DIGITS)
 
 
 def _in_every_stamp(layout: Layout, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
@@ -76,6 +94,11 @@ def _in_every_stamp(layout: Layout, time: Sequence[int], stamps: Sequence[str]) 
     return None
 
 
+def _addresses(words: Collection[str], kinds: Collection[str]) -> bool:
+    """Whether a column holds addresses of devices, and not of what passed their messages on."""
+    return bool(kinds) and _RELAYS.isdisjoint(words) and all(_ADDRESS.fullmatch(kind) for kind in kinds)
+
+
 def site_of_all(layout: Layout, *, apart: Collection[int]) -> tuple[int, str] | None:
     """The column with a site's heading and the one site that the first rows hold; `None` where there is none.
 
@@ -84,9 +107,10 @@ def site_of_all(layout: Layout, *, apart: Collection[int]) -> tuple[int, str] | 
     """
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
-        if index in apart or not words & _SITES or not words <= _SITES | _NUMBERED or understand(name).quantity:
-            continue
         kinds = set(layout.column(index))
+        named = words & _SITES and words <= _SITES | _NUMBERED
+        if index in apart or not (named or _addresses(words, kinds)) or understand(name).quantity:
+            continue
         if len(kinds) == 1 and (site := next(iter(kinds))):
             return index, site
     return None

@@ -7,17 +7,20 @@ import re
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.ingest.anemometer import excel, metar_bulletins, spelled_stamps, untimed
+from flagdata.ingest.anemometer import bulletins, excel, spelled_stamps, untimed
+from flagdata.ingest.anemometer.delimited import drafted
+from flagdata.ingest.anemometer.delimited import guess as drafted_guess
 from flagdata.ingest.anemometer.draft import skeleton
 from flagdata.ingest.anemometer.formats import FORMATS, Format
 from flagdata.ingest.anemometer.layout import cell_kind
-from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer.options import Limits, WindOptions
 from flagdata.ingest.anemometer.restated import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
+_SYNOP = re.compile(r"\b(?:AAXX|BBXX|OOXX)\s")
 _MESHES = {".obj", ".ply", ".stl", ".off"}
 
 
@@ -48,9 +51,9 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         if untimed.clocked(opened):
             day = untimed.year_alone(opened) or "01-01"
             return recognise(untimed.dated(opened, dt.date.fromisoformat(f"2000-{day}")))
-        if metar_bulletins.matches(opened.head()):
-            day = dt.date.fromisoformat(f"2000-01-{metar_bulletins.first_day(opened)}")
-            return recognise(metar_bulletins.dated(opened, day))
+        if bulletins.matches(opened.head()):
+            day = dt.date.fromisoformat(f"2000-01-{bulletins.first_day(opened)}")
+            return recognise(bulletins.dated(opened, day))
         if spelled_stamps.spelled(opened.head()):
             return recognise(spelled_stamps.provisional(opened))
         source = restate(opened)
@@ -74,6 +77,10 @@ def unknown(source: TextFile) -> Guess:
         text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"
         fix = "decode them to a table with one row a report: its time, speed and direction, each with its unit"
         return Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix)
+    if any(_SYNOP.search(line) for line in source.head()):
+        text = "SYNOP reports (WMO-No. 306), of ships, or of land stations without a day, a wind or its unit (iw)"
+        fix = "decode them to a table with one row a report: its time, station, speed and direction, each with its unit"
+        return Guess(format="SYNOP", score=0.0, reasons=(text,), kind="other", fix=fix)
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
         what, offered, recipe = table
@@ -100,11 +107,19 @@ def recognise(source: TextFile) -> tuple[Guess, ...]:
     for name in FORMATS:
         reader: Format = FORMATS[name]()
         guess = reader.recognise(head)
+        if guess is not None and guess.draft is not None and len(head.lines) == HEAD_LINES:
+            guess = _drafted_of_all(source) or guess
         if guess is not None:
             found.append(guess)
     known = any(guess.score >= SURE and not guess.draft for guess in found)
     told = [guess for guess in found if not (known and guess.doubts)]
     return tuple(sorted(told, key=lambda guess: -guess.score))
+
+
+def _drafted_of_all(source: TextFile) -> Guess | None:
+    """The guess at a table by its first lines, and by later rows that show more of its sites and columns."""
+    proposal = drafted(source, WindOptions())
+    return None if proposal is None else drafted_guess(proposal)
 
 
 def _folder(path: Path) -> Guess:

@@ -41,11 +41,13 @@ BURST = 4.0
 _REGULAR = 0.7
 """Share of the stamps that must follow a period for the rows to come at one."""
 ENOUGH = 10
+_EVEN = 0.9
+"""Share of the stamps whose rows must fit a period for the rows to have come evenly."""
 
 
 _APART = (
-    "log a stamp with every row; if the rows of one stamp are of several stations, say which column tells them apart: "
-    '--columns "time,site,wind_speed[m/s]"'
+    "log a stamp with every row; if the rows of one stamp are of several stations, name the column that tells them "
+    "apart as site in --columns"
 )
 
 
@@ -219,12 +221,16 @@ def _held(reading: Reading, runs: _Runs, *, period: float, burst: bool, continui
     what = f"one every {step:.4g} s ({1 / step:.4g} Hz)"
     spread = max(float(np.abs(counts - np.median(counts)).max()) * step, step)
     sure = f"each time is sure to about {spread:.3g} s beside the delay of the clock itself"
+    even = _even(runs, period)
+    if not even:
+        sure = f"their number a stamp does not follow the time to the next, so each time is unsure by up to {every:g} s"
     if continuity is None:
-        why = f"the readings do not tell whether rows came evenly or in bursts; if evenly, {sure}"
+        why = f"the readings do not tell whether rows came evenly or in bursts; {'if evenly, ' if even else ''}{sure}"
     elif continuity <= BURST:
+        came = "came evenly and" if even else "came in no bursts, but"
         why = (
             f"the readings run on across the stamps ({continuity:.3g} times the mean square difference within), so "
-            f"rows came evenly and {sure}"
+            f"rows {came} {sure}"
         )
     else:
         why = (
@@ -238,6 +244,13 @@ def _held(reading: Reading, runs: _Runs, *, period: float, burst: bool, continui
         f"the rows are spread {f'within {reading.step / NANOSECONDS:g} s, ' if burst else 'evenly, '}{what}; {why}",
         fix=None if continuity is not None and continuity <= BURST else _APART,
     )  # fmt: skip
+
+
+def _even(runs: _Runs, period: float) -> bool:
+    """Whether nearly every stamp stands for as many rows as a period [ns] puts between it and the next, but for one."""
+    room, rows = runs.room.astype(np.float64), runs.rows[:-1]
+    inner = slice(1, None) if len(room) > 2 else slice(None)  # the log may begin within a stamp
+    return bool((np.abs(room - rows * period) <= period)[inner].mean() >= _EVEN) if len(room) else True
 
 
 def _continuity(reading: Reading, again: NDArray[np.bool_]) -> float | None:

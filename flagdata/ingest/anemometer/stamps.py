@@ -41,7 +41,7 @@ _GROUPS: dict[str, str] = {
     "Q": r"(?P<Q>\d{1,2}(?:\.\d{1,9})?)", "J": r"(?P<J>\d{1,3}(?:\.\d{1,9})?)",
     "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
     "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
-    "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]\d{{2}}(?::?\d{{2}})?)?",
+    "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?",
     "Z": r"\s*(?:[A-Z]{3,4})?",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -65,7 +65,7 @@ _SUBSECONDS = {"L": 1_000_000, "U": 1_000, "N": 1}
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
     r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?"
-    rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]\d{{2}}(?::?\d{{2}})?)?$"
+    rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?$"
 )
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""

@@ -36,7 +36,7 @@ from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
 _WHERE = "--columns"
-_TOWARDS = "wind_direction_to"
+TOWARDS = "wind_direction_to"
 _PARTS = {
     "year": "%Y", "month": "%m", "day": "%d", "day_of_year": "%j", "hour": "%H", "minute": "%M", "second": "%S%f",
 }  # fmt: skip
@@ -100,8 +100,8 @@ def parse(text: str) -> tuple[Entry, ...]:
         if "?" in (match["column"], match["name"], match["detail"]):
             fix = "write there what it is, or leave the entry blank where the column is not needed"
             raise UsageError(f"{part.strip()!r} still has a question mark, entry {number}", where=_WHERE, fix=fix)
-        if match["name"] not in (*_NAMES, *_FREE, *_PARTS, _SITE, _TOWARDS):
-            known = [*_FREE, *_PARTS, _SITE, _TOWARDS, *_NAMES]
+        if match["name"] not in (*_NAMES, *_FREE, *_PARTS, _SITE, TOWARDS):
+            known = [*_FREE, *_PARTS, _SITE, TOWARDS, *_NAMES]
             raise UnknownNameError.of("name of a column", match["name"], known, where=_WHERE)
         column = match["column"].strip() if by_name else number - 1
         entries.append(Entry(column=column, name=match["name"], detail=(match["detail"] or "").strip()))
@@ -111,7 +111,7 @@ def parse(text: str) -> tuple[Entry, ...]:
         raise UsageError(
             f"{twice} stands twice", where=_WHERE, fix="name one of them, and ingest the other in a second run"
         )
-    if not any(entry.name in CHANNELS or entry.name == _TOWARDS for entry in entries):
+    if not any(entry.name in CHANNELS or entry.name == TOWARDS for entry in entries):
         raise UsageError("no column is measured", where=_WHERE, fix="name the wind's column: wind_speed[m/s]")
     return tuple(entries)
 
@@ -145,10 +145,10 @@ def stated(layout: Layout, text: str, *, unit: str | None, order: Order | None, 
         raise UsageError("a column stands twice", where=_WHERE, fix="say once what it is")
     site = next((index for index, entry in entries if entry.name == _SITE), None)
     time = _time(layout, [(i, e) for i, e in entries if e.name in (*_FREE, *_PARTS)], order, where)
-    measured = [(index, entry) for index, entry in entries if entry.name in CHANNELS or entry.name == _TOWARDS]
+    measured = [(index, entry) for index, entry in entries if entry.name in CHANNELS or entry.name == TOWARDS]
     channels: dict[str, Column] = {}
     for index, entry in measured:
-        towards = entry.name == _TOWARDS
+        towards = entry.name == TOWARDS
         channel = "wind_direction" if towards else entry.name
         if channel in channels:
             raise UsageError(f"{channel} stands twice", where=_WHERE, fix="name one of the two")
@@ -290,6 +290,15 @@ def shown(layout: Layout) -> str:
     return "; ".join(f"{number}: {cell}" for number, cell in enumerate(cells, start=1) if cell)[:600]
 
 
+def with_site(text: str, index: int) -> str:
+    """A line of columns that says beside that the column at `index` tells sites apart."""
+    if "=" in re.sub(r"\[[^\]]*\]", "", text):
+        return f"{text},{index + 1}={_SITE}"
+    parts = re.split(r",(?![^\[]*\])", text)
+    parts += [""] * (index + 1 - len(parts))
+    return ",".join([*parts[:index], _SITE, *parts[index + 1 :]])
+
+
 def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str:
     """The option with which the user says what the columns are, as far as they are known; "?" where they are not."""
     width = layout.number_of_columns()
@@ -348,7 +357,7 @@ def read_also(
         unit_name: of the direction; `None` takes the one its values are likely in.
         channel: that the direction is.
     """
-    entries = _understood(time, (wind,)) | {direction: f"{channel}[{unit_name or unit_of(layout, direction)}]"}
+    entries = _understood(layout, time, (wind,)) | {direction: f"{channel}[{unit_name or unit_of(layout, direction)}]"}
     return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
 
 
@@ -360,8 +369,7 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> st
         name: column for name, column in wind.columns.items()
         if not name.startswith(("apparent", "theoretical")) and name not in ("wind_speed", *COMPONENTS)
     }  # fmt: skip
-    entries = _understood(time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
-    entries |= {} if wind.site is None else {wind.site[0]: _SITE}
+    entries = _understood(layout, time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
     return ",".join(f"{at + 1}={entry}" for at, entry in sorted(entries.items()))
 
 
@@ -376,9 +384,9 @@ def calibrated(layout: Layout, time: TimeChoice | None, column: int) -> str:
     )
 
 
-def _understood(time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
-    """Entries of the columns of the time and of the first wind, by their index."""
-    found: dict[int, str] = {}
+def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of the columns of the site, of the time and of the first wind, by their index."""
+    found: dict[int, str] = {} if layout.site is None else {layout.site: _SITE}
     if time is not None:
         forms = (time.form or "").split(" ")
         parts = {form: name for name, form in _PARTS.items()}
@@ -391,14 +399,14 @@ def _understood(time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str
             found |= dict(zip(time.columns, ("date", *["time"] * len(time.columns)), strict=False))
     for wind in winds[:1]:
         for channel, column in wind.columns.items():
-            name = _TOWARDS if column.towards else channel
+            name = TOWARDS if column.towards else channel
             found.setdefault(column.index, f"{name}[{column.unit or '?'}]")
     return found
 
 
 def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
     """Entries of columns by their index."""
-    found = _understood(time, winds)
+    found = _understood(layout, time, winds)
     timed = time is not None
     steady = None if timed else _steady(layout)
     if steady is not None:
@@ -414,6 +422,9 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
                 continue
+            if heading.channel in COMPONENTS and _alone(layout, at):
+                found[at] = "?"  # v_wind may be a speed (v, velocity), or the component towards the north
+                continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
             if guessed is None and CHANNELS[heading.channel].unit == "rad" and _in_doubt(layout, at):
                 guessed = "?"
@@ -427,6 +438,12 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         ):
             found[at] = "?"
     return found
+
+
+def _alone(layout: Layout, index: int) -> bool:
+    """Whether no other column is a component of the wind."""
+    names = (pair for at, pair in enumerate(zip(layout.names, layout.units, strict=True)) if at != index)
+    return not any(understand(name, stated).channel in COMPONENTS for name, stated in names)
 
 
 def _in_doubt(layout: Layout, index: int) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import codes, possible, unitcheck, zones
+from flagdata.ingest.anemometer import calm, codes, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.growing import Growing
@@ -27,6 +27,7 @@ from flagdata.units import unit
 
 DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 """Channels whose unit is held against their values."""
+_DIRECTIONS = frozenset(name for name in CHANNELS if name.endswith(("wind_direction", "wind_direction_magnetic")))
 
 
 class Rows(Protocol):
@@ -61,6 +62,8 @@ class _Column:
     index: int
     suffix: str = ""
     points: Mapping[str, float] | None = None
+    calm: Collection[str] = ()
+    absent: Sequence[str] = ()
     values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
@@ -138,7 +141,8 @@ class _Gathered:
             cells = cells_of(block, column.index)
             cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
             parsed = numbers(
-                cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix
+                cells, decimal=recipe.file.decimal, missing=(*recipe.file.missing, *column.absent),
+                suffix=column.suffix, zeros=column.calm,
             )  # fmt: skip
             column.values.add(parsed.value[keep])
             column.states.add(parsed.state[keep])
@@ -200,9 +204,7 @@ def read_table(
         clock=RowClock(form=recipe.time.format, columns=own) if own or host is None else host,
         host=host if own else None,
         channels={
-            name: _Column(
-                index=i, suffix=recipe.channels[name].suffix, points=compass.BY_UNIT.get(recipe.channels[name].unit)
-            )
+            name: _channel_column(name, i, recipe.channels[name])
             for name, i in _channel_columns(recipe, rows, where).items()
         },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
@@ -212,7 +214,7 @@ def read_table(
     for line, block in rows.blocks(gathered.width()):
         gathered.add(line, block, recipe)
     pa.default_memory_pool().release_unused()  # the text of the last blocks
-    findings = [*rows.findings(), *_stamp_findings(gathered, rows, where)]
+    findings = [*rows.findings(), *_stamp_findings(gathered, rows, recipe, where)]
     given = given or Given()
     order, found = gathered.clock.order(gathered.line(), given.clock)
     line = gathered.line()[order]
@@ -231,11 +233,17 @@ def read_table(
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
     channels: dict[str, NDArray[np.float64]] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
+    states = {name: column.state(order) for name, column in gathered.channels.items()}
+    still = calm.rows(states)
     for name, column in gathered.channels.items():
-        layout, state = recipe.channels[name], column.state(order)
+        layout, state = recipe.channels[name], states.pop(name)
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         cells = column.value(order)  # NaN where a cell is no number
+        if name in DOUBTED and name in still:
+            findings.append(calm.report(name, still[name], line))
+        elif name in still:
+            state, cells = np.where(still[name], np.uint8(Cell.CALM), state), np.where(still[name], np.nan, cells)
         away = CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from")
         if name in DOUBTED or (away and layout.unit in ("deg", "10 deg")):
             coded = codes.within_a_turn(cells) if away else codes.speeds(cells)
@@ -267,7 +275,7 @@ def read_table(
     return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
 
 
-def _stamp_findings(gathered: _Gathered, rows: Rows, where: str) -> tuple[Finding, ...]:
+def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str) -> tuple[Finding, ...]:
     """Rows left out for their stamps.
 
     Raises:
@@ -277,6 +285,11 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, where: str) -> tuple[Findin
     count = len(gathered.line())
     years = f"outside the accepted years, {YEARS[0]} to {YEARS[1]}"
     far = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
+    if count == 0 and not bad and recipe.rows is not None:
+        raise InputError(
+            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which tells sites apart", where=where,
+            fix="name a site as the file writes it, or the wind's column by its heading; ingest --sniff lists them",
+        )  # fmt: skip
     if count == 0:
         raise InputError(
             f"no row with a readable time stamp{far}",
@@ -308,6 +321,13 @@ def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
             continue
         found[name] = _index(layout.column, rows, where)
     return found
+
+
+def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
+    return _Column(
+        index=index, suffix=layout.suffix, points=compass.BY_UNIT.get(layout.unit),
+        calm=compass.STILL if name in DOUBTED else (), absent=tuple(compass.STILL) if name in _DIRECTIONS else (),
+    )  # fmt: skip
 
 
 def _index(column: str | int, rows: Rows, where: str) -> int:

@@ -32,6 +32,8 @@ _CLOCK = re.compile(
 )
 _HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
 """Before or after noon, in a column of its own."""
+_ZONED = rf"(?:Z|UTC|GMT|{'|'.join(ABBREVIATED)}|(?:0:00|:00[.,]0+|[T ]0{{4,6}}|[APap][Mm]) ?[+-]00(?::?00)?)$"
+"""How stamps end that state their zone, their digits as 0: an offset stands behind minutes, not behind an hour."""
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
@@ -191,7 +193,7 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         if fits(found):
             return time_choice(layout, columns, form, found, 2.0)
     shape = next(re.sub(r"\d", "0", text.strip()) for text in texts if text.strip())
-    zoned = "%z" if re.search(rf"(Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-]00(:?00)?)$", shape) and len(shape) > 12 else ""
+    zoned = "%z" if re.search(_ZONED, shape) and len(shape) > 12 else ""
     if not zoned and len(shape) > 12 and re.search(r"\d ?[A-Z]{3,4}$", shape) and not re.search(r"[AP]M$", shape):
         zoned = "%Z"  # letters that mean several zones, as CST, IST and BST do
     shape = re.sub(rf" ?(?:{'|'.join(ABBREVIATED)})$", "", shape) if zoned else shape
@@ -264,7 +266,7 @@ def _days(
 
 def _gaps(shape: str) -> tuple[str, ...]:
     """What may stand between date and time."""
-    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;-])0", shape)
+    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;-]+)0", shape)
     return (found[1],) if found else (" ",)
 
 

@@ -13,7 +13,7 @@ import io
 import re
 from collections.abc import Sequence
 
-from flagdata.compass import POINTS
+from flagdata.compass import CALM, POINTS, STILL
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.headings import interest, understand, words_of
 from flagdata.ingest.anemometer.layout import Layout, cut, lay_out
@@ -89,7 +89,7 @@ def _column(lines: Sequence[str]) -> tuple[Layout, int, str, bool, bool] | None:
         words = set(words_of(name))
         quantities = _quantities(name)
         named = bool(words & _NAMES or ({"dir"} <= words and words & {"spd", "speed"}) or len(quantities) == 2)
-        cells = [cell for cell in layout.column(column) if cell]
+        cells = [cell for cell in layout.column(column) if cell and cell.lower() not in CALM]
         if not named and not _surely_both(layout, cells):
             continue
         speed_first = _speed_first(quantities, cells)
@@ -141,7 +141,9 @@ def _surely_both(layout: Layout, cells: Sequence[str]) -> bool:
 
 
 def _both(cell: str, *, speed_first: bool) -> tuple[str, str, str] | None:
-    """Direction, speed and unit of a cell; `None` where it holds something else."""
+    """Direction, speed and unit of a cell; `None` where it holds something else. Calm air has no direction."""
+    if cell.strip().lower() in STILL:
+        return "", cell.strip(), ""
     pair = _PAIR.fullmatch(cell.strip()) if speed_first else None
     if pair is not None:
         return pair[2].replace(",", "."), pair[1].replace(",", "."), ""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flagdata.ingest.anemometer import stated_columns
-from flagdata.ingest.anemometer.angles import may_be_direction
+from flagdata.ingest.anemometer.angles import compass_unit, may_be_direction, may_be_two
 from flagdata.ingest.anemometer.cells import numbers
 from flagdata.ingest.anemometer.directions import judge
-from flagdata.ingest.anemometer.headings import understand, words_of
+from flagdata.ingest.anemometer.headings import COURSES, understand, words_of
 from flagdata.ingest.anemometer.instruments import COMPONENTS, Wind
 from flagdata.ingest.anemometer.layout import Layout
 from flagdata.ingest.anemometer.timechoice import TimeChoice
@@ -72,6 +72,30 @@ def directions(
     return tuple(found)
 
 
+def otherwise(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str, ...]:
+    """A remark with the line that reads the direction of a wind in the other way that its heading or values leave open.
+
+    It may be in another unit, or where the wind blows to.
+    """
+    column = wind.columns.get("wind_direction")
+    if time is None or column is None or column.towards:
+        return ()
+    name = layout.names[column.index]
+    heading = understand(name, layout.units[column.index])
+    value = numbers(layout.column(column.index), decimal=layout.decimal).value
+    judged = judge(heading, value, "wind_direction")
+    if not judged.doubt:
+        return ()
+    if judged.may_be and judged.may_be[0] != column.unit:
+        line = stated_columns.read_also(layout, time, wind, column.index, unit_name=judged.may_be[0])
+        return (f'to read column {name!r} in {judged.may_be[0]}: --columns "{line}"',)
+    if set(words_of(name)) & COURSES:
+        to = stated_columns.TOWARDS
+        line = stated_columns.read_also(layout, time, wind, column.index, unit_name=column.unit, channel=to)
+        return (f'to read column {name!r} as where the wind blows to: --columns "{line}"',)
+    return ()
+
+
 def relative(layout: Layout, winds: Sequence[Wind]) -> tuple[str, ...]:
     """A remark for each direction from a platform's bow that is left out beside one from north."""
     taken = {column.index for wind in winds for column in wind.columns.values()}
@@ -88,5 +112,7 @@ def _may_be(layout: Layout, index: int) -> tuple[str, ...]:
     heading = understand(layout.names[index], layout.units[index])
     if heading.channel != "wind_direction":
         return ()
+    if compass_unit(layout, index) is None and may_be_two(layout, index):
+        return "points-de", "points-es"
     judged = judge(heading, numbers(layout.column(index), decimal=layout.decimal).value, heading.channel)
     return judged.may_be if judged.left_out else ()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from flagdata.ingest.anemometer.coverage_json import columns
+from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.ingest.anemometer.coverage_json import places
+from flagdata.ingest.anemometer.places import rows
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -47,18 +50,56 @@ def test_a_parameter_whose_key_says_nothing_goes_by_its_label(read: Read) -> Non
     assert series.channels["wind_speed"][0] == 14.4
 
 
+def _columns(item: dict[str, Any]) -> list[str]:
+    return list(rows(places(item))[0])
+
+
 def test_a_collection_of_one_coverage_is_that_coverage() -> None:
     one = _coverage({"symbol": "m/s"})
     shared = {"type": "CoverageCollection", "parameters": one.pop("parameters"), "coverages": [one]}
-    found = columns(shared)
-    assert found is not None
-    assert found[0] == ["time", "wd [deg]", "wind_speed [m/s]"]
-    assert columns(shared | {"coverages": [one, one]}) is None
+    assert _columns(shared) == ["time", "wd [deg]", "wind_speed [m/s]"]
 
 
 def test_a_range_over_another_axis_is_no_column() -> None:
     item = _coverage({"symbol": "m/s"})
     item["ranges"]["wd"] = _range(AWAY, along="z")
-    found = columns(item)
-    assert found is not None
-    assert found[0] == ["time", "wind_speed [m/s]"]
+    assert _columns(item) == ["time", "wind_speed [m/s]"]
+
+
+def test_places_of_a_collection_are_sites(log_file: Callable[..., Path]) -> None:
+    one, other = _coverage({"symbol": "m/s"}), _coverage({"symbol": "m/s"})
+    other["domain"]["axes"]["x"] = {"values": [6.5]}
+    other["ranges"]["wind_speed"] = _range([1.0, 2.0, 3.0, 4.0])
+    path = log_file(json.dumps({"type": "CoverageCollection", "coverages": [one, other]}))
+    assert anemometers(path) == ("x 5.0", "x 6.5")
+    series = read_log(path, WindOptions(wind="x 6.5")).series
+    assert series.channels["wind_speed"].tolist() == [1, 2, 3, 4]
+    named = path.with_name("named.json")
+    one["eumetnet:locationId"], other["eumetnet:locationId"] = "0-20000-0-06999", "0-20000-0-06998"
+    named.write_text(json.dumps({"type": "CoverageCollection", "coverages": [one, other]}))
+    assert anemometers(named) == ("0-20000-0-06998", "0-20000-0-06999")
+
+
+def test_coverages_of_one_place_are_put_together() -> None:
+    one, other = _coverage({"symbol": "m/s"}), _coverage({"symbol": "m/s"})
+    del one["ranges"]["wd"], other["ranges"]["wind_speed"]
+    one["id"], other["id"] = "speed", "direction"
+    found = rows(places({"type": "CoverageCollection", "coverages": [one, other]}))
+    assert list(found[0]) == ["time", "wind_speed [m/s]", "wd [deg]"]
+    assert [row["wd [deg]"] for row in found] == AWAY
+
+
+def test_the_same_columns_once_more_are_a_place_of_their_own() -> None:
+    found = rows(places({"type": "CoverageCollection", "coverages": [_coverage({"symbol": "m/s"})] * 2}))
+    assert len(found) == 8
+    assert len({row["station"] for row in found}) == 2
+
+
+def test_tuples_of_a_composite_axis_are_places() -> None:
+    item = _coverage({"symbol": "m/s"})
+    composite = {"dataType": "tuple", "coordinates": ["x", "y"], "values": [[5, 52], [6, 52]]}
+    item["domain"]["axes"] = {"t": {"values": ["2026-05-01T12:00:00Z", "2026-05-01T12:10:00Z"]}, "composite": composite}
+    both = {"type": "NdArray", "axisNames": ["composite", "t"], "shape": [2, 2], "values": [1.0, 2.0, 3.0, 4.0]}
+    item["ranges"] = {"wind_speed": both}
+    found = [(row["station"], row["wind_speed [m/s]"]) for row in rows(places(item))]
+    assert found == [("x 5", 1.0), ("x 5", 2.0), ("x 6", 3.0), ("x 6", 4.0)]

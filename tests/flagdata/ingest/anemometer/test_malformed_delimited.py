@@ -96,7 +96,7 @@ REFUSED = [
     pytest.param(
         {"content": csv(ROW, "x,1", "y,2", "z,3"), "error": InputError, "says": "3 of 4"}, id="most-stamps-bad"
     ),
-    pytest.param({"content": stamped("a", "b", "c", "3"), "error": InputError, "says": "3 of 4"}, id="most-values-bad"),
+    pytest.param({"content": stamped("a", "b", "d", "3"), "error": InputError, "says": "3 of 4"}, id="most-values-bad"),
     pytest.param(
         {"content": stamped("", "NaN", "---", "n/a"), "error": InputError, "says": "not one value"},
         id="all-values-missing",

@@ -75,7 +75,7 @@ def test_states_that_are_words_are_no_values(log_file: Write) -> None:
 
 
 def test_a_table_with_a_speed_of_its_own_is_no_list_of_names(log_file: Write) -> None:
-    rows = "".join(f"{_stamp(at)},wind sensor {at % 2},{_SPEEDS[at]}\n" for at in range(20))
+    rows = "".join(f"{_stamp(at)},wind sensor {at // 10},{_SPEEDS[at]}\n" for at in range(20))
     log = read_log(log_file(f"time,remark,wind speed (m/s)\n{rows}"))
     np.testing.assert_allclose(log.series.channels["wind_speed"], _SPEEDS)
 

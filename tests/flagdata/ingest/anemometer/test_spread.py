@@ -51,6 +51,15 @@ def test_rows_of_a_held_stamp_come_at_the_sensors_own_rate(rate: int, hold: int,
     assert gaps(log) == ()
 
 
+def test_rows_whose_number_does_not_follow_the_stamps_did_not_come_evenly() -> None:
+    counts = np.tile([2, 9, 4, 14, 6, 20, 3, 11], 5)
+    log = ordered(np.repeat(np.arange(40) * 60, counts) * S, smooth(int(counts.sum())), step=S)
+    (finding,) = [found for found in log.findings if found.kind == "held-stamps"]
+    assert "came evenly" not in finding.what
+    assert "came in no bursts" in finding.what
+    assert "unsure by up to 60 s" in finding.what
+
+
 def test_rows_lost_between_held_stamps_are_a_gap_of_their_length() -> None:
     row = np.arange(2400)
     log = ordered((row // 60 * 60 + 600 * (row >= 1200)) * S, smooth(2400), step=S)

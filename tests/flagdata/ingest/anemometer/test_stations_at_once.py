@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import NothingMeasuredError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
 from flagdata.ingest.anemometer.headings import understand
 
@@ -45,8 +44,9 @@ def test_a_station_in_calm_air_says_so_in_both_columns_and_is_not_lost(log_file:
     rows = [*rows, "2026-05-01 12:00,戊山,無風,無風"]
     path = log_file("日期時間,測站,風向（方位點）,風速（公里/小時）\n" + "\n".join(rows) + "\n")
     assert "戊山" in anemometers(path, WindOptions(zone="UTC"))
-    with pytest.raises(NothingMeasuredError):
-        read_log(path, WindOptions(zone="UTC", wind="戊山"))
+    log = read_log(path, WindOptions(zone="UTC", wind="戊山"))
+    assert log.series.channels["wind_speed"].tolist() == [0.0]
+    assert np.isnan(log.series.channels["wind_direction"]).all()
 
 
 def test_rows_of_one_stamp_that_nothing_tells_apart_are_doubted_with_a_way_to_part_them(log_file: Write) -> None:

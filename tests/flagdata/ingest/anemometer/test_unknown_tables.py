@@ -170,3 +170,11 @@ def test_a_platform_that_moves_is_told_beside_a_wind_that_does_not_say_whose(rea
 
 def test_a_speed_that_nothing_calls_the_winds_is_told(read: Read) -> None:
     assert "does not say that the speed is the wind's" in warned(read(table("speed (km/h),rpm", ["15,900", "18,950"])))
+
+
+def test_tabs_divide_cells_with_decimal_commas_behind_a_stamp_too(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z\t{3 + at},5\t{200 + at}\n" for at in range(9))
+    log = read(rows, columns="time,wind_speed[m/s],wind_direction[deg]")
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([3.5, 4.5])
+    log = read("".join(row.rpartition("\t")[0] + "\n" for row in rows.splitlines()), columns="time,wind_speed[m/s]")
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([3.5, 4.5])
