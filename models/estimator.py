@@ -28,7 +28,7 @@ from models.targets import Cloth, Target
 
 SHIPPED = Path(__file__).parent / "shipped"
 """Models that come with the package, a folder each."""
-DEFAULT = "wave"
+DEFAULT = "flow"
 DRAWS = 400
 CLOUD = "cloud.safetensors"
 

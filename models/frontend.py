@@ -6,13 +6,14 @@ pooling by two, the spectral decomposition layer. All but the pooling is linear,
 banded matrices (`models.filters`) and the spectrum is one product with a matrix of (mean removal, Hann window, discrete
 Fourier transform). `models.spectral.periodogram` is the definition that tests hold this to.
 
-From the same spectra come two kinds of maps:
+From the same spectra come two kinds of maps, and a third of the clip's optical flow:
 
 - *spectral maps* (4, H/2, W/2), what the paper's network takes: the largest power of each derivative, then its
   frequency;
 - *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.wave` takes: two peaks, power by band, the spectrum's centre and
   width, the gradient of the phase at the strongest frequency with its coherence (a travelling wave's wave number), and
-  what the clip looks like at rest.
+  what the clip looks like at rest;
+- *flow maps* (`models.flow.CHANNELS`, H/4, W/4), what `models.flow_network` takes.
 """
 
 from __future__ import annotations
@@ -28,11 +29,12 @@ from torch.nn import functional
 
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
+from models import flow
 from models.filters import pooled_derivatives, smoothing_matrix
 from models.handmade import FEATURES, features
 
-Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps", "handmade"]
-"""What a front end gives: standardised frames, one of the two kinds of maps, or the page of hand-made features."""
+Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps", "flow-maps", "handmade"]
+"""What a front end gives: standardised frames, one of the three kinds of maps, or the page of hand-made features."""
 
 BANDS = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.32), (0.32, 0.52), (0.52, 1.0))
 """Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins in (low, high]."""
@@ -97,7 +99,8 @@ class FrontEnd:
             return (4, self.size // 2, self.size // 2)
         if self.maps == "handmade":
             return (len(FEATURES),)
-        return (len(WAVE_CHANNELS), self.size // 4, self.size // 4)
+        channels = flow.CHANNELS if self.maps == "flow-maps" else WAVE_CHANNELS
+        return (len(channels), self.size // 4, self.size // 4)
 
     @property
     def hash(self) -> str:
@@ -128,6 +131,8 @@ class FrontEnd:
             return frames.unsqueeze(0)
         if self.maps == "handmade":
             return features(frames[None, None], rate=self.rate)[0]
+        if self.maps == "flow-maps":
+            return flow.flow_maps(frames)
         smooth = self._temporal.to(frames)
         pooled = pooled_derivatives((smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma)
         real, imaginary = self._fourier.to(frames)

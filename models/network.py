@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 
 from torch import Tensor
 
-INPUTS = ("frames", "spectral-maps", "wave-maps")
+INPUTS = ("frames", "spectral-maps", "wave-maps", "flow-maps")
 
 
 @runtime_checkable

@@ -10,6 +10,7 @@ NETWORKS = Registry(
         "sdn": "models.sdn:SpectralNetwork",
         "resnet18": "models.baselines:ResNetOfFrames",
         "wave": "models.wave:WaveNetwork",
+        "flow": "models.flow_network:FlowNetwork",
         "cardona": "models.baselines:Cardona",
         "yang": "models.baselines:Yang",
     },

@@ -82,7 +82,7 @@ def evaluate(
     sequences make the learning curve.
 
     \b
-      flagdata evaluate wave sdn --at v1 --lake lake --out evaluation
+      flagdata evaluate flow sdn --at v1 --lake lake --out evaluation
     """
     import flagdata
     from models.evaluation import report

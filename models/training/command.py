@@ -47,13 +47,13 @@ def train(
 ) -> None:
     """Train a network on the clips of a lake and commit it as an artifact.
 
-    RECIPE is a TOML file, or a recipe of the catalog: wave, sdn, sdn-contrastive and the networks they are compared
-    with. Each film is decoded and filtered once, into the cache; steps then read from there. A training that was
-    stopped or killed goes on from its last checkpoint when the command is given again.
+    RECIPE is a TOML file, or a recipe of the catalog: flow, wave, sdn and the networks they are compared with. Each
+    film is decoded and filtered once, into the cache; steps then read from there. A training that was stopped or killed
+    goes on from its last checkpoint when the command is given again.
 
     \b
-      flagdata train wave --at v1 --lake lake
-      torchrun --nproc-per-node 2 -m flagdata.cli train wave --at v1 --lake lake
+      flagdata train flow --at v1 --lake lake
+      torchrun --nproc-per-node 2 -m flagdata.cli train flow --at v1 --lake lake
     """
     from dataclasses import replace
 

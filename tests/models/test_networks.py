@@ -23,6 +23,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "resnet18": {"frames": 3, "width": 4},
     "cardona": {"frames": 4, "width": 4, "hidden": 8},
     "wave": {"widths": (6, 8, 8), "dimension": 5},
+    "flow": {"widths": (6, 8, 8), "dimension": 5},
     "yang": {"frames": 4, "hidden": 8, "grid": 2, "features": 16},
 }
 """Arguments that make each network of the table small enough for a test."""
@@ -96,6 +97,7 @@ def test_recurrent_networks_say_so() -> None:
         "resnet18": False,
         "cardona": True,
         "wave": False,
+        "flow": False,
         "yang": True,
     }
 

@@ -13,6 +13,7 @@ VALIDATIONS = {
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",
     "flags": "tests.validation.flags",
+    "flow-ablation": "tests.validation.flow_ablation",
     "flutter": "tests.validation.flutter",
     "foreign": "tests.validation.foreign",
     "gate": "tests.validation.gate",

@@ -4,7 +4,7 @@ Each change is filmed anew from flags that no model has seen: another mesh, anot
 textures, a noisier camera; and runs of the reference simulator (../shared/data/arcsim), which share no code with ours,
 filmed by our rasteriser. What the model's own doubt says of them is told beside the errors.
 
-Where `tests.validation.wave_ablation` finds a lake to learn from, two small networks are told of the same clips, one of
+Where `tests.validation.maps_ablation` finds a lake to learn from, two small networks are told of the same clips, one of
 which learned from the whole film alone, without crops of several sizes and mirror images.
 """
 
@@ -28,7 +28,6 @@ from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
 from measure.refine.view import DrawnView
 from models import estimator
-from models.frontend import WAVE_CHANNELS
 from models.restriction import Known
 from sim.assets import Assets
 from sim.datasets import jobs
@@ -39,7 +38,8 @@ from sim.datasets.recipe import DatasetRecipe, Side
 from sim.render import Meshes
 from sim.render.raster import Raster
 from sim.run.recipe import IntegratorSpec
-from tests.validation import wave_ablation
+from tests.validation.flow_ablation import ABLATION
+from tests.validation.maps_ablation import ALL, Ground
 
 FLAGS = int(os.environ.get("FLAGDATA_TRANSFER_FLAGS", "60"))
 """Flags of each change; Cycles, which takes two minutes a film, has a quarter of them."""
@@ -83,13 +83,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _small_networks() -> dict[str, estimator.Estimator]:
-    """One with the augmentation of the recipe `wave` and one without, if there is a lake to learn from."""
-    ground = wave_ablation.Ground.stated()
+    """One with the augmentation of the recipe `flow` and one without, if there is a lake to learn from."""
+    ground = Ground.stated(ABLATION.branch)
     if ground is None:
         return {}
-    with_it = wave_ablation.recipe(wave_ablation.ALL, WAVE_CHANNELS, seed=1)
+    with_it = ABLATION.recipe(ALL, ABLATION.known, seed=1)
     without = replace(
-        with_it, name="wave-without-augmentation", title="wave, without augmentation", variants=1,
+        with_it, name="flow-without-augmentation", title="flow, without augmentation", variants=1,
         cropping=replace(with_it.cropping, scales=(1.0,), mirror=False),
     )  # fmt: skip
     return {

@@ -1,0 +1,151 @@
+"""Maps of optical flow: how fast and in which rhythm the picture moves at each place, whatever it shows.
+
+The power of a derivative's spectrum (`models.frontend`) mixes how a flag moves with what is printed on it. Optical flow
+is the motion alone: from each frame to the next, the displacement that explains a small window's change best in the
+least-squares sense (Lucas and Kanade 1981, equation 9), on two scales, since a window of a fine picture does not follow
+fast motion and one of a coarse picture blurs slow motion. Of the displacements' course in time each place keeps its
+statistics.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+BANDS = ((0.0, 0.1), (0.1, 0.2), (0.2, 0.32), (0.32, 0.52), (0.52, 1.0))
+"""Parts of the flow's spectrum up to the Nyquist frequency, each of which takes the bins in (low, high]."""
+_OF_SCALE = (
+    "mean x", "mean y", "log power x", "log power y", "log variance x", "log variance y", "log power of change x",
+    "log power of change y", "correlation of x and y", "centre x", "centre y", "width x", "width y",
+    *(f"band {low:g}-{high:g} log power {axis}" for low, high in BANDS for axis in "xy"),
+    "phase gradient along x", "coherence along x", "phase gradient along y", "coherence along y", "log slope",
+)  # fmt: skip
+CHANNELS = (
+    *(f"{scale}: {name}" for scale in ("fine", "coarse") for name in _OF_SCALE),
+    "mean picture", "log of its slope", "log standard deviation in time",
+)  # fmt: skip
+"""Names of the maps, in order. Flow is in pixels of its scale a frame: fine is half the clip's size, coarse a quarter;
+powers P are log(1 + P/0.02²); centres and widths of spectra are shares of the Nyquist frequency, phase gradients
+radians a place."""
+POOL = 4
+"""The maps have the clip's height and width over this."""
+WINDOW = 5
+"""Height and width [px] of the windows whose motion is told; they overlap."""
+RIDGE = 1e-3
+"""Square slope [(standard deviations of the clip / px)²] that is added to each direction's: where less is to be seen
+than that, the flow falls to 0 instead of following the camera's noise."""
+FASTEST = 8.0
+"""Largest displacement [px a frame] that is told; a window of 5 px does not follow half of it."""
+_FLOOR = 0.02**2  # square flow [px²] up to which the scale of powers is linear
+_SHARE = 1e-4  # that keeps quotients of nothing by nothing finite
+_TINY = 1e-6
+
+
+def flow_maps(frames: Tensor) -> Tensor:
+    """`CHANNELS` of a clip: (59, height/4, width/4) float32.
+
+    Args:
+        frames: (time, height, width) floating, standardised: of mean 0 and standard deviation 1; time at least 4,
+            height and width multiples of 4 and at least 12.
+    """
+    fine = functional.avg_pool2d(frames, 2)
+    coarse = functional.avg_pool2d(fine, 2)
+    scales = [_statistics(*lucas_kanade(fine, stride=2)), _statistics(*lucas_kanade(coarse))]
+    return torch.cat([*scales, _at_rest(coarse)])
+
+
+def lucas_kanade(frames: Tensor, *, stride: int = 1) -> tuple[Tensor, Tensor]:
+    """The displacement [px] of each window from each frame to the next, (2, time − 1, h, w) along x and y, and the mean
+    square slope in it, (time − 1, h, w).
+
+    The displacement (u, v) is the least-squares solution of u ∂I/∂x + v ∂I/∂y = −∂I/∂t over a window of 5 × 5 pixels,
+    with the ridge `RIDGE`. Slopes are central differences of the mean of both frames.
+
+    Args:
+        frames: (time, height, width), floating; the windows' centres are `stride` pixels apart.
+    """
+    middle, change = (frames[:-1] + frames[1:]) / 2, frames[1:] - frames[:-1]
+    padded = functional.pad(middle, (1, 1, 1, 1), mode="replicate")
+    across = (padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2]) / 2
+    down = (padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1]) / 2
+    products = torch.stack([across * across, down * down, across * down, across * change, down * change])
+    xx, yy, xy, xt, yt = functional.avg_pool2d(
+        products, WINDOW, stride=stride, padding=WINDOW // 2, count_include_pad=False
+    )
+    slope = xx + yy
+    xx, yy = xx + RIDGE, yy + RIDGE
+    determinant = xx * yy - xy.square()
+    flow = torch.stack([xy * yt - yy * xt, xy * xt - xx * yt]) / determinant
+    return flow.clamp(-FASTEST, FASTEST), slope
+
+
+def _statistics(flow: Tensor, slope: Tensor) -> Tensor:
+    """(28, h, w): what `_OF_SCALE` names, of the course in time of a flow (2, time, h, w)."""
+    mean, power = flow.mean(dim=1), flow.square().mean(dim=1)
+    variance = (power - mean.square()).clamp(min=0)
+    change = (flow[:, 1:] - flow[:, :-1]).square().mean(dim=1)
+    product = (flow[0] * flow[1]).mean(dim=0) - mean[0] * mean[1]
+    correlation = product / (variance.prod(dim=0).sqrt() + _SHARE)
+    rows = _fourier(flow.shape[1]).to(flow)
+    spectrum = torch.stack([(part @ flow.flatten(2)).unflatten(2, flow.shape[2:]) for part in rows])
+    found = [mean, _logarithm(power), _logarithm(variance), _logarithm(change), correlation[None]]
+    found += [_shape(spectrum, steps=flow.shape[1]), _phases(spectrum)]
+    return torch.cat([*found, (slope.mean(dim=0, keepdim=True) / RIDGE).log1p()])
+
+
+@functools.cache
+def _fourier(count: int) -> Tensor:
+    """(2, count // 2, count): real and imaginary part of the transform under a Hann window, over √count, without the
+    mean and the bin at zero."""
+    time = torch.arange(count)
+    window = torch.hann_window(count, periodic=True)
+    window = window * (count / window.square().sum()).sqrt() / math.sqrt(count)
+    phase = 2 * math.pi * torch.arange(1, count // 2 + 1)[:, None] * time / count
+    rows = torch.stack([phase.cos(), -phase.sin()]) * window
+    return (rows - rows.mean(dim=2, keepdim=True)).float()
+
+
+def _shape(spectrum: Tensor, *, steps: int) -> Tensor:
+    """(14, h, w): centre and width of both components' spectra of so many steps, then the log power of each band."""
+    power = spectrum.square().sum(dim=0)  # (2, bin, h, w)
+    share = torch.arange(1, power.shape[1] + 1).to(power) / (steps / 2)
+    weight, total = share[:, None, None], power.sum(dim=1) + _TINY
+    centre = (power * weight).sum(dim=1) / total
+    width = ((power * weight.square()).sum(dim=1) / total - centre.square()).clamp(min=0).sqrt()
+    bands = [_logarithm(power[:, (share > low) & (share <= high)].sum(dim=1)) for low, high in BANDS]
+    return torch.cat([centre, width, *bands])
+
+
+def _phases(spectrum: Tensor) -> Tensor:
+    """(4, h, w): phase gradient [rad a place] along x, averaged over frequencies by their cross power, and coherence;
+    then along y. The last column, or row, has no neighbour and is 0."""
+    found = []
+    for axis, pad in ((-1, (0, 1)), (-2, (0, 0, 0, 1))):
+        length = spectrum.shape[axis] - 1
+        ahead, behind = spectrum.narrow(axis, 1, length), spectrum.narrow(axis, 0, length)
+        real = (ahead * behind).sum(dim=(0, 1))  # (bin, h, w), both components together
+        imaginary = (ahead[1] * behind[0] - ahead[0] * behind[1]).sum(dim=0)
+        cross = (real.square() + imaginary.square()).sqrt()
+        total = cross.sum(dim=0)
+        gradient = (torch.atan2(imaginary, real) * cross).sum(dim=0) / (total + _TINY)
+        power = ahead.square().sum(dim=(0, 1, 2)) * behind.square().sum(dim=(0, 1, 2))
+        found.append(functional.pad(torch.stack([gradient, total / (power.sqrt() + _TINY)]), pad))
+    return torch.cat(found)
+
+
+def _at_rest(frames: Tensor) -> Tensor:
+    """(3, h, w): the mean picture, the log of its slope, the log of the standard deviation in time."""
+    mean = frames.mean(dim=0)
+    spread = (frames - mean).square().mean(dim=0).sqrt()
+    slope = torch.zeros_like(mean)
+    slope[:, 1:-1] = (mean[:, 2:] - mean[:, :-2]).square()
+    slope[1:-1] += (mean[2:] - mean[:-2]).square()
+    return torch.stack([mean, (slope.sqrt() * 10).log1p(), (spread * 10).log1p()])
+
+
+def _logarithm(power: Tensor) -> Tensor:
+    return (power / _FLOOR).log1p()

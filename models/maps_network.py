@@ -1,0 +1,62 @@
+"""A small residual network on maps: what `models.wave` and `models.flow_network` have in common."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from flagdata.errors import InputError
+from models.blocks import BasicBlock, initialise
+
+
+class MapsNetwork(nn.Module):
+    """Maps (batch, channel, h, w) to a summary (batch, dimension).
+
+    The maps are standardised by batch statistics, pass residual blocks, and are pooled by their mean and their maximum
+    over the picture, which tell how much there is and how strong it is at its strongest.
+
+    Args:
+        known: names of the maps that come in.
+        chosen: those that are used.
+        dimension: of the summary.
+        widths: channels of the blocks.
+        strides: by which each block makes height and width smaller.
+
+    Raises:
+        InputError: no map, or one that is not known; as many strides as there are widths are needed.
+    """
+
+    def __init__(
+        self,
+        *,
+        known: tuple[str, ...],
+        chosen: tuple[str, ...],
+        dimension: int,
+        widths: tuple[int, ...],
+        strides: tuple[int, ...],
+    ) -> None:
+        super().__init__()
+        unknown = set(chosen) - set(known)
+        if unknown or not chosen:
+            raise InputError(f"maps {sorted(unknown)} are not known", fix=f"name some of {', '.join(known)}")
+        if len(widths) != len(strides) or not widths:
+            raise InputError(f"{len(widths)} widths and {len(strides)} strides", fix="give one of each for every block")
+        self.dimension = dimension
+        self.channels = len(known)
+        self._chosen = [known.index(name) for name in chosen]
+        self.standardise = nn.BatchNorm2d(len(chosen), affine=False)
+        ins = (len(chosen), *widths[:-1])
+        self.blocks = nn.Sequential(
+            *(
+                BasicBlock(inputs=inputs, width=width, stride=stride)
+                for inputs, width, stride in zip(ins, widths, strides, strict=True)
+            )
+        )
+        initialise(self.blocks)
+        self.summary = nn.Sequential(nn.Linear(2 * widths[-1], 128), nn.ReLU(), nn.Linear(128, dimension))
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """The summary (batch, dimension)."""
+        seen = maps if len(self._chosen) == maps.shape[1] else maps[:, self._chosen]
+        features = self.blocks(self.standardise(seen))
+        return self.summary(torch.cat([features.mean(dim=(2, 3)), features.amax(dim=(2, 3))], dim=1))
