@@ -131,7 +131,7 @@ def data_of(model: Estimator) -> DataSpec:
 
 
 @click.command()
-@click.argument("model", type=click.Path(path_type=Path), default=SHIPPED / "wave")
+@click.argument("model", type=click.Path(path_type=Path), default=SHIPPED / "flow")
 @click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
               help="Where the films are that the model was trained on and validated by.")  # fmt: skip
 @click.option("--dataset", "datasets", multiple=True,

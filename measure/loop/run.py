@@ -6,7 +6,6 @@ numerics, weigh the library's effects, judge, and run the refitted model on what
 
 from __future__ import annotations
 
-import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -25,6 +24,7 @@ from measure.inference.evidence import Evidence, Fit
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.corrective_field import Mode, corrective_field
 from measure.loop.gauss_newton import Refined, cut
+from measure.loop.parameters import parameters
 from measure.loop.refit import Fits, Refit, refit
 from measure.loop.residuals import residuals
 from measure.loop.selection import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, finalists, judge, strength
@@ -39,7 +39,7 @@ from measure.probes.lines import Line
 from measure.probes.statistics import Projection, Statistics, projected
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
+from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
@@ -278,7 +278,7 @@ def _outcome(
     after = None if larger is None else _unseen(setting, larger)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="", test=_test(solved, bank, options),
-        parameters=_parameters(solved.base, larger, solved.reference.reach), ranking=_ranking(solved, larger),
+        parameters=parameters(solved.base, larger, solved.reference.reach), ranking=_ranking(solved, larger),
         comparisons=trial.comparisons, apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         provenance={
@@ -353,28 +353,3 @@ def _named(judgement: Judgement) -> tuple[str, ...]:
         if weighed.column in judgement.named:
             names += [weighed.candidate.effect, *EQUIVALENT.get(weighed.candidate.effect, ())]
     return tuple(dict.fromkeys(names))
-
-
-def _parameters(base: Refined, larger: Refined | None, reach: Floats) -> tuple[Parameter, ...]:
-    """Density, bending and damping, which are estimated by their logarithms, with the intervals that hold those of null
-    experiments: `reach` (theta,) standard errors to either side."""
-    made: list[Parameter] = []
-    for place, (name, _, _) in enumerate(THETA):
-        before = _shown(name, base.model.calibration, float(reach[place]) * base.errors[place])
-        if larger is None:
-            made.append(Parameter(name=name, before=before, after=None, shift=None))
-            continue
-        steps = larger.model.calibration.steps_from(base.model.calibration)
-        after = _shown(name, larger.model.calibration, float(reach[place]) * larger.errors[place])
-        made.append(Parameter(name=name, before=before, after=after, shift=steps[place] / base.errors[place]))
-    return tuple(made)
-
-
-def _shown(name: str, calibration: Calibration, half: float) -> Estimate:
-    """A calibrated parameter as a reader knows it, with half the width of its logarithm's interval."""
-    value, unit = {
-        "density": (calibration.density, "of nominal"), "bending": (calibration.bending, "of nominal"),
-        "damping": (calibration.damping, "s"),
-    }[name]  # fmt: skip
-    low, high = value * math.exp(-half), value * math.exp(half)
-    return Estimate(value=value, low=low, high=high, unit=unit, level=CRITERIA.interval)

@@ -212,6 +212,11 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     )
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
     places = "" if specimen.anchors_told else ", tied at their mean observed places"
+    between = (
+        "intervals of these hold what simulators of other authors differ by, "
+        f"{100 * CRITERIA.density_between:.0f} % in density, a factor of {math.exp(CRITERIA.bending_between):.1f} in "
+        f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, each one standard deviation"
+    )
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
@@ -220,6 +225,7 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         logged,
         f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
+        between,
         f"the coarse mesh of the fit may bias a strength by {100 * CRITERIA.response:.0f} %: its interval says so",
         "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
     )

@@ -37,6 +37,10 @@ class Criteria:
         least_turned: a wind that varies across its mean by less than this share of what it does along it is not
             turbulence (see `course`).
         most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
+        density_between: standard deviation of the logarithm of the density by which simulators of other authors differ;
+            this and the next two are of twenty nulls of MuJoCo (decision 023).
+        bending_between: the same of the bending stiffness.
+        damping_between: standard deviation of the internal damping by which they differ [s]: it does not grow with it.
         room: share of the squared error before that must lie above the floor, for a reduction to be a share of it.
 
     Raises:
@@ -53,6 +57,9 @@ class Criteria:
     response: float = 0.25
     least_turned: float = 0.3
     most_within: float = 2.0
+    density_between: float = 0.07
+    bending_between: float = 0.6
+    damping_between: float = 2.4e-3
     room: float = 0.02
 
     def __post_init__(self) -> None:

@@ -173,12 +173,21 @@ class NullTest:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """A calibrated parameter of the base model, before and after the effect was added; `shift` in standard errors."""
+    """A calibrated parameter.
+
+    Attributes:
+        name: "density", "bending" or "damping".
+        before, after: of the base model, and with the effect; their intervals hold what simulators differ by.
+        shift: from one to the other, in standard errors.
+        within: standard error of its logarithm by noise and by the discretisations of one simulator alone; None where
+            it was not recorded.
+    """
 
     name: str
     before: Estimate
     after: Estimate | None
     shift: float | None
+    within: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

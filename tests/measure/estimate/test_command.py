@@ -107,7 +107,7 @@ def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) ->
 def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_path: Path) -> None:
     path = write_video(tmp_path / "flag.mkv", pictures(40, height=240, width=320))
     found = answer(path, "--anyway")
-    assert found["model"] == "wave"
+    assert found["model"] == "flow"
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
 
 

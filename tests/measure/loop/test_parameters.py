@@ -1,0 +1,52 @@
+"""Intervals of calibrated parameters: this code's own scatter and what codes differ by, in quadrature."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from measure.forecasting.calibration import THETA, Calibration
+from measure.loop.parameters import parameters
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Parameter
+
+REACH = 1.6448536269514722  # of a normal, 90 % to either side
+
+
+def told(calibration: Calibration, errors: dict[str, float]) -> dict[str, Parameter]:
+    fitted: Any = SimpleNamespace(
+        model=SimpleNamespace(calibration=calibration), errors=np.array([errors[name] for name, _, _ in THETA])
+    )
+    return {one.name: one for one in parameters(fitted, None, np.full(len(THETA), REACH))}
+
+
+def test_scatter_and_spread_among_codes_add_in_quadrature() -> None:
+    """3 % and 7 %: √(0.03² + 0.07²) = 0.0762 of the density's logarithm; 0.8 and 0.6: 1 of the bending's."""
+    found = told(Calibration(density=1.2, bending=2.0), {"density": 0.03, "bending": 0.8, "damping": 0.1})
+    assert CRITERIA.density_between == 0.07
+    assert CRITERIA.bending_between == 0.6
+    density, bending = found["density"], found["bending"]
+    assert math.log(density.before.high / density.before.value) == pytest.approx(REACH * math.sqrt(0.0058), rel=1e-6)
+    assert math.log(density.before.value / density.before.low) == pytest.approx(REACH * math.sqrt(0.0058), rel=1e-6)
+    assert math.log(bending.before.high / bending.before.low) == pytest.approx(2 * REACH, rel=1e-6)
+    assert density.within == pytest.approx(0.03)
+    assert bending.within == pytest.approx(0.8)
+
+
+def test_of_little_damping_the_interval_is_that_of_the_codes_and_begins_at_zero() -> None:
+    """2.4 ms · 1.645 = 3.95 ms to either side of 1 ms, and next to nothing of its own."""
+    damping = told(Calibration(damping=1e-3), {"density": 0.1, "bending": 0.1, "damping": 1e-6})["damping"].before
+    assert damping.low == 0.0
+    assert damping.high == pytest.approx(1e-3 + REACH * 2.4e-3, rel=1e-4)
+
+
+def test_of_much_damping_what_codes_differ_by_hardly_shows() -> None:
+    """30 ms known to 20 % is 6 ms, beside which 2.4 ms count little: √(6² + 2.4²) is about 6.5 ms a standard error."""
+    damping = told(Calibration(damping=30e-3), {"density": 0.1, "bending": 0.1, "damping": 0.2})["damping"].before
+    own_low, own_high = 30e-3 * (1 - math.exp(-0.2 * REACH)), 30e-3 * (math.exp(0.2 * REACH) - 1)
+    assert damping.value - damping.low == pytest.approx(math.hypot(own_low, REACH * 2.4e-3), rel=1e-6)
+    assert damping.high - damping.value == pytest.approx(math.hypot(own_high, REACH * 2.4e-3), rel=1e-6)
