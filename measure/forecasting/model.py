@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from measure.forecasting.calibration import Calibration
+from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.observer import WIDEST, Forecaster
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
@@ -54,6 +54,14 @@ class Model:
         strengths = (b - a for (_, a), (_, b) in zip(other.effects, self.effects, strict=True))
         return (*self.calibration.steps_from(other.calibration), *strengths)
 
+    def stepped(self, place: int, size: float) -> tuple[Model, float]:
+        """After a step along one parameter, with the step: back, where bounds cut the one ahead shorter."""
+        count = len(THETA) + len(self.effects)
+        ways = [self.moved(tuple(way if k == place else 0.0 for k in range(count))) for way in (size, -size)]
+        taken = [moved.steps_from(self)[place] for moved in ways]
+        longer = int(abs(taken[1]) > abs(taken[0]) + 1e-9 * size)
+        return ways[longer], taken[longer]
+
     def halved(self) -> Model:
         """Halfway from here to the nominal base model."""
         nominal = Calibration()
@@ -80,6 +88,14 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
         ]
         found += forecaster.errors(*apply(acting, *batch), segments).split(count, dim=-1)
     return found
+
+
+def linearised(model: Model, forecaster: Forecaster, segments: Segments) -> tuple[Tensor, list[Tensor]]:
+    """The errors of a model (frame, marker, 3, segment) [m] and, per unit, what each of its parameters takes away."""
+    sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
+    steps = [model.stepped(place, size) for place, size in enumerate(sizes)]
+    base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
+    return base, [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
 
 
 def _admissible(column: EffectColumn, coefficient: float) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError
 from measure.forecasting.calibration import PRIOR, THETA, Calibration
-from measure.forecasting.model import Model, errors_of
+from measure.forecasting.model import Model, errors_of, linearised
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import DOUBLE, Column, EffectColumn
 from measure.forecasting.segments import Segments
@@ -174,20 +174,8 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
 def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
     if any(column.name in DOUBLE for column, _ in model.effects):
         forecaster = forecaster.double
-    sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
-    steps = [_stepped(model, place, size) for place, size in enumerate(sizes)]
-    base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
-    changes = [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
+    base, changes = linearised(model, forecaster, segments)
     return reduced(base, changes, segments.recording, segments.noise, segments.counted)
-
-
-def _stepped(model: Model, place: int, size: float) -> tuple[Model, float]:
-    """A model after a step along one of its parameters, with the step: back, where bounds cut the one ahead shorter."""
-    count = len(THETA) + len(model.effects)
-    ways = [model.moved(tuple(way if k == place else 0.0 for k in range(count))) for way in (size, -size)]
-    taken = [moved.steps_from(model)[place] for moved in ways]
-    longer = int(abs(taken[1]) > abs(taken[0]) + 1e-9 * size)
-    return ways[longer], taken[longer]
 
 
 def _step(

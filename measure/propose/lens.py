@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.model import Model, errors_of
+from measure.forecasting.model import Model, linearised
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
@@ -92,12 +92,7 @@ class Lens:
 
     def at(self, model: Model) -> Statistics:
         """Statistics of the calibrated parameters and the effects of a model, there."""
-        steps = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
-
-        ways = np.eye(len(steps)) * steps
-        models = [model, *(model.moved(tuple(float(v) for v in way)) for way in ways)]
-        base, *errors = errors_of(models, self.forecaster, self.segments)
-        changes = [(base - own) / step for own, step in zip(errors, steps, strict=True)]
+        base, changes = linearised(model, self.forecaster, self.segments)
         return self.seen(base, changes)
 
     def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:

@@ -71,6 +71,6 @@ def test_sensitivities_at_a_bound_are_taken_from_within(bending: float, steps: t
     model = Model(calibration=Calibration(bending=bending), effects=((LIFT, 1.0),))
     for place, step in ((1, steps[0]), (3, steps[1])):
         size = abs(step)
-        moved, taken = gauss_newton._stepped(model, place, size)  # pyright: ignore[reportPrivateUsage]
+        moved, taken = model.stepped(place, size)
         assert taken == pytest.approx(step)
         np.testing.assert_allclose(moved.steps_from(model), np.where(np.arange(4) == place, step, 0.0), atol=1e-12)

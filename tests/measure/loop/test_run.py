@@ -116,7 +116,15 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
     assert len(dragged.comparisons) == 3
     for comparison in dragged.comparisons:
         assert comparison.after.value < comparison.before.value
-        assert comparison.control is None or comparison.after.value < comparison.control.value
+    slow, fast, _ = dragged.comparisons
+    for left_out in (slow, fast):
+        # The statistics tell it from the control where metres do not: at 3.5 m/s both are within the floor's reach.
+        assert left_out.control_name == "tangential-quadratic-drag"
+        assert left_out.apart is not None
+        assert left_out.apart.low > 0
+    assert fast.control is not None
+    assert fast.after.high < fast.control.low
+    assert fast.reduction.low > 0
 
 
 def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_otherwise(dragged: Verdict) -> None:
