@@ -44,6 +44,9 @@ WIDEST = 400
 """Members of a batch: beyond, a member costs as much as before. Steps of a flag of 176 vertices side by side in 40
 segments take 34 s by 72 members at a time, 20 s by 400 (with 486 vertices 54 and 41 s)."""
 
+_JOINT = 200
+"""Members of a joint batch, half as many, so that two workers have one each where one batch would hold all."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentWind:
@@ -81,7 +84,7 @@ class Forecaster:
         markers: (marker, 2) [m].
         integrator: of the model.
         dtype, device: of the tensors.
-        workers: threads among which batches that run jointly are shared out; members do not depend on it.
+        workers: threads that joint batches are run in; which batches run jointly does not depend on it.
     """
 
     specimen: Specimen
@@ -249,7 +252,8 @@ class Forecaster:
     def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
         """`errors` of each of some batches of the same segments.
 
-        They run in one joint batch, or one for each worker: small batches cost nearly as much as larger ones.
+        They run in joint batches of up to `_JOINT` members: small batches cost nearly as much as larger ones. Products
+        of matrices round differently with the number of columns, so that their number decides, not that of workers.
         """
 
         def run(chosen: NDArray[np.int64]) -> Sequence[Tensor]:
@@ -259,7 +263,7 @@ class Forecaster:
             )
             return torch.stack(errors).split(len(segments), dim=-1)
 
-        together = max(math.ceil(len(batches) * len(segments) / WIDEST), min(self.workers, len(batches)))
+        together = min(math.ceil(len(batches) * len(segments) / _JOINT), len(batches))
         shares = [np.arange(len(batches))[place::together] for place in range(together)]
         with ThreadPoolExecutor(self.workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
             done = list(pool.map(run, shares))

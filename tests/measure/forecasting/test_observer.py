@@ -173,11 +173,14 @@ def test_models_in_one_batch_leave_what_they_leave_alone(
         torch.testing.assert_close(errors, alone, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_sensitivities_do_not_depend_on_how_many_threads_share_them_out(
-    forecaster: Forecaster, own_recording: Trajectory
+    forecaster: Forecaster, own_recording: Trajectory, monkeypatch: pytest.MonkeyPatch, dtype: torch.dtype
 ) -> None:
     segments = Segments.of([own_recording])
     calibrations = [NOMINAL] * len(segments)
+    monkeypatch.setattr(observer, "_JOINT", 2 * len(segments))
+    forecaster = replace(forecaster, dtype=dtype)
     base = forecaster.errors(*forecaster.system(segments, calibrations), segments)
     alone, shared = (
         replace(forecaster, workers=workers).sensitivities(library()[:3], segments, calibrations, base)
