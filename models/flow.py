@@ -9,12 +9,11 @@ statistics.
 
 from __future__ import annotations
 
-import functools
-import math
-
 import torch
 from torch import Tensor
 from torch.nn import functional
+
+from models.course import at_rest, band_powers, centre_and_width, fourier_rows, log_power, shares_of_nyquist
 
 BANDS = ((0.0, 0.1), (0.1, 0.2), (0.2, 0.32), (0.32, 0.52), (0.52, 1.0))
 """Parts of the flow's spectrum up to the Nyquist frequency, each of which takes the bins in (low, high]."""
@@ -55,7 +54,7 @@ def flow_maps(frames: Tensor) -> Tensor:
     fine = functional.avg_pool2d(frames, 2)
     coarse = functional.avg_pool2d(fine, 2)
     scales = [_statistics(*lucas_kanade(fine, stride=2)), _statistics(*lucas_kanade(coarse))]
-    return torch.cat([*scales, _at_rest(coarse)])
+    return torch.cat([*scales, at_rest(coarse)])
 
 
 def lucas_kanade(frames: Tensor, *, stride: int = 1) -> tuple[Tensor, Tensor]:
@@ -90,34 +89,20 @@ def _statistics(flow: Tensor, slope: Tensor) -> Tensor:
     change = (flow[:, 1:] - flow[:, :-1]).square().mean(dim=1)
     product = (flow[0] * flow[1]).mean(dim=0) - mean[0] * mean[1]
     correlation = product / (variance.prod(dim=0).sqrt() + _SHARE)
-    rows = _fourier(flow.shape[1]).to(flow)
+    rows = fourier_rows(flow.shape[1]).to(flow)
     spectrum = torch.stack([(part @ flow.flatten(2)).unflatten(2, flow.shape[2:]) for part in rows])
-    found = [mean, _logarithm(power), _logarithm(variance), _logarithm(change), correlation[None]]
+    logs = [log_power(own, floor=_FLOOR) for own in (power, variance, change)]
+    found = [mean, *logs, correlation[None]]
     found += [_shape(spectrum, steps=flow.shape[1]), _phases(spectrum)]
     return torch.cat([*found, (slope.mean(dim=0, keepdim=True) / RIDGE).log1p()])
-
-
-@functools.cache
-def _fourier(count: int) -> Tensor:
-    """(2, count // 2, count): real and imaginary part of the transform under a Hann window, over √count, without the
-    mean and the bin at zero."""
-    time = torch.arange(count)
-    window = torch.hann_window(count, periodic=True)
-    window = window * (count / window.square().sum()).sqrt() / math.sqrt(count)
-    phase = 2 * math.pi * torch.arange(1, count // 2 + 1)[:, None] * time / count
-    rows = torch.stack([phase.cos(), -phase.sin()]) * window
-    return (rows - rows.mean(dim=2, keepdim=True)).float()
 
 
 def _shape(spectrum: Tensor, *, steps: int) -> Tensor:
     """(14, h, w): centre and width of both components' spectra of so many steps, then the log power of each band."""
     power = spectrum.square().sum(dim=0)  # (2, bin, h, w)
-    share = torch.arange(1, power.shape[1] + 1).to(power) / (steps / 2)
-    weight, total = share[:, None, None], power.sum(dim=1) + _TINY
-    centre = (power * weight).sum(dim=1) / total
-    width = ((power * weight.square()).sum(dim=1) / total - centre.square()).clamp(min=0).sqrt()
-    bands = [_logarithm(power[:, (share > low) & (share <= high)].sum(dim=1)) for low, high in BANDS]
-    return torch.cat([centre, width, *bands])
+    share = shares_of_nyquist(power, steps=steps)
+    bands = (log_power(own, floor=_FLOOR) for own in band_powers(power, share, BANDS))
+    return torch.cat([*centre_and_width(power, share, floor=_TINY), *bands])
 
 
 def _phases(spectrum: Tensor) -> Tensor:
@@ -135,17 +120,3 @@ def _phases(spectrum: Tensor) -> Tensor:
         power = ahead.square().sum(dim=(0, 1, 2)) * behind.square().sum(dim=(0, 1, 2))
         found.append(functional.pad(torch.stack([gradient, total / (power.sqrt() + _TINY)]), pad))
     return torch.cat(found)
-
-
-def _at_rest(frames: Tensor) -> Tensor:
-    """(3, h, w): the mean picture, the log of its slope, the log of the standard deviation in time."""
-    mean = frames.mean(dim=0)
-    spread = (frames - mean).square().mean(dim=0).sqrt()
-    slope = torch.zeros_like(mean)
-    slope[:, 1:-1] = (mean[:, 2:] - mean[:, :-2]).square()
-    slope[1:-1] += (mean[2:] - mean[:-2]).square()
-    return torch.stack([mean, (slope.sqrt() * 10).log1p(), (spread * 10).log1p()])
-
-
-def _logarithm(power: Tensor) -> Tensor:
-    return (power / _FLOOR).log1p()

@@ -13,24 +13,8 @@ from models.maps_network import MapsNetwork
 
 
 class FlowNetwork(MapsNetwork):
-    """Maps (batch, 59, H, W) to a summary (batch, dimension), see `MapsNetwork`.
-
-    Args:
-        dimension: of the summary.
-        widths: channels of the blocks.
-        strides: by which each block makes height and width smaller.
-        channels: names of the flow maps that are used, to measure what each adds; all by default.
-    """
+    """Maps (batch, 59, H, W) to a summary (batch, dimension), see `MapsNetwork`."""
 
     takes: ClassVar[str] = "flow-maps"
-    recurrent: ClassVar[bool] = False
-
-    def __init__(
-        self,
-        *,
-        dimension: int = 32,
-        widths: tuple[int, ...] = (48, 96, 160),
-        strides: tuple[int, ...] = (1, 2, 2),
-        channels: tuple[str, ...] = CHANNELS,
-    ) -> None:
-        super().__init__(known=CHANNELS, chosen=channels, dimension=dimension, widths=widths, strides=strides)
+    known: ClassVar[tuple[str, ...]] = CHANNELS
+    reduces: ClassVar[tuple[int, ...]] = (1, 2, 2)

@@ -30,6 +30,7 @@ from torch.nn import functional
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from models import flow
+from models.course import at_rest, band_powers, centre_and_width, fourier_rows, log_power, shares_of_nyquist
 from models.filters import pooled_derivatives, smoothing_matrix
 from models.handmade import FEATURES, features
 
@@ -135,29 +136,17 @@ class FrontEnd:
             return flow.flow_maps(frames)
         smooth = self._temporal.to(frames)
         pooled = pooled_derivatives((smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma)
-        real, imaginary = self._fourier.to(frames)
+        real, imaginary = fourier_rows(self.frames).to(frames)
         flat, picture = pooled.flatten(2), pooled.shape[2:]
         spectra = (real @ flat).unflatten(2, picture), (imaginary @ flat).unflatten(2, picture)
         if self.maps == "spectral-maps":
             return self._peaks(spectra)
-        return torch.cat([self._waves(spectra), _at_rest(frames)])
+        return torch.cat([self._waves(spectra), at_rest(functional.avg_pool2d(frames, 4))])
 
     @cached_property
     def _temporal(self) -> Tensor:
         """(time, time)."""
         return smoothing_matrix(self.frames, self.temporal_sigma).float()
-
-    @cached_property
-    def _fourier(self) -> Tensor:
-        """(2, time // 2, time): real and imaginary part of the windowed transform over √N_t, the bin at zero left
-        out."""
-        count = self.frames
-        window = torch.hann_window(count, periodic=True, dtype=torch.float64)
-        window = window * (count / window.square().sum()).sqrt() / math.sqrt(count)
-        turn = 2 * math.pi * torch.arange(1, count // 2 + 1, dtype=torch.float64)[:, None] / count
-        phase = turn * torch.arange(count)
-        rows = torch.stack([phase.cos(), -phase.sin()]) * window
-        return (rows - rows.mean(dim=2, keepdim=True)).float()
 
     def _peaks(self, spectra: tuple[Tensor, Tensor]) -> Tensor:
         real, imaginary = spectra
@@ -168,15 +157,11 @@ class FrontEnd:
     def _waves(self, spectra: tuple[Tensor, Tensor]) -> Tensor:
         real, imaginary = spectra  # (2, bin, h, w)
         power = _sum_of_four(real.square() + imaginary.square()) / 4
-        bins = power.shape[1]
-        share = torch.arange(1, bins + 1, device=power.device, dtype=power.dtype) / (self.frames / 2)
-        total = power.sum(dim=1)
-        weight = share[:, None, None]
-        centre = (power * weight).sum(dim=1) / (total + _TINY)
-        width = ((power * weight.square()).sum(dim=1) / (total + _TINY) - centre.square()).clamp(min=0).sqrt()
-        peaks, places = power.topk(min(2, bins), dim=1)
-        banded = [_logarithm(power[:, (share > low) & (share <= high)].sum(dim=1)) for low, high in BANDS]
-        found = [_logarithm(peaks), share[places], torch.stack([_logarithm(total), centre, width], dim=1)]
+        share = shares_of_nyquist(power, steps=self.frames)
+        centre, width = centre_and_width(power, share, floor=_TINY)
+        peaks, places = power.topk(min(2, power.shape[1]), dim=1)
+        banded = [_logarithm(own) for own in band_powers(power, share, BANDS)]
+        found = [_logarithm(peaks), share[places], torch.stack([_logarithm(power.sum(dim=1)), centre, width], dim=1)]
         found += [torch.stack(banded, dim=1), _phases(real, imaginary, places[:, :1])]
         return torch.cat(found, dim=1).flatten(0, 1)
 
@@ -190,7 +175,7 @@ def standardised(clip: Tensor) -> Tensor:
 
 
 def _logarithm(power: Tensor) -> Tensor:
-    return (power / _FLOOR).log1p()
+    return log_power(power, floor=_FLOOR)
 
 
 def _sum_of_four(values: Tensor) -> Tensor:
@@ -224,15 +209,3 @@ def _phases(real: Tensor, imaginary: Tensor, place: Tensor) -> Tensor:
     x = along([((b, f), (a, e)), ((d, h), (c, g))], (power[1] + power[3]) * (power[0] + power[2]))
     y = along([((c, g), (a, e)), ((d, h), (b, f))], (power[2] + power[3]) * (power[0] + power[1]))
     return torch.stack([x[0], y[0], x[1], y[1]], dim=1)
-
-
-def _at_rest(frames: Tensor) -> Tensor:
-    """(3, H/4, W/4) of the frames at a quarter of their size: the mean, the log of its slope, and of the standard
-    deviation in time."""
-    small = functional.avg_pool2d(frames, 4)
-    mean = small.mean(dim=0)
-    spread = (small - mean).square().mean(dim=0).sqrt()  # a third of the time of torch.std_mean
-    slope = torch.zeros_like(mean)
-    slope[:, 1:-1] = (mean[:, 2:] - mean[:, :-2]).square()
-    slope[1:-1] += (mean[2:] - mean[:-2]).square()
-    return torch.stack([mean, (slope.sqrt() * 10).log1p(), (spread * 10).log1p()])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import torch
 from torch import Tensor, nn
 
@@ -15,27 +17,35 @@ class MapsNetwork(nn.Module):
     The maps are standardised by batch statistics, pass residual blocks, and are pooled by their mean and their maximum
     over the picture, which tell how much there is and how strong it is at its strongest.
 
-    Args:
+    Attributes:
         known: names of the maps that come in.
-        chosen: those that are used.
+        reduces: by which each block makes height and width smaller, where `strides` are not given.
+
+    Args:
         dimension: of the summary.
         widths: channels of the blocks.
         strides: by which each block makes height and width smaller.
+        channels: names of the maps that are used, to measure what each adds; all by default.
 
     Raises:
         InputError: no map, or one that is not known; as many strides as there are widths are needed.
     """
 
+    recurrent: ClassVar[bool] = False
+    known: ClassVar[tuple[str, ...]]
+    reduces: ClassVar[tuple[int, ...]]
+
     def __init__(
         self,
         *,
-        known: tuple[str, ...],
-        chosen: tuple[str, ...],
-        dimension: int,
-        widths: tuple[int, ...],
-        strides: tuple[int, ...],
+        dimension: int = 32,
+        widths: tuple[int, ...] = (48, 96, 160),
+        strides: tuple[int, ...] | None = None,
+        channels: tuple[str, ...] | None = None,
     ) -> None:
         super().__init__()
+        known, chosen = self.known, self.known if channels is None else channels
+        strides = self.reduces if strides is None else strides
         unknown = set(chosen) - set(known)
         if unknown or not chosen:
             raise InputError(f"maps {sorted(unknown)} are not known", fix=f"name some of {', '.join(known)}")

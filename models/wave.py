@@ -14,22 +14,8 @@ from models.maps_network import MapsNetwork
 
 
 class WaveNetwork(MapsNetwork):
-    """Maps (batch, 35, H, W) to a summary (batch, dimension), see `MapsNetwork`.
-
-    Args:
-        dimension: of the summary.
-        widths: channels of the three blocks, each of which halves height and width.
-        channels: names of the wave maps that are used, to measure what each adds; all by default.
-    """
+    """Maps (batch, 35, H, W) to a summary (batch, dimension), see `MapsNetwork`."""
 
     takes: ClassVar[str] = "wave-maps"
-    recurrent: ClassVar[bool] = False
-
-    def __init__(
-        self,
-        *,
-        dimension: int = 32,
-        widths: tuple[int, int, int] = (48, 96, 160),
-        channels: tuple[str, ...] = WAVE_CHANNELS,
-    ) -> None:
-        super().__init__(known=WAVE_CHANNELS, chosen=channels, dimension=dimension, widths=widths, strides=(2, 2, 2))
+    known: ClassVar[tuple[str, ...]] = WAVE_CHANNELS
+    reduces: ClassVar[tuple[int, ...]] = (2, 2, 2)
