@@ -77,6 +77,9 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
     if heading.unit is None and north and 0 <= low < high <= 36 and whole:
         return Judged(left_out="may be in degrees or in tens of degrees: left out", may_be=("10 deg", "deg"))
     unit, told = heading.unit or "deg", stated if heading.unit else f"in degrees by its values, up to {high:g}"
+    if heading.unit is None and north and 0 < low == high <= 36 and whole:
+        doubt = f"holds nothing but {high:g}, taken as degrees: it may be a sixteenth of the compass or tens of degrees"
+        return Judged(unit=unit, told=told, may_be=("sixteenths", "10 deg"), doubt=doubt)
     if unit == "deg" and north and several and low >= 0 and high <= 36 and whole:
         doubt = f"is stated in degrees, but holds whole numbers up to {high:g}: likely tens of degrees"
         return Judged(unit=unit, told=told, may_be=("10 deg",), doubt=doubt)

@@ -144,14 +144,22 @@ def pattern(form: str) -> str:
         position += 1
     if len(set(used)) < len(used):
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
-    dated = {"Y", "m", "d"} <= set(used) or {"y", "m", "d"} <= set(used) or {"Y", "b", "d"} <= set(used)
-    dated = dated or {"y", "b", "d"} <= set(used)
-    dated = dated or "s" in used or ("Y" in used and bool({"j", "J", "E", "D"} & set(used)))
-    if not dated:
-        raise UsageError("no whole date in it", where=f"time format {form!r}", fix="name year, month and day")
+    if not _dated(frozenset(used)):
+        raise UsageError(
+            "no whole date in it", where=f"time format {form!r}",
+            fix="name year, month and day; year and month alone are read as the month's first day",
+        )  # fmt: skip
     if not {"H", "I", "Q", "E", "G", "K"} & set(used) and {"M", "S", "f", "p"} & set(used):
         raise UsageError("no hour in it", where=f"time format {form!r}", fix="name the hour, or the date alone")
     return "^" + "".join(out) + "$"
+
+
+def _dated(used: frozenset[str]) -> bool:
+    """Whether directives make a date: a day of a month or of the year, a count, or a month that stands by itself."""
+    if "s" in used or ("Y" in used and used & {"j", "J", "E", "D"}):
+        return True
+    month = bool(used & {"Y", "y"} and used & {"m", "b"})
+    return month and ("d" in used or len(used) == 2)
 
 
 def is_date_alone(form: str) -> bool:
@@ -316,7 +324,7 @@ def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[ND
         leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
         return first + of_year - 1, (of_year >= 1) & (of_year <= 365 + leap) & (year >= YEARS[0]) & (year <= YEARS[1])
     month = part("m") if part("m") is not None else _month(found)
-    day = part("d")
+    day = part("d") if part("d") is not None else np.ones_like(year)
     leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
     lengths = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
     known = (month >= 1) & (month <= 12)

@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import counted, dateparts, second_times, yearless_columns
+from flagdata.ingest.anemometer import counted, dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
 from flagdata.ingest.anemometer.dates import Order, decide
+from flagdata.ingest.anemometer.extremes import of_extreme
 from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
 from flagdata.ingest.anemometer.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.midnight import parse_as, parse_with_bare_dates
@@ -39,10 +40,6 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
-_OF_EXTREME = re.compile(
-    r"hora.*(?:max|min(?!u)|racha)|time(?:of|at)(?:max|min|gust|peak)|time(?:max|gust|peak)|(?:max|gust|peak).*time"
-)
-"""Headings of the times at which extremes of other quantities came."""
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
 """A date whose numbers are divided by blanks, and a clock."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
@@ -56,7 +53,8 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
         order: of dates written with numbers only, as the user says.
     """
     best: TimeChoice | None = None
-    choices = list(_choices(layout, order))
+    extremes = {index for index, name in enumerate(layout.names) if of_extreme(name)}
+    choices = [choice for choice in _choices(layout, order) if not extremes & set(choice.columns)]
     choices = [
         replace(choice, score=choice.score - 2.0 * (1.0 - _filled(layout, choice)))
         for choice in _without_false_epochs(layout, choices)
@@ -120,11 +118,11 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
               and share(_HALF, texts)}  # fmt: skip
     for index, cells in enumerate(columns):
         texts = [cell for cell in cells if cell]
-        if not texts:
+        if not texts or of_extreme(layout.names[index]):
             continue
         if share(_DATE, texts):
             dates.append(index)
-        elif dateparts.hour_alone(layout, columns, index) or _OF_EXTREME.search("".join(words_of(layout.names[index]))):
+        elif dateparts.hour_alone(layout, columns, index):
             continue
         elif share(_CLOCK, texts) or (set(words_of(layout.names[index])[:1]) & _CLOCK_NAMES
                                        and share(re.compile(r"^\d{1,6}$"), texts)):  # fmt: skip
@@ -145,6 +143,8 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
                 yield found
     days = [] if clocks else list(_days(layout, columns, dates, order))
     yield from days
+    if not dates and not clocks:
+        yield from months.choices(layout, columns)
     yield from dateparts.choices(layout, columns, dates=dates, order=order)
     if not dates:
         yield from yearless_columns.choices(layout, columns, clocks, order)

@@ -484,3 +484,12 @@ def test_sixteenths_are_an_eighth_of_pi_each(log_file: Write) -> None:
     line = "time,wind_speed[m/s],wind_direction[sixteenths]"
     channels = read_log(path, WindOptions(columns=line)).series.channels
     np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 22.5 * np.arange(16))
+
+
+@pytest.mark.parametrize(("constant", "doubted"), [("4", True), ("30", True), ("0", False), ("270", False)])
+def test_a_small_direction_that_never_changes_is_doubted(log_file: Write, constant: str, doubted: bool) -> None:
+    """A vane that counts sixteenths may stand still for as long as a file lasts; 0 is the north in all units."""
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{constant}\n" for at in range(16))
+    log = read_log(log_file(f"time,Wind speed (m/s),Wind direction\n{rows}"))
+    assert np.rad2deg(log.series.channels["wind_direction"][0]) == pytest.approx(float(constant))
+    assert any("sixteenth of the compass" in finding.what for finding in log.findings) is doubted
