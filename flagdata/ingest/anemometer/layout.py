@@ -41,9 +41,13 @@ _UNITS_OF_OTHERS = frozenset(
     {
         "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
         "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
+        "degrees_north", "degrees_east", "degree_north", "degree_east", "degree_celsius", "celsius", "psu", "ph_t",
     }
 )  # fmt: skip
-"""What stands in a line of units below times, counts and quantities that are not read."""
+"""What stands in a line of units below times, counts and quantities that are not read; some are of UDUNITS."""
+_ONE = r"(?:[umnkcµμ]?(?:mol|m|g|l|w|j|s|pa)|h|d|k|sr|deg|degc)"
+_COMPOUND = re.compile(rf"{_ONE}(?:(?:[. ]{_ONE}\^?-[123])+|/{_ONE}[23]?)")
+"""Units of two parts that are not read, as mg.m-3, umol kg-1 or mg/L."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
 
@@ -237,7 +241,8 @@ def cell_kind(cell: str) -> CellKind:
 def is_unit(text: str) -> bool:
     """Whether a cell of a line of units spells one; brackets are looked through."""
     bare = text.strip().strip("[]()<>").strip()
-    return bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
+    known = bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
+    return known or _COMPOUND.fullmatch(bare.lower()) is not None
 
 
 def _unit_behind(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError
@@ -178,3 +179,13 @@ def test_tabs_divide_cells_with_decimal_commas_behind_a_stamp_too(read: Read) ->
     assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([3.5, 4.5])
     log = read("".join(row.rpartition("\t")[0] + "\n" for row in rows.splitlines()), columns="time,wind_speed[m/s]")
     assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([3.5, 4.5])
+
+
+def test_a_line_of_units_of_which_few_are_of_a_wind_is_one(log_file: Write) -> None:
+    """As data servers write them: CF's units of places, and quantities that are not read."""
+    heads = "time,latitude,longitude,wspd,wspd_qc,wdir,chl,ph_total\n"
+    units = "UTC,degrees_north,degrees_east,km h-1,,degrees_true,mg.m-3,pH_T\n"
+    rows = "".join(f"2020-05-01T00:{at:02d}:00Z,51.2,2.9,{18 + at},1,{200 + at},1.2,8.01\n" for at in range(12))
+    channels = read_log(log_file(heads + units + rows)).series.channels
+    np.testing.assert_allclose(channels["wind_speed"], (18 + np.arange(12)) / 3.6)
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 200 + np.arange(12))
