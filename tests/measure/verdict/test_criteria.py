@@ -17,7 +17,7 @@ ROOMS = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "clos
 METHOD = {
     "forecasting/alignment": {"_CALM"},
     "forecasting/calibration": {"_DENSITY", "_BENDING", "_DAMPING", "PRIOR", "PRIOR_WITHOUT_MASS"},
-    "forecasting/observer": {"WIDEST"},
+    "forecasting/observer": {"WIDEST", "_JOINT"},
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
     "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
     "probes/course": {"ALONG", "LEFT", "_WINDOW"},
