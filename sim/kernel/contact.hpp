@@ -21,6 +21,14 @@
 #include <immintrin.h>
 #endif
 
+// Bytes of the processor's vector registers. A block of members, and a group of points that a search looks at, are as
+// wide: a vector that is wider is kept in memory, and a member then takes three times as long.
+#ifdef __AVX512F__
+constexpr int REGISTER = 64;
+#else
+constexpr int REGISTER = 32;
+#endif
+
 namespace contact {
 
 template <typename T>
@@ -81,8 +89,8 @@ inline T closest(Point<T> p, Point<T> a, Point<T> b, Point<T> c, T w[3]) {
 // The candidates of one lane.
 template <typename T>
 class Search {
-  static constexpr int W = 64 / sizeof(T);
-  typedef T Wide __attribute__((vector_size(64)));
+  static constexpr int W = REGISTER / sizeof(T);
+  typedef T Wide __attribute__((vector_size(REGISTER)));
   using Mask = decltype(Wide{} < Wide{});
   using Flag = std::conditional_t<sizeof(T) == 4, int32_t, int64_t>;
 

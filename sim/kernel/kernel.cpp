@@ -79,15 +79,7 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
     implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations, steps);                                   \
   }
 
-// A block is as wide as the processor's registers: one that is twice as wide is kept in memory, and takes three times as
-// long a member on a processor with AVX2.
-#ifdef __AVX512F__
-#define SINGLES 16
-#define DOUBLES 8
-#else
-#define SINGLES 8
-#define DOUBLES 4
-#endif
+constexpr int SINGLES = REGISTER / sizeof(float), DOUBLES = REGISTER / sizeof(double);
 
 extern "C" {
 FOR(float, SINGLES, f32)
