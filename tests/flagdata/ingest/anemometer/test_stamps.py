@@ -86,7 +86,7 @@ def test_what_is_no_date_is_not_valid(text: str) -> None:
     assert parse([text], "iso").valid.tolist() == [False]
 
 
-@pytest.mark.parametrize("form", ["%Y-%m", "%Y-%m-%d %M", "%H:%M", "%K", "%Y-%m-%d %H:%M %Y", "%"])
+@pytest.mark.parametrize("form", ["%Y-%m %H:%M", "%Y", "%Y-%m-%d %M", "%H:%M", "%K", "%Y-%m-%d %H:%M %Y", "%"])
 def test_a_format_without_a_whole_instant_is_refused(form: str) -> None:
     with pytest.raises(UsageError):
         parse(["2026-05-01"], form)
