@@ -110,6 +110,20 @@ struct Wide<int64_t> {
   typedef longs type;
 };
 
+// The samples of a row, counted from a triangle's first, at which all edge functions clipped by are at least 0.
+struct Row {
+  int64_t first, last;
+  void clip(int64_t start, int64_t across) {
+    if (across > 0) {
+      if (start < 0) first = std::max(first, (-start + across - 1) / across);
+    } else if (start < 0) {
+      last = -1;
+    } else if (across < 0) {
+      last = std::min(last, start / -across);
+    }
+  }
+};
+
 // Calls visit(first pixel of 8, mask, shares of b, shares of c) for all samples of a triangle, row by row.
 template <typename I, typename Visit>
 void scan(const Steps& s, const Triangle& t, int64_t stride, Visit&& visit) {
@@ -121,9 +135,17 @@ void scan(const Steps& s, const Triangle& t, int64_t stride, Visit&& visit) {
   wide e0 = ab.start + lane * ab.across, e1 = bc.start + lane * bc.across, e2 = ca.start + lane * ca.across;
   for (int64_t y = t.top; y <= t.bottom; ++y) {
     wide f0 = e0, f1 = e1, f2 = e2;
-    for (int64_t x = t.left; x <= t.right; x += LANES) {
+    int64_t x = t.left, right = t.right;
+    if constexpr (sizeof(I) == 8) {  // a pole's triangles are long and thin: most of their bounding box is not theirs
+      Row row{0, right - x};
+      row.clip(e0[0], ab.across), row.clip(e1[0], bc.across), row.clip(e2[0], ca.across);
+      const int64_t skipped = row.first;
+      right = x + row.last, x += skipped;
+      f0 += skipped * ab.across, f1 += skipped * bc.across, f2 += skipped * ca.across;
+    }
+    for (; x <= right; x += LANES) {
       const wide inside = (f0 | f1 | f2) >= 0;
-      const ints mask = __builtin_convertvector(inside, ints) & (__builtin_convertvector(lane, ints) <= int32_t(t.right - x));
+      const ints mask = __builtin_convertvector(inside, ints) & (__builtin_convertvector(lane, ints) <= int32_t(right - x));
       visit(y * stride + x, mask, __builtin_convertvector(f2, floats) * scale, __builtin_convertvector(f0, floats) * scale);
       f0 += I(LANES) * ab.across, f1 += I(LANES) * bc.across, f2 += I(LANES) * ca.across;
     }
