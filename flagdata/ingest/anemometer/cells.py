@@ -17,6 +17,8 @@ from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 
 _NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?$"
 _INFINITE = r"^[+-]?(inf|infinity|1\.#inf0*)$"
+BELOW = r"^<\s*=?\s*(\d+\.?\d*|\.\d+)$"
+"""A number that the instrument could only say to be smaller than another: "<0.3"."""
 
 
 class Cell(IntEnum):
@@ -27,6 +29,7 @@ class Cell(IntEnum):
     UNREADABLE = 2
     INFINITE = 3
     CALM = 4
+    BELOW = 5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,12 +37,14 @@ class Numbers:
     """A column.
 
     Attributes:
-        value: (n,) float64, NaN unless `state` is NUMBER, or CALM with 0.
+        value: (n,) float64, NaN unless `state` is NUMBER, or CALM or BELOW with 0.
         state: (n,) uint8 of `Cell`.
+        limit: the largest number that a value was said to be below; 0 where none was.
     """
 
     value: NDArray[np.float64]
     state: NDArray[np.uint8]
+    limit: float = 0.0
 
 
 def numbers(
@@ -49,6 +54,7 @@ def numbers(
     missing: Sequence[str] = (),
     suffix: str = "",
     zeros: Collection[str] = (),
+    below: bool = False,
 ) -> Numbers:
     """Read a column of cells.
 
@@ -57,6 +63,7 @@ def numbers(
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
         suffix: what stands behind each number, such as its unit; a number without it is unreadable.
         zeros: words that stand for 0, lower-case; those of `missing` go before them.
+        below: whether "<0.3" is a value below the instrument's threshold, 0 within 0.3; else it is unreadable.
     """
     text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
     if suffix:
@@ -65,7 +72,7 @@ def numbers(
     if decimal == ",":
         pointed = pc.match_substring(text, ".")
         text = pc.if_else(pointed, "?", pc.replace_substring(text, ",", "."))
-    state = np.zeros(len(text), dtype=np.uint8)
+    state, limit = np.zeros(len(text), dtype=np.uint8), 0.0
     try:
         parsed = pc.cast(text, pa.float64())
     except pa.ArrowInvalid:
@@ -76,6 +83,11 @@ def numbers(
         state[~_mask(readable)] = Cell.UNREADABLE
         if zeros:
             state[_mask(pc.is_in(lower, pa.array(sorted(zeros), pa.string())))] = Cell.CALM
+        if below:
+            smaller = pc.match_substring_regex(text, BELOW)
+            state[_mask(smaller)] = Cell.BELOW
+            limits = pc.cast(pc.replace_substring_regex(text.filter(smaller), BELOW, r"\1"), pa.float64())
+            limit = float(pc.max(limits).as_py() or 0.0)
         state[_mask(pc.or_(absent, pc.match_substring_regex(written, MISSING_SIGNS)))] = Cell.MISSING
         state[_mask(endless)] = Cell.INFINITE
         parsed = pc.cast(pc.if_else(readable, text, None), pa.float64())
@@ -85,8 +97,8 @@ def numbers(
     for code in _numeric(missing):
         state[(value == code) & (state == Cell.NUMBER)] = Cell.MISSING
     value[state != Cell.NUMBER] = np.nan
-    value[state == Cell.CALM] = 0.0
-    return Numbers(value=value, state=state)
+    value[(state == Cell.CALM) | (state == Cell.BELOW)] = 0.0
+    return Numbers(value=value, state=state, limit=limit)
 
 
 def _without(text: pa.StringArray, suffix: str) -> pa.StringArray:

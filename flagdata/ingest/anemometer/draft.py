@@ -16,7 +16,9 @@ import numpy as np
 
 from flagdata.ingest.anemometer import (
     counted,
+    cumulated,
     missing_codes,
+    own_motion,
     quality_columns,
     site_labels,
     stated_columns,
@@ -290,6 +292,8 @@ def _doubts(
         fix = f"if it is the wind, name it: --wind {in_shell(unsure[0])}"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
+        own = next((told for wind in winds if (told := own_motion.doubt(layout, wind))), "")
+        what += f"; {own}" if own else ""
         found.append(Doubt(what=what, fix=fix))
     return found
 
@@ -353,6 +357,10 @@ def _unit_doubt(
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
         return Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, column))
     value = numbers(layout.column(column), decimal=layout.decimal).value
+    if missing[0] == "wind_speed" and cumulated.grows(value):
+        what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {cumulated.WHAT}"
+        fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"
+        return Doubt(what=what, fix=fix)
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]
     if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):

@@ -402,12 +402,20 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
             return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
         if windy and len(known - WIND - _MEAN - _PLAIN) == 0:
             return "wind_speed", True, known & WIND
+        if _of_a_cup(words):
+            return "wind_speed", True, {"cup"}
     if si in (None, "rad") and known & {"awa", "twa", "awd"}:
         word = next(iter(sorted(known & {"awa", "twa", "awd"})))
         return _ABBREVIATED[word], True, {word}
     if si == "m/s" and not known & _OTHER:
         return "wind_speed", False, set()
     return _weather(words, compact, si, windy)
+
+
+def _of_a_cup(words: list[str]) -> bool:
+    """Whether a heading names a cup anemometer, and beside it its height, side or statistic alone ("Cup116m_Mean")."""
+    known = {word for word in words if len(word) > 2 and not word.isdigit()}
+    return "cup" in known and known <= {"cup", *_MEAN, *_SPREAD, *_PLAIN, "north", "east", "south", "west"}
 
 
 def _misstated(known: set[str], unit: str | None) -> str:

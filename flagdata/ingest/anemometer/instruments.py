@@ -122,7 +122,7 @@ def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
         if index in time or not heading.quantity or _day_of_month(layout, index):
             continue
         calm = compass.STILL if heading.quantity.endswith("wind_speed") else ()
-        parsed = numbers(layout.column(index), decimal=layout.decimal, zeros=calm)
+        parsed = numbers(layout.column(index), decimal=layout.decimal, zeros=calm, below=bool(calm))
         points = compass_unit(layout, index) if may_be_points(heading) else None
         if points is not None:
             found.values[index] = degrees(layout, index, points)

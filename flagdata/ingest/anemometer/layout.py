@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flagdata.compass import CALM
+from flagdata.ingest.anemometer.cells import BELOW
 from flagdata.ingest.anemometer.headings import names_time
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.rows import blank_cells
@@ -231,7 +232,7 @@ def cell_kind(cell: str) -> CellKind:
     text = cell.strip().strip('"').strip()
     if text.lower() in _MISSING or re.match(MISSING_SIGNS, text):
         return "missing"
-    if _NUMBER.fullmatch(text) or _unit_behind(text):
+    if _NUMBER.fullmatch(text) or _unit_behind(text) or re.match(BELOW, text.replace(",", ".")):
         return "number"
     if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text):
         return "stamp"

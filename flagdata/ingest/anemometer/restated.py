@@ -1,7 +1,8 @@
 """Text that is no table, but says the same in every line, stated again as a table that every format reads.
 
 Each kind is a module with `matches(lines)`, which looks at the first lines, and `as_table(source)`, which makes the
-table or returns `None` where the file is of another kind after all. The first that matches is taken.
+table or returns `None` where the file is of another kind after all. The first of `KINDS` that matches is taken. Those
+of `WITHIN` come before and change cells within their lines, each what the one before it left.
 """
 
 from __future__ import annotations
@@ -16,12 +17,18 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
+WITHIN = (
+    "flagdata.ingest.anemometer.clock_words",
+    "flagdata.ingest.anemometer.twice_told",
+)
 KINDS = (
     "flagdata.ingest.anemometer.expedition",
     "flagdata.ingest.anemometer.metar",
     "flagdata.ingest.anemometer.synop",
     "flagdata.ingest.anemometer.global_hourly",
     "flagdata.ingest.anemometer.published",
+    "flagdata.ingest.anemometer.pywws",
+    "flagdata.ingest.anemometer.hours_across",
     "flagdata.ingest.anemometer.station_lines",
     "flagdata.ingest.anemometer.aprs",
     "flagdata.ingest.anemometer.ft",
@@ -45,7 +52,7 @@ LOOKED_AT = 60
 
 
 class Kind(Protocol):
-    """What each module of `KINDS` offers."""
+    """What each module of `WITHIN` and `KINDS` offers."""
 
     def matches(self, lines: Sequence[str]) -> bool:
         """Whether the first lines look like this kind."""
@@ -62,6 +69,10 @@ def restate(source: TextFile, recipe: Recipe | None = None) -> TextFile:
     Args:
         recipe: that the user names; one whose columns are not those of the table describes the lines as they are.
     """
+    for name in WITHIN:
+        cells: Kind = import_module(name)  # type: ignore[assignment]
+        if cells.matches(source.head(LOOKED_AT)):
+            source = cells.as_table(source) or source
     lines = source.head(LOOKED_AT)
     for name in KINDS:
         kind: Kind = import_module(name)  # type: ignore[assignment]

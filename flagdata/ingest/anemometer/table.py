@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import calm, codes, possible, unitcheck, zones
+from flagdata.ingest.anemometer import below, calm, codes, cumulated, possible, unitcheck, zones
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.columns import Columns
 from flagdata.ingest.anemometer.growing import Growing
@@ -64,6 +64,7 @@ class _Column:
     points: Mapping[str, float] | None = None
     calm: Collection[str] = ()
     absent: Sequence[str] = ()
+    limit: float = 0.0
     values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
@@ -142,8 +143,9 @@ class _Gathered:
             cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
             parsed = numbers(
                 cells, decimal=recipe.file.decimal, missing=(*recipe.file.missing, *column.absent),
-                suffix=column.suffix, zeros=column.calm,
+                suffix=column.suffix, zeros=column.calm, below=bool(column.calm),
             )  # fmt: skip
+            column.limit = max(column.limit, parsed.limit)
             column.values.add(parsed.value[keep])
             column.states.add(parsed.state[keep])
         for check in self.checks:
@@ -235,6 +237,7 @@ def read_table(
     flags = np.zeros(len(line), dtype=np.uint16)
     states = {name: column.state(order) for name, column in gathered.channels.items()}
     still = calm.rows(states)
+    sensor = recipe.sensor
     for name, column in gathered.channels.items():
         layout, state = recipe.channels[name], states.pop(name)
         unreadable = int((state == Cell.UNREADABLE).sum())
@@ -251,10 +254,15 @@ def read_table(
             state = np.where(coded, np.uint8(Cell.MISSING), state)
             cells = np.where(coded, np.nan, cells)
         value = in_si(cells, layout)
+        if column.limit:
+            limit = float(in_si(np.array([column.limit]), layout)[0])
+            findings.append(below.report(name, state == Cell.BELOW, limit, line))
+            sensor = below.known(sensor, limit)
         if name in DOUBTED:
             span = float(time.max() - time.min()) / NANOSECONDS
             doubt = unitcheck.contradiction(cells * layout.gain, layout.unit, span=span, channel=name)
             findings.extend([doubt] if doubt is not None else [])
+            findings.extend(cumulated.report(name, cells, line))
         channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
         if away:
@@ -269,7 +277,7 @@ def read_table(
         flags[fault] |= SampleFlag.SENSOR_FAULT
         findings.extend(found)
     reading = Reading(
-        time=time, channels=channels, flags=flags, line=line, sensor=recipe.sensor, step=gathered.clock.step,
+        time=time, channels=channels, flags=flags, line=line, sensor=sensor, step=gathered.clock.step,
         rules=recipe.quality, host_time=host_time, findings=tuple(findings),
     )  # fmt: skip
     return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})

@@ -3,6 +3,7 @@
 2026 5 1 12 30        year, month, day, hour and minute; or the hour and minute in one number, 1230
 2026 121 1230         year, day of the year and a clock of one number
 20260501 1230         a date of eight digits and a clock of one number, perhaps twice: in UTC and local
+20260501 13           a date of eight digits and an hour, in a log of a row an hour
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ def choice(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     """
     if any(layout.names):
         return None
-    return _parts(layout, columns) or _ordinal(layout, columns) or _compact(layout, columns)
+    kinds = (_parts, _ordinal, _compact, _dated_hours)
+    return next((found for kind in kinds if (found := kind(layout, columns)) is not None), None)
 
 
 def _compact(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
@@ -65,6 +67,16 @@ def _compact(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | N
     index, stamps = found[0]
     time = time_choice(layout, (index, index + 1), "%Y%m%d %H%M", stamps, 2.2)
     return replace(time, unnamed=True, zone_advice=_other_zone(found))
+
+
+def _dated_hours(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """A date of eight digits and the number of the hour beside it, in a log of a row an hour."""
+    for index, (dates, hours) in enumerate(itertools.pairwise(columns)):
+        if not share(_EIGHT, dates) or not whole_numbers(hours, 0, 24) or not _hourly((dates, hours), "%Y%m%d %H"):
+            continue
+        found, _ = parse_with_bare_dates([" ".join(row) for row in zip(dates, hours, strict=True)], "%Y%m%d %H")
+        return replace(time_choice(layout, (index, index + 1), "%Y%m%d %H", found, 2.2), unnamed=True)
+    return None
 
 
 def _other_zone(found: Sequence[tuple[int, Stamps]]) -> str:
@@ -145,9 +157,9 @@ def _ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | N
     return None
 
 
-def _hourly(parts: Sequence[Sequence[str]]) -> bool:
-    """Whether year, month, day and hour in columns that nothing names are those of a log of a row an hour."""
-    found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], "%Y %m %d %H")
+def _hourly(parts: Sequence[Sequence[str]], form: str = "%Y %m %d %H") -> bool:
+    """Whether a date and an hour in columns that nothing names are those of a log of a row an hour."""
+    found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], form)
     steps = np.diff(found.ns)
     return len(steps) >= 24 and bool(found.valid.all()) and float((steps == 3600 * NANOSECONDS).mean()) >= SHARE
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from flagdata.ingest.anemometer.headings import understand
@@ -26,6 +27,16 @@ def test_hyphens_in_a_clock_are_no_offset(read: Read, stamp: str, options: dict[
     log = read(f"time,wind speed (m/s),wind dir\n{rows}", zone="UTC", **options)
     assert [iso(int(log.series.time[at])) for at in (0, 59)] == ["2026-05-01T12:00:00Z", "2026-05-01T12:59:00Z"]
     assert log.series.channels["wind_speed"][[0, 59]].tolist() == [3, 62]
+
+
+@pytest.mark.parametrize(
+    "day", ["20260501-1200", "20260501_1200", "20260501 1200", "2026-05-01 12.00.", "2026.05.01 12:00:"]
+)
+def test_milliseconds_behind_a_clock_without_colons_are_kept(read: Read, day: str) -> None:
+    rows = "".join(f"{day}{at // 10:02d}.{at % 10}25,{3 + at % 7}\n" for at in range(60))
+    log = read(f"time,wind speed (m/s)\n{rows}", zone="UTC")
+    assert iso(int(log.series.time[0])) == "2026-05-01T12:00:00.025Z"
+    assert set(np.diff(log.series.time)) == {100_000_000}
 
 
 def test_whole_hours_with_hyphens_are_no_offset_either(read: Read) -> None:

@@ -122,3 +122,19 @@ def test_small_hours_and_minutes_in_one_number_are_minutes(log_file: Write, head
     rows = "".join(f"2026,5,1,{10 * at},{2 + at / 10:.1f}\n" for at in range(3))
     log = read_log(log_file(f"year,month,day,{heading},wind (m/s)\n{rows}"), WindOptions(zone="UTC"))
     assert [iso(int(at))[11:16] for at in log.series.time] == ["00:00", "00:10", "00:20"]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_date_of_eight_digits_and_the_hour_beside_it_are_offered_in_an_hourly_log(
+    log_file: Write, first: int
+) -> None:
+    hours = range(first, first + 24)
+    rows = (f"260,2026050{day},{hour:5d},{10 * hour + day:4d}\n" for day in range(1, 4) for hour in hours)
+    path = log_file("".join(rows))
+    offered = _offer(path)
+    assert offered.split(",")[1:3] == ["date", "hour"]
+    log = read_log(path, WindOptions(columns=",date,hour,wind_speed[0.1 m/s]", zone="UTC"))
+    assert iso(int(log.series.time[0])) == f"2026-05-01T0{first}:00:00Z"
+    assert iso(int(log.series.time[-1])) == ("2026-05-03T23:00:00Z" if first == 0 else "2026-05-04T00:00:00Z")
+    assert set(np.diff(log.series.time)) == {3_600_000_000_000}
+    assert ("heading-doubtful" in {finding.kind for finding in log.findings}) == (first == 1)
