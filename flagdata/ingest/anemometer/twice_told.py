@@ -14,10 +14,10 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 _POINT = r"(?P<point{0}>[^\W\d_](?:[^\W\d_]|[ -](?=[^\W\d_])){{0,15}})"
-_ANGLE = r"(?P<angle{0}>\d{{1,3}}(?:\.\d+)?)\s*(?:°|º|deg)?"
+_ANGLE = r"(?P<angle{0}>\d{{1,3}}(?:\.\d+)?) ?(?:°|º|deg)?"
 _CELL = re.compile(
-    rf"(?:^|(?<=[,;\t|\"]))\s*(?:{_POINT.format(1)}\s*[(\[]?\s*{_ANGLE.format(1)}\s*[)\]]?"
-    rf"|{_ANGLE.format(2)}\s*[(\[]?\s*{_POINT.format(2)}\s*[)\]]?)\s*(?=$|[,;\t|\"])"
+    rf"(?:^|(?<=[,;\t|\"])) {{0,3}}(?:{_POINT.format(1)} {{0,3}}[(\[]? ?{_ANGLE.format(1)} ?[)\]]?"
+    rf"|{_ANGLE.format(2)} ?[(\[]? ?{_POINT.format(2)} ?[)\]]?) {{0,3}}(?=$|[,;\t|\"])"
 )
 _NEAR = 22.5 + 1
 _SHARE = 0.9
