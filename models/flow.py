@@ -2,9 +2,9 @@
 
 The power of a derivative's spectrum (`models.frontend`) mixes how a flag moves with what is printed on it. Optical flow
 is the motion alone: from each frame to the next, the displacement that explains a small window's change best in the
-least-squares sense (Lucas and Kanade 1981, equation 9), on two scales, since a window of a fine picture does not follow
-fast motion and one of a coarse picture blurs slow motion. Of the displacements' course in time each place keeps its
-statistics.
+least-squares sense (Lucas and Kanade 1981, equation 9), on two scales or three, since a window of a fine picture does not
+follow fast motion and one of a coarse picture blurs slow motion. Of the displacements' course in time each place keeps
+its statistics.
 """
 
 from __future__ import annotations
@@ -23,15 +23,26 @@ _OF_SCALE = (
     *(f"band {low:g}-{high:g} log power {axis}" for low, high in BANDS for axis in "xy"),
     "phase gradient along x", "coherence along x", "phase gradient along y", "coherence along y", "log slope",
 )  # fmt: skip
-CHANNELS = (
-    *(f"{scale}: {name}" for scale in ("fine", "coarse") for name in _OF_SCALE),
-    "mean picture", "log of its slope", "log standard deviation in time",
-)  # fmt: skip
-"""Names of the maps, in order. Flow is in pixels of its scale a frame: fine is half the clip's size, coarse a quarter;
-powers P are log(1 + P/0.02²); centres and widths of spectra are shares of the Nyquist frequency, phase gradients
-radians a place."""
-POOL = 4
-"""The maps have the clip's height and width over this."""
+_SCALES = ("finest", "fine", "coarse")
+
+
+def channels(scales: int) -> tuple[str, ...]:
+    """Names of the maps on so many scales, in order.
+
+    Flow is in pixels of its scale a frame: the first scale is half the clip's size, the next half of that; powers P are
+    log(1 + P/0.02²); centres and widths of spectra are shares of the Nyquist frequency, phase gradients radians a place.
+
+    Args:
+        scales: 2 or 3.
+    """
+    found = tuple(f"{scale}: {name}" for scale in _SCALES[-scales:] for name in _OF_SCALE)
+    return (*found, "mean picture", "log of its slope", "log standard deviation in time")
+
+
+CHANNELS = channels(2)
+"""Of clips of 112 px."""
+CHANNELS_OF_THREE = channels(3)
+"""Of clips of 224 px, on whose two coarser scales the maps are those of `CHANNELS`."""
 WINDOW = 5
 """Height and width [px] of the windows whose motion is told; they overlap."""
 RIDGE = 1e-3
@@ -44,17 +55,24 @@ _SHARE = 1e-4  # that keeps quotients of nothing by nothing finite
 _TINY = 1e-6
 
 
-def flow_maps(frames: Tensor) -> Tensor:
-    """`CHANNELS` of a clip: (59, height/4, width/4) float32.
+def pool(scales: int) -> int:
+    """By what the maps are smaller than the clip, in height and in width."""
+    return 2**scales
+
+
+def flow_maps(frames: Tensor, *, scales: int = 2) -> Tensor:
+    """`channels(scales)` of a clip: (59 or 87, height/pool, width/pool) float32, pool as `pool(scales)`.
 
     Args:
         frames: (time, height, width) floating, standardised: of mean 0 and standard deviation 1; time at least 4,
-            height and width multiples of 4 and at least 12.
+            height and width multiples of the pool and at least three times as large.
+        scales: 2 or 3.
     """
-    fine = functional.avg_pool2d(frames, 2)
-    coarse = functional.avg_pool2d(fine, 2)
-    scales = [_statistics(*lucas_kanade(fine, stride=2)), _statistics(*lucas_kanade(coarse))]
-    return torch.cat([*scales, at_rest(coarse)])
+    found: list[Tensor] = []
+    for remaining in reversed(range(scales)):
+        frames = functional.avg_pool2d(frames, 2)
+        found.append(_statistics(*lucas_kanade(frames, stride=2**remaining)))
+    return torch.cat([*found, at_rest(frames)])
 
 
 def lucas_kanade(frames: Tensor, *, stride: int = 1) -> tuple[Tensor, Tensor]:

@@ -1,14 +1,14 @@
 """Our own network: maps of optical flow to a summary of 32 numbers that a distribution over the parameters rests on.
 
-It sees how fast, in which rhythm and which way the picture moves at each place, on two scales, and what the clip looks
-like at rest (`models.flow`).
+It sees how fast, in which rhythm and which way the picture moves at each place, on two scales or three, and what the clip
+looks like at rest (`models.flow`).
 """
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from models.flow import CHANNELS
+from models.flow import CHANNELS, CHANNELS_OF_THREE
 from models.maps_network import MapsNetwork
 
 
@@ -18,3 +18,10 @@ class FlowNetwork(MapsNetwork):
     takes: ClassVar[str] = "flow-maps"
     known: ClassVar[tuple[str, ...]] = CHANNELS
     reduces: ClassVar[tuple[int, ...]] = (1, 2, 2)
+
+
+class ThreeScaleFlowNetwork(FlowNetwork):
+    """Maps (batch, 87, H, W) to a summary (batch, dimension), see `MapsNetwork`."""
+
+    takes: ClassVar[str] = "flow-maps-3"
+    known: ClassVar[tuple[str, ...]] = CHANNELS_OF_THREE

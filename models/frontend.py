@@ -13,7 +13,7 @@ From the same spectra come two kinds of maps, and a third of the clip's optical 
 - *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.wave` takes: two peaks, power by band, the spectrum's centre and
   width, the gradient of the phase at the strongest frequency with its coherence (a travelling wave's wave number), and
   what the clip looks like at rest;
-- *flow maps* (`models.flow.CHANNELS`, H/4, W/4), what `models.flow_network` takes.
+- *flow maps* (`models.flow.channels`; on two scales, H/4, W/4, or on three, H/8, W/8), what `models.flow_network` takes.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ from models.course import at_rest, band_powers, centre_and_width, fourier_rows, 
 from models.filters import pooled_derivatives, smoothing_matrix
 from models.handmade import FEATURES, features
 
-Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps", "flow-maps", "handmade"]
-"""What a front end gives: standardised frames, one of the three kinds of maps, or the page of hand-made features."""
+Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3", "handmade"]
+"""What a front end gives: standardised frames, one of the kinds of maps, or the page of hand-made features."""
+_FLOW_SCALES = {"flow-maps": 2, "flow-maps-3": 3}
 
 BANDS = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.32), (0.32, 0.52), (0.52, 1.0))
 """Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins in (low, high]."""
@@ -63,7 +64,7 @@ class FrontEnd:
 
     Attributes:
         maps: what it gives.
-        size: height and width of the clips it takes [px]; a whole multiple of 4.
+        size: height and width of the clips it takes [px]; a whole multiple of 4, of 8 for flow on three scales.
         frames: their length.
         rate: their frames a second [Hz].
         temporal_sigma: of the Gaussian in time [frames].
@@ -81,9 +82,10 @@ class FrontEnd:
     spatial_sigma: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.frames < 4 or self.size < 4 or self.size % 4:
+        least = flow.pool(_FLOW_SCALES.get(self.maps, 2))
+        if self.frames < 4 or self.size < least or self.size % least:
             raise InputError(
-                f"{self.frames} frames of {self.size} px", fix="give 4 frames or more, and a multiple of 4 px"
+                f"{self.frames} frames of {self.size} px", fix=f"give 4 frames or more, and a multiple of {least} px"
             )
         if not min(self.rate, self.temporal_sigma, self.spatial_sigma) > 0:
             raise InputError(
@@ -100,8 +102,10 @@ class FrontEnd:
             return (4, self.size // 2, self.size // 2)
         if self.maps == "handmade":
             return (len(FEATURES),)
-        channels = flow.CHANNELS if self.maps == "flow-maps" else WAVE_CHANNELS
-        return (len(channels), self.size // 4, self.size // 4)
+        scales = _FLOW_SCALES.get(self.maps)
+        if scales is None:
+            return (len(WAVE_CHANNELS), self.size // 4, self.size // 4)
+        return (len(flow.channels(scales)), self.size // flow.pool(scales), self.size // flow.pool(scales))
 
     @property
     def hash(self) -> str:
@@ -132,8 +136,8 @@ class FrontEnd:
             return frames.unsqueeze(0)
         if self.maps == "handmade":
             return features(frames[None, None], rate=self.rate)[0]
-        if self.maps == "flow-maps":
-            return flow.flow_maps(frames)
+        if self.maps in _FLOW_SCALES:
+            return flow.flow_maps(frames, scales=_FLOW_SCALES[self.maps])
         smooth = self._temporal.to(frames)
         pooled = pooled_derivatives((smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma)
         real, imaginary = fourier_rows(self.frames).to(frames)

@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 
 from torch import Tensor
 
-INPUTS = ("frames", "spectral-maps", "wave-maps", "flow-maps")
+INPUTS = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
 @runtime_checkable

@@ -11,6 +11,7 @@ NETWORKS = Registry(
         "resnet18": "models.baselines:ResNetOfFrames",
         "wave": "models.wave:WaveNetwork",
         "flow": "models.flow_network:FlowNetwork",
+        "flow-3": "models.flow_network:ThreeScaleFlowNetwork",
         "cardona": "models.baselines:Cardona",
         "yang": "models.baselines:Yang",
     },

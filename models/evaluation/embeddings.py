@@ -57,7 +57,7 @@ def triplet_accuracies(
 
 def takes_any_length(estimator: Estimator) -> bool:
     """Whether a network can be given clips of other lengths than those it learned from, and has an embedding."""
-    return estimator.front_end.maps in ("spectral-maps", "wave-maps", "flow-maps")
+    return estimator.front_end.maps in ("spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
 def readouts(

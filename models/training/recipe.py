@@ -3,8 +3,8 @@
 title, seed
 [data]       dataset: a data set's name, or a list of them, whose sides are told by names; sequences: of the training
              side, all by default
-[input]      maps: "frames", "spectral-maps", "wave-maps" or "flow-maps"; size [px], frames; scales, mirror: of crops;
-             variants: crops of each film that are prepared
+[input]      maps: "frames", "spectral-maps", "wave-maps", "flow-maps" or "flow-maps-3"; size [px], frames; scales,
+             mirror: of crops; variants: crops of each film that are prepared
 [network]    name: of `models.registry.NETWORKS`; its other keys are the network's own
 [loss]       name: "regression", "posterior" or "contrastive"; targets: of `models.targets`; components, margin
 [optimiser]  rate, decay, batch, epochs; schedule: "steps" or "cosine"; drop-after: epochs; clip-norm; precision:
@@ -36,7 +36,7 @@ from models.targets import TARGETS
 TRAININGS = Shelf(folder="training", noun="training recipe")
 RECIPE_VERSION = 1
 """Raised whenever the same recipe and data give other weights."""
-_MAPS: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps")
+_MAPS: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
 class Schedule(StrEnum):

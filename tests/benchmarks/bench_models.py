@@ -31,7 +31,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     generator = torch.Generator().manual_seed(seed)
     clip = (torch.rand((1, 1, 30, 224, 224), generator=generator) * 255).to(torch.uint8)
-    kinds: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "handmade")
+    kinds: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3", "handmade")
     ends = {maps: _milliseconds(lambda maps=maps: FrontEnd(maps=maps)(clip)) for maps in kinds}
     model = estimator.shipped()
     film = (torch.rand((1, 30, 300, 300), generator=generator) * 255).to(torch.uint8).numpy()

@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from flagdata.errors import InputError
 from models import flow
-from models.flow import CHANNELS, flow_maps, lucas_kanade
+from models.flow import CHANNELS, CHANNELS_OF_THREE, flow_maps, lucas_kanade
 from models.flow_network import FlowNetwork
 from models.frontend import FrontEnd, standardised
 
@@ -103,6 +103,35 @@ def test_powers_are_those_of_the_displacement_in_each_scales_pixels() -> None:
         assert float(told(maps, f"{scale}: log power y").median()) == pytest.approx(expected, abs=0.2)
         assert float(told(maps, f"{scale}: log power x").median()) < expected - 3
         assert float(told(maps, f"{scale}: log variance y").median()) < expected - 2
+
+
+def test_the_two_coarser_of_three_scales_are_those_of_a_clip_of_half_the_size() -> None:
+    clip = torch.from_numpy(np.random.default_rng(5).standard_normal((6, 48, 64)))
+    three, two = flow_maps(clip, scales=3), flow_maps(torch.nn.functional.avg_pool2d(clip, 2))
+    assert three.shape == (len(CHANNELS_OF_THREE), 6, 8)
+    assert CHANNELS_OF_THREE[-len(CHANNELS) :] == CHANNELS
+    torch.testing.assert_close(three[-len(CHANNELS) :], two)
+
+
+def test_the_finest_scale_tells_motion_of_a_tenth_of_a_pixel_of_the_clip() -> None:
+    """A steady 0.1 px of the clip is 0.05 of the finest scale's."""
+    across = np.broadcast_to(0.1 * np.arange(FRAMES)[:, None, None], (FRAMES, SIZE, SIZE))
+    maps = flow_maps(warped(across, np.zeros_like(across), grain=6.0), scales=3)
+    told = maps[CHANNELS_OF_THREE.index("finest: mean x")][2:-2, 2:-2]
+    assert float(told.median()) == pytest.approx(0.05, rel=0.1)
+    power = maps[CHANNELS_OF_THREE.index("finest: log power x")][2:-2, 2:-2]
+    assert float(power.median()) == pytest.approx(math.log1p(0.05**2 / 0.02**2), abs=0.2)
+
+
+def test_the_front_end_gives_three_scales_of_clips_that_can_be_halved_thrice() -> None:
+    front_end = FrontEnd(maps="flow-maps-3", size=SIZE)
+    assert front_end.shape == (len(CHANNELS_OF_THREE), SIZE // 8, SIZE // 8)
+    assert front_end(torch.rand(1, 1, FRAMES, SIZE, SIZE)).shape == (1, *front_end.shape)
+    assert front_end.hash != FrontEnd(maps="flow-maps", size=SIZE).hash
+    with pytest.raises(InputError, match="100 px") as refused:
+        FrontEnd(maps="flow-maps-3", size=100)
+    assert "multiple of 8" in str(refused.value.fix)
+    assert FrontEnd(maps="flow-maps", size=100).shape[1:] == (25, 25)
 
 
 def test_the_front_end_gives_them_and_contrast_changes_nothing() -> None:

@@ -118,14 +118,14 @@ def test_a_travelling_wave_has_its_frequency_and_its_phase_gradient(across: floa
 
 def test_brightness_and_contrast_change_nothing() -> None:
     clip = noise(3)[None, None]
-    for maps in ("spectral-maps", "wave-maps", "flow-maps"):
+    for maps in ("spectral-maps", "wave-maps", "flow-maps", "flow-maps-3"):
         front_end = FrontEnd(maps=maps, size=SIZE)
         torch.testing.assert_close(front_end(40.0 + 7.0 * clip), front_end(clip), rtol=1e-3, atol=1e-4)
 
 
 def test_a_clip_without_contrast_is_still_finite() -> None:
     flat = torch.full((1, 1, FRAMES, SIZE, SIZE), 128, dtype=torch.uint8)
-    for maps in ("frames", "spectral-maps", "wave-maps", "flow-maps"):
+    for maps in ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3"):
         assert FrontEnd(maps=maps, size=SIZE)(flat).isfinite().all()
 
 

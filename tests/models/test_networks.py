@@ -24,6 +24,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "cardona": {"frames": 4, "width": 4, "hidden": 8},
     "wave": {"widths": (6, 8, 8), "dimension": 5},
     "flow": {"widths": (6, 8, 8), "dimension": 5},
+    "flow-3": {"widths": (6, 8, 8), "dimension": 5},
     "yang": {"frames": 4, "hidden": 8, "grid": 2, "features": 16},
 }
 """Arguments that make each network of the table small enough for a test."""
@@ -98,6 +99,7 @@ def test_recurrent_networks_say_so() -> None:
         "cardona": True,
         "wave": False,
         "flow": False,
+        "flow-3": False,
         "yang": True,
     }
 
