@@ -2,9 +2,9 @@
 
 The power of a derivative's spectrum (`models.frontend`) mixes how a flag moves with what is printed on it. Optical flow
 is the motion alone: from each frame to the next, the displacement that explains a small window's change best in the
-least-squares sense (Lucas and Kanade 1981, equation 9), on two scales or three, since a window of a fine picture does not
-follow fast motion and one of a coarse picture blurs slow motion. Of the displacements' course in time each place keeps
-its statistics.
+least-squares sense (Lucas and Kanade 1981, equation 9), on two scales or three, since a window of a fine picture does
+not follow fast motion and one of a coarse picture blurs slow motion. Of the displacements' course in time each place
+keeps its statistics.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _SCALES = ("finest", "fine", "coarse")
 def channels(scales: int) -> tuple[str, ...]:
     """Names of the maps on so many scales, in order.
 
-    Flow is in pixels of its scale a frame: the first scale is half the clip's size, the next half of that; powers P are
-    log(1 + P/0.02²); centres and widths of spectra are shares of the Nyquist frequency, phase gradients radians a place.
+    Flow is in pixels of its scale a frame: the first scale is half the clip's size, the next half of that. Powers P are
+    log(1 + P/0.02²), centres and widths of spectra shares of the Nyquist frequency, phase gradients radians a place.
 
     Args:
         scales: 2 or 3.

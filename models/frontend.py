@@ -13,7 +13,7 @@ From the same spectra come two kinds of maps, and a third of the clip's optical 
 - *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.wave` takes: two peaks, power by band, the spectrum's centre and
   width, the gradient of the phase at the strongest frequency with its coherence (a travelling wave's wave number), and
   what the clip looks like at rest;
-- *flow maps* (`models.flow.channels`; on two scales, H/4, W/4, or on three, H/8, W/8), what `models.flow_network` takes.
+- *flow maps* (`models.flow.channels`; on two scales H/4, W/4, on three H/8, W/8), what `models.flow_network` takes.
 """
 
 from __future__ import annotations
