@@ -25,6 +25,9 @@ no clock was set and the rows are out of order."""
 
 JITTER = 2 * NANOSECONDS
 """Disorder that buffers of a computer explain; a clock that is set back jumps further."""
+_REGULAR, _AROUND = 10, 20
+"""Steps within a tenth of the usual one are regular; so many before and after a small step back show a clock that was
+set."""
 HOUR = 3600 * NANOSECONDS
 DAY = 24 * HOUR
 MOST = 4
@@ -68,6 +71,23 @@ def set_back(time: Instants) -> tuple[Jump, ...]:
     step = usual(time)
     steps = np.diff(time)
     return tuple(_jump(int(row) + 1, int(steps[row]), step) for row in np.flatnonzero(steps < -JITTER))
+
+
+def stepped_back(time: Instants) -> tuple[Jump, ...]:
+    """Steps back by no more than `JITTER` that no buffer explains: the rows before and after them come at the usual
+    step, and none of those after makes up for it, as the row behind a late one does.
+
+    Args:
+        time: (n,) instants in the order of the rows.
+    """
+    step, steps = usual(time), np.diff(time)
+    regular = np.abs(steps - step) <= step // _REGULAR
+    found: list[Jump] = []
+    for at in np.flatnonzero(steps < 0).tolist():
+        before, after = regular[max(0, at - _AROUND) : at], regular[at + 1 : at + 1 + _AROUND]
+        if min(len(before), len(after)) == _AROUND and before.all() and after.all():
+            found.append(Jump(row=at + 1, size=int(steps[at]) - step, whole=False))
+    return tuple(found) if len(found) <= MOST else ()
 
 
 def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:

@@ -9,7 +9,7 @@ Rules, in order:
    reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. So it is where the clock was set on,
    except that without a word of the user nothing is changed. Refused: time that runs back again and again, or by no
    whole hour to where the log never was, as in files that were joined.
-5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE.
+5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.
 6. Rows equal in stamp and values are the same row written twice: one is kept.
 7. Rows that share a stamp are given instants of their own (`spread`).
 """
@@ -68,7 +68,7 @@ def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:
 def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
     lag = np.maximum.accumulate(reading.time) - reading.time
     if len(lag) == 0 or int(lag.max()) <= JITTER:
-        return _late_rows_sorted(_one_clock(reading, (), choice))
+        return _late_rows_sorted(_one_clock(reading, clock.stepped_back(reading.time), choice))
     few = max(FEW, len(reading.time) // 1000)
     jumps = clock.set_back(reading.time)
     wild = clock.excursions(reading.time, most=few) if len(jumps) <= few else np.zeros(len(lag), dtype=bool)

@@ -80,6 +80,28 @@ def test_the_user_says_whose_stamps_are_right(choice: str, shift: int, size: int
     assert (finding.severity, finding.fix) == (Severity.NOTE, None)
 
 
+@pytest.mark.parametrize(("choice", "shift"), [(None, [0, 2]), ("first", [0, 2]), ("last", [-2, 0])])
+def test_a_clock_set_back_by_two_seconds_in_a_steady_log_loses_no_row(
+    choice: str | None, shift: list[int], read: Read
+) -> None:
+    """So little is within what buffers of a computer disorder, but there the rows behind make up for it."""
+    found = read(log(jumped(200, 80, -2)), **({} if choice is None else {"clock": choice}))
+    raw = jumped(200, 80, -2)
+    assert after(found) == [*(raw[:80] + shift[0]).tolist(), *(raw[80:] + shift[1]).tolist()]
+    said = told(found, "clock-set-back")
+    assert (said.value, said.where, said.severity) == (
+        -2.0, "line 82", Severity.WARNING if choice is None else Severity.NOTE,
+    )  # fmt: skip
+
+
+def test_a_row_that_comes_late_by_a_second_is_no_clock(read: Read) -> None:
+    seconds = np.arange(200.0)
+    seconds[[80, 81]] = seconds[[81, 80]]
+    found = read(log(seconds))
+    assert after(found) == list(range(200))
+    assert {finding.kind for finding in found.findings} & {"clock-set-back", "time-backwards"} == {"time-backwards"}
+
+
 def test_a_clock_that_may_have_been_set_on_is_a_doubt_and_changes_nothing(read: Read) -> None:
     found = read(log(jumped(9000, 4000, 3600)))
     assert after(found) == jumped(9000, 4000, 3600).tolist()
