@@ -77,6 +77,7 @@ _CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?
 CLOCKS = (
     "%H:%M:%S%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%I:%M:%S%p", "%I:%M%p", "%I:%M:%S%f %p", "%I:%M:%S%f%p",
     "%H%M%S", "%H%M", "%H.%M.%S%f", "%Hh%M", "%H h %M", "%H.%M", "%H", "%H:%M:%S%f%p", "%H:%M%p", "%H-%M-%S%f", "%H-%M",
+    "%H:%M:%S:%L",
 )  # fmt: skip
 """How a time of day may be written."""
 

@@ -213,7 +213,8 @@ def understand(name: str, stated: str = "") -> Heading:
     quantity, sure, used = _quantity(words, compact, unit, rest)
     courses = {"course", "heading"} if known & WIND else {"course"}
     if quantity and known & _OTHER and not (quantity.endswith("direction") and known & courses):
-        excluded = known & _OTHER - VERTICAL if quantity == "wind_z" else known & _OTHER
+        allowed = VERTICAL if quantity == "wind_z" else {"scalar"} if "sonic" in known else frozenset()
+        excluded = known & _OTHER - allowed
         if "wind" in quantity and excluded:
             quantity, sure = "", False
     if quantity == "wind_speed" and len(along := known & {"x", "y", "z"}) == 1:
@@ -404,6 +405,8 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
             return "wind_speed", True, known & WIND
         if _of_a_cup(words):
             return "wind_speed", True, {"cup"}
+        if known >= {"sonic", "scalar"} and not known & (_TEMPERATURE | _HUMIDITY | _PRESSURE):
+            return "wind_speed", True, {"scalar"}  # the mean of a sonic's speeds, beside that of its vectors
     if si in (None, "rad") and known & {"awa", "twa", "awd"}:
         word = next(iter(sorted(known & {"awa", "twa", "awd"})))
         return _ABBREVIATED[word], True, {word}

@@ -28,8 +28,8 @@ _DATE = re.compile(
     r"|^\s*(19|20)\d\d(?:[0-2]\d\d|3[0-6]\d)\s*$"
 )
 _CLOCK = re.compile(
-    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"
-    r"|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}\s*$"
+    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+|:\d{3})?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"
+    r"|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}([.,]\d+)?\s*$"
 )
 _HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
 """Before or after noon, in a column of its own."""
@@ -43,6 +43,8 @@ _STAMPLIKE = re.compile(
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
 """A date whose numbers are divided by blanks, and a clock."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
+_MILLISECONDS = "%H:%M:%S:%L"
+"""A clock with its milliseconds behind a colon, as LabVIEW's and .NET's programs write it."""
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
 
 
@@ -55,6 +57,7 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     best: TimeChoice | None = None
     extremes = {index for index, name in enumerate(layout.names) if of_extreme(name)}
     choices = [choice for choice in _choices(layout, order) if not extremes & set(choice.columns)]
+    choices = [choice for choice in choices if not _hundredths(layout, choice)]
     choices = [
         replace(choice, score=choice.score - 2.0 * (1.0 - _filled(layout, choice)))
         for choice in _without_false_epochs(layout, choices)
@@ -65,6 +68,13 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     if best is None or best.form is None:
         return best
     return second_times.with_part_of_second(layout, second_times.settle(layout, best, choices), time_as)
+
+
+def _hundredths(layout: Layout, choice: TimeChoice) -> bool:
+    """Whether a time is read as milliseconds behind a colon, and none has three digits: they may be hundredths."""
+    if not (choice.form or "").endswith(_MILLISECONDS):
+        return False
+    return not any(re.search(r":\d{3}\s*$", text) for text in _texts(layout, choice))
 
 
 def _filled(layout: Layout, choice: TimeChoice) -> float:
@@ -151,7 +161,7 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
     for index in clocks:
         clock = _with_half((index,), halves)
         texts = _joined(columns, clock)
-        for form in CLOCKS[:4]:
+        for form in (*CLOCKS[:4], "%H.%M.%S%f", _MILLISECONDS):
             if fits(counted.parse(texts, form)):
                 yield time_choice(layout, clock, form, counted.parse(texts, form), 1.0)
                 break
@@ -266,7 +276,7 @@ def _days(
 
 def _gaps(shape: str) -> tuple[str, ...]:
     """What may stand between date and time."""
-    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;-]+)0", shape)
+    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;.-]+)0", shape)
     return (found[1],) if found else (" ",)
 
 
@@ -289,9 +299,14 @@ def _compact(shape: str) -> tuple[str, ...]:
         "00000000 000000": "%Y%m%d %H%M%S%f", "00000000 0000": "%Y%m%d %H%M", "00000000 00:00:00": "%Y%m%d %H:%M:%S%f",
         "00000000T0000": "%Y%m%d %H%M", "00000000_000000": "%Y%m%d_%H%M%S%f", "00000000 00:00": "%Y%m%d %H:%M",
         "00000000-000000": "%Y%m%d-%H%M%S%f", "00000000 00": "%Y%m%d %H", "00000000 0": "%Y%m%d %H",
-        "00000000:0000": "%Y%m%d:%H%M",
+        "00000000:0000": "%Y%m%d:%H%M", "00000000-00:00:00": "%Y%m%d-%H:%M:%S%f",
+        "00000000_00:00:00": "%Y%m%d_%H:%M:%S%f", "00000000-000000-000": "%Y%m%d-%H%M%S-%L",
+        "00000000_000000_000": "%Y%m%d_%H%M%S_%L", "00000000-000000000": "%Y%m%d-%H%M%S%L",
+        "00000000_000000000": "%Y%m%d_%H%M%S%L", "00000000000000000": "%Y%m%d%H%M%S%L",
         "00000000:000000": "%Y%m%d:%H%M%S%f", "00000000_0000": "%Y%m%d_%H%M",
     }  # fmt: skip
+    if re.match(r"0{8} 00\.00\.00(?:\.|$)", bare):
+        return ("%Y%m%d %H.%M.%S%f",)
     known = forms.get(bare.split(".")[0])
     return (known,) if known else ()
 
