@@ -28,6 +28,7 @@ REPORT = re.compile(
 )
 _OF_ASOS = re.compile(r"\d{5}[A-Z0-9]{4} [A-Z0-9]{3}(?P<day>\d{8})\d{4}.*\s5-MIN\s")
 """What stands before a report in NCEI's ASOS of 5 minutes (DSI-6401): the local date, at most a day from UTC's."""
+_WEATHER = ("air temperature [degC]", "air pressure [hPa]")
 _UNITS = {"KT": "kn", "MPS": "m/s", "KMH": "km/h"}
 
 
@@ -53,16 +54,23 @@ def tabled(
     """Rows as `row_of` makes them as a table; `None` where there is none.
 
     Args:
+        found: rows; behind the unit may stand the temperature [°C] and the pressure [hPa] at the station, "" for none.
         left_out: reports that cannot be read.
         what: the reports are.
     """
-    units = sorted({row[-1] for row in found})
+    units = sorted({row[5] for row in found})
     named = units[0] if len(units) == 1 else "m/s"
-    rows = [list(row[:5]) if row[-1] == named else _in_si(row) for row in found]
+    winds = [list(row[:5]) if row[5] == named else _in_si(row) for row in found]
+    weather = [[*row[6:], *[""] * (len(_WEATHER) - len(row[6:]))] for row in found]
+    told = [at for at in range(len(_WEATHER)) if any(row[at] for row in weather)]
     # The last column is filled in every row: most reports have no gust, and a table ends where its rows do.
-    rows = [[when, *wind, station] for when, station, *wind in rows]
+    rows = [
+        [when, *wind, *(beside[at] for at in told), station]
+        for (when, station, *wind), beside in zip(winds, weather, strict=True)
+    ]
     kind = "metar-reports" if "METAR" in what else "synop-reports"
-    names = ["time [UTC]", f"wind speed [{named}]", "wind direction [deg]", f"gust [{named}]", "station"]
+    names = ["time [UTC]", f"wind speed [{named}]", "wind direction [deg]", f"gust [{named}]"]
+    names += [*(_WEATHER[at] for at in told), "station"]
     what = f"the wind of {what}" if len(units) == 1 else f"the wind of {what} in {' and '.join(units)}, all put in m/s"
     return table(source, names, rows, kind=kind, what=what, left_out=left_out)
 

@@ -7,8 +7,10 @@
 Source: WMO, Manual on Codes (WMO-No. 306), FM 12: AAXX YYGGiw states the day of the month, the hour in UTC and the unit
 of all speeds (iw: 0 and 1 m/s, 3 and 4 knots); a report is IIiii (the station), iRixhVV, Nddff (dd the direction in
 tens of degrees, 00 calm, 99 variable; ff the mean over ten minutes), 00fff where ff is 99, and further groups, of which
-9GGgg is the time of observation where it is not the hour, and 910ff of section 3 the highest gust in ten minutes. The
-month is only in the stamp before the report, whose day must be that of the report.
+1sTTT is the temperature of the air in tenths of a degree (s: 0 above, 1 below zero), 3PPPP the pressure at the station
+in tenths of hPa without its thousands, 9GGgg the time of observation where it is not the hour, and 910ff of section 3
+the highest gust in ten minutes. 4PPPP is the pressure reduced to the level of the sea, which is not read. The month is
+only in the stamp before the report, whose day must be that of the report.
 """
 
 from __future__ import annotations
@@ -31,6 +33,10 @@ _REPORT = re.compile(
 _SECTION = re.compile(r" (?:222\S\S|333|444|555)(?= |$)")
 _TIME = re.compile(r" 9([01]\d|2[0-3])([0-5]\d)(?= |$)")
 _GUST = re.compile(r" 333 (?:(?!444|555)\S+ )*?910(\d\d)(?: 00(\d{3}))?(?= |$)")
+_TEMPERATURE = re.compile(r" 1([01])(\d{3})(?= |$)")
+_PRESSURE = re.compile(r" 3(\d{4})(?= |$)")
+_THOUSANDS, _LOWEST = 1000, 4500
+"""A pressure below the first [0.1 hPa] lacks its thousands; none between the two is measured at a station."""
 _MOST, _VARIABLE = 36, 99
 """Tens of degrees of the north, and what stands for no one direction."""
 _ABOVE = "99"
@@ -51,13 +57,14 @@ class Synop:
         day: of the month, two digits.
         hour: to which the report belongs [UTC].
         time: of the observation, hour and minute [UTC]; `None` where it is the hour.
-        row: station, speed, direction, gust and unit as `metar.row_of` has them; "" for what is missing.
+        row: station, speed, direction, gust, unit, temperature and pressure as `metar.tabled` takes them; "" for what
+            is missing.
     """
 
     day: str
     hour: int
     time: tuple[int, int] | None
-    row: tuple[str, str, str, str, str]
+    row: tuple[str, ...]
 
     def at(self, date: dt.date, stamp: dt.datetime | None = None) -> list[str]:
         """The report's row of a table of `metar.tabled`.
@@ -86,12 +93,31 @@ def read(heading: re.Match[str], text: str) -> Synop | None:
     speed = _speed(match["speed"], match["above"])
     away = f"{10 * tens}" if 0 < tens <= _MOST and speed.strip("0") else ""
     end = _SECTION.search(match["rest"])
-    time = _TIME.search(match["rest"][: end.start()] if end is not None else match["rest"])
+    first = match["rest"][: end.start()] if end is not None else match["rest"]
+    time = _TIME.search(first)
     gust = _GUST.search(match["rest"])
     return Synop(
         day=heading["day"], hour=hour, time=None if time is None else (int(time[1]), int(time[2])),
-        row=(match["station"], speed, away, "" if gust is None else _speed(gust[1], gust[2]), named or "m/s"),
+        row=(
+            match["station"], speed, away, "" if gust is None else _speed(gust[1], gust[2]), named or "m/s",
+            _temperature(first), _pressure(first),
+        ),
     )  # fmt: skip
+
+
+def _temperature(groups: str) -> str:
+    """The temperature of the air [°C] of the groups of section 1; "" where it is missing."""
+    found = _TEMPERATURE.search(groups)
+    return "" if found is None else f"{'-' if found[1] == '1' else ''}{int(found[2]) / 10:.1f}"
+
+
+def _pressure(groups: str) -> str:
+    """The pressure at the station [hPa] of the groups of section 1; "" where it is missing."""
+    found = _PRESSURE.search(groups)
+    tenths = _THOUSANDS if found is None else int(found[1])
+    if _THOUSANDS <= tenths < _LOWEST:
+        return ""
+    return f"{tenths / 10 + (1000 if tenths < _THOUSANDS else 0):.1f}"
 
 
 def _speed(two: str, three: str | None) -> str:

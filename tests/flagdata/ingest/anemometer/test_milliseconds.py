@@ -13,7 +13,7 @@ from flagdata.errors import InputError, TimeError
 from flagdata.ingest.anemometer import WindOptions, read_log
 
 Write = Callable[[str], Path]
-START = dt.datetime(2021, 5, 3, 12, 0, 0, 23_000)
+START = dt.datetime(2021, 5, 3, 12, 0, 0, 23_000, tzinfo=dt.UTC)
 STEP = 100  # ms
 
 

@@ -63,6 +63,30 @@ def test_stamped_reports_give_speed_direction_and_time(read: Read) -> None:
     assert any("gust" in finding.what for finding in log.findings if finding.kind == "columns-not-read")
 
 
+_WEATHER = """202605010000 AAXX 01001 03999 11458 72305 10158 20113 39956 40113 333 10201 20099=
+202605010300 AAXX 01031 03999 11458 72305 11034 30122 40279 333 11050=
+202605010600 AAXX 01061 03999 11458 72305 00104 1//// 37654=
+202605010900 AAXX 01091 03999 11458 72305 40113 333 10201 39940=
+"""
+
+
+def test_temperature_and_station_pressure_are_those_of_the_first_section(read: Read) -> None:
+    channels = read(_WEATHER).series.channels
+    np.testing.assert_allclose(channels["air_temperature"], [288.95, 269.75, np.nan, np.nan])
+    np.testing.assert_allclose(channels["air_pressure"], [99_560, 101_220, 76_540, np.nan])
+
+
+def test_the_pressure_at_the_level_of_the_sea_is_not_that_of_the_air(read: Read) -> None:
+    channels = read(_STAMPED).series.channels
+    assert "air_pressure" not in channels
+    np.testing.assert_allclose(channels["air_temperature"][:4], [288.95, 287.95, 287.95, 287.95])
+
+
+def test_impossible_pressures_of_a_station_are_missing(read: Read) -> None:
+    channels = read(_WEATHER.replace("30122", "32122")).series.channels
+    np.testing.assert_allclose(channels["air_pressure"], [99_560, np.nan, 76_540, np.nan])
+
+
 @pytest.mark.parametrize(("digit", "scale"), [("0", 1.0), ("1", 1.0), ("3", KNOT), ("4", KNOT)])
 def test_the_unit_of_a_report_is_its_own(read: Read, digit: str, scale: float) -> None:
     lines = "".join(f"2026050100{at}0 AAXX 0100{digit} 03999 11458 72310 10158=\n" for at in range(4))
