@@ -20,9 +20,9 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from flagdata.errors import LimitError
+from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import json_measures, json_series
+from flagdata.ingest.anemometer import coverage_json, json_measures, json_series
 from flagdata.ingest.anemometer.headings import understand, words_of
 from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.source import TableText, TextFile
@@ -34,6 +34,8 @@ _DEEPEST = 8
 _LONGEST = 20_000
 """Characters of the longest dictionary that is read as Python prints it."""
 _LOOKED_AT = 50
+_TOLD = 5
+"""Parts of a coverage that are not read, of which each is told."""
 _PLATFORM = frozenset(
     {"lat", "latitude", "lon", "lng", "longitude", "position", "sog", "cog", "heading", "navigation", "course"}
 )
@@ -84,9 +86,13 @@ def as_table(source: TextFile) -> TableText | None:
 
     Raises:
         LimitError: more than `WIDEST` columns.
+        InputError: CoverageJSON of which no wind can be read.
     """
     whole = _whole(source)
     series = json_series.table(whole)
+    unread = coverage_json.unread(whole)
+    if unread and not any("wind" in understand(name).quantity for row in series or () for name in row):
+        raise InputError(f"CoverageJSON: {unread[0].what}", where=str(source.path), fix=unread[0].fix)
     columns = None if series is None else [{name: _text(value) for name, value in row.items()} for row in series]
     if columns is None and isinstance(whole, dict):
         columns = _columns(whole)
@@ -116,6 +122,13 @@ def as_table(source: TextFile) -> TableText | None:
     writer.writerows([row.get(name, "") for name in names] for row in kept)
     text = f"JSON, read as a table of {len(names)} columns; lines are counted with its heading as the first"
     found = [Finding(kind="json-table", severity=Severity.NOTE, what=text)]
+    if unread:
+        text = "; ".join(defect.what for defect in unread[:_TOLD])
+        text += f"; and {len(unread) - _TOLD} more" if len(unread) > _TOLD else ""
+        text = f"not read: {text}"
+        found.append(
+            Finding(kind="columns-not-read", severity=Severity.WARNING, count=len(unread), what=text, fix=unread[0].fix)
+        )
     if others:
         text = f"{others} objects have no member of the wind that others have: messages of another kind; left out"
         found.append(Finding(kind="other-messages", severity=Severity.NOTE, count=others, what=text))

@@ -322,10 +322,11 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
     where = str(path)
     unix = windows = mac = nul = lines = tail = before = 0
     last = b""
-    size = 0
+    size, json = 0, False
     with opened(path) as stream:
         while chunk := stream.read(_CHUNK):
             nul += chunk.count(0)
+            json = json if size else chunk.lstrip(codecs.BOM_UTF8 + b" \r\n\t")[:1] in (b"{", b"[")
             size += len(chunk)
             pairs = chunk.count(b"\r\n") + (last == b"\r" and chunk[:1] == b"\n")
             feeds, returns = chunk.count(b"\n"), chunk.count(b"\r")
@@ -342,10 +343,9 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
             if int(spans.max()) > limits.line:
                 at = int(np.append(ends, len(data))[int(np.argmax(spans))])
                 number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
-                raise LimitError(
-                    f"a line longer than {limits.line} bytes", where=f"{where}, line {number}",
-                    fix="check that this is the log, or give read_log wider limits",
-                )  # fmt: skip
+                fix = "check that this is the log, or give read_log wider limits"
+                fix = f"if it is JSON, put it in lines: python -m json.tool FILE NEWFILE; {fix}" if json else fix
+                raise LimitError(f"a line longer than {limits.line} bytes", where=f"{where}, line {number}", fix=fix)
             before = lines
             last = chunk[-1:]
     found: list[Finding] = []

@@ -1,8 +1,10 @@
-"""CoverageJSON of one place is a table of its ranges over the axis of time."""
+"""CoverageJSON is a table of its ranges over the axis of time, and refused by name where it has none."""
 
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.errors import InputError, LimitError
+from flagdata.ingest.anemometer import WindOptions, anemometers, read_log, sniff
 from flagdata.ingest.anemometer.coverage_json import places
 from flagdata.ingest.anemometer.places import rows
 from flagdata.signals import WindLog
@@ -103,3 +106,99 @@ def test_tuples_of_a_composite_axis_are_places() -> None:
     item["ranges"] = {"wind_speed": both}
     found = [(row["station"], row["wind_speed [m/s]"]) for row in rows(places(item))]
     assert found == [("x 5", 1.0), ("x 5", 2.0), ("x 6", 3.0), ("x 6", 4.0)]
+
+
+def _refused(path: Path) -> InputError:
+    with pytest.raises(InputError, match="CoverageJSON") as caught:
+        read_log(path)
+    assert sniff(path)[0].fix == caught.value.fix
+    return caught.value
+
+
+def test_a_missing_axis_of_time_is_refused_and_read_once_it_is_written(log_file: Callable[..., Path]) -> None:
+    item = _coverage({"symbol": "m/s"})
+    axis = item["domain"]["axes"].pop("t")
+    error = _refused(log_file(json.dumps(item)))
+    assert 'the axis of time "t" of the coverage is missing; its axes are x, y' in error.what
+    assert '"t": {"values": [...]} in domain.axes' in error.fix
+    item["domain"]["axes"]["t"] = axis
+    assert len(read_log(log_file(json.dumps(item))).series.time) == 4
+
+
+def test_a_range_over_a_missing_axis_is_refused_and_read_once_it_is_written(log_file: Callable[..., Path]) -> None:
+    item = _coverage({"symbol": "m/s"})
+    item["ranges"] = {"wind_speed": {**_range(SPEEDS), "axisNames": ["t", "z", "x"]}}
+    error = _refused(log_file(json.dumps(item)))
+    assert "'wind_speed' of the coverage is over the axis 'z', which its domain does not have" in error.what
+    assert '"z": {"values": [...]} in domain.axes, with 1 value;' in error.fix
+    item["domain"]["axes"]["z"] = {"values": [10.0]}
+    assert read_log(log_file(json.dumps(item))).series.channels["wind_speed"][0] == 14.4
+
+
+def test_a_missing_axis_in_a_collection_is_told_with_the_number_of_its_coverage(log_file: Callable[..., Path]) -> None:
+    one = _coverage({"symbol": "m/s"})
+    del one["domain"]["axes"]["t"]
+    error = _refused(log_file(json.dumps({"type": "CoverageCollection", "coverages": [one, one]})))
+    assert "of coverage 1 is missing" in error.what
+
+
+def test_a_direction_that_cannot_be_read_is_told_beside_the_speed(log_file: Callable[..., Path]) -> None:
+    item = _coverage({"symbol": "m/s"})
+    item["ranges"]["wd"] = _range(AWAY, along="z")
+    log = read_log(log_file(json.dumps(item)))
+    assert log.series.channels["wind_speed"][0] == 14.4
+    told = [finding.what for finding in log.findings if finding.kind == "columns-not-read"]
+    assert any("'wd'" in what and "'z'" in what for what in told)
+
+
+@pytest.mark.parametrize(
+    ("where", "put", "says"),
+    [
+        ("domain", "https://example.org/domain", "not in the file, but at https://example.org/domain"),
+        ("domain", {"type": "Domain"}, "has no axes"),
+        ("ranges", {}, "has no ranges"),
+        ("ranges", {"wind_speed": "https://example.org/speed"}, "not in the file, but at https://example.org/speed"),
+        ("ranges", {"wind_speed": {"type": "TiledNdArray", "axisNames": ["t"], "shape": [4]}}, "holds no values"),
+        ("ranges", {"wind_speed": _range([1.0, 2.0, 3.0])}, "has 3 values along the axis 't', which has 4"),
+        ("ranges", {"wind_speed": {**_range(SPEEDS), "shape": [4, 1, 2]}}, "holds 4 values, but its shape is 4x1x2"),
+    ],
+)
+def test_what_the_file_does_not_hold_is_refused_by_its_name(
+    log_file: Callable[..., Path], where: str, put: Any, says: str
+) -> None:
+    item = _coverage({"symbol": "m/s"}) | {where: put}
+    assert says in _refused(log_file(json.dumps(item))).what
+
+
+def test_a_place_that_moves_is_refused(log_file: Callable[..., Path]) -> None:
+    item = _coverage({"symbol": "m/s"})
+    tuples = [[f"2026-05-01T12:{at}0:00Z", 5 + at, 52] for at in range(4)]
+    item["domain"]["axes"] = {"composite": {"dataType": "tuple", "coordinates": ["t", "x", "y"], "values": tuples}}
+    assert "a trajectory" in _refused(log_file(json.dumps(item))).what
+
+
+def test_several_places_are_refused_with_the_name_that_reads_one(log_file: Callable[..., Path]) -> None:
+    item = _coverage({"symbol": "m/s"})
+    item["domain"]["axes"]["x"] = {"values": [5.0, 6.0]}
+    both = {"type": "NdArray", "axisNames": ["t", "y", "x"], "shape": [4, 1, 2], "values": [*map(float, range(8))]}
+    item["ranges"] = {"wind_speed": both}
+    path = log_file(json.dumps(item))
+    with pytest.raises(InputError, match="2 anemometers: x 5.0, x 6.0") as caught:
+        read_log(path)
+    assert "--wind 'x 5.0'" in caught.value.fix
+    assert read_log(path, WindOptions(wind="x 5.0")).series.channels["wind_speed"].tolist() == [0, 2, 4, 6]
+
+
+def test_a_coverage_in_one_long_line_is_read_once_it_is_put_in_lines(log_file: Callable[..., Path]) -> None:
+    item, count = _coverage({"symbol": "m/s"}), 6000
+    minutes = range(0, 10 * count, 10)
+    times = [f"{np.datetime64('2026-01-01T00:00:00') + np.timedelta64(at, 'm')}Z" for at in minutes]
+    item["domain"]["axes"]["t"]["values"] = times
+    item["ranges"] = {"wind_speed": _range([float(at % 9) for at in range(count)])}
+    path = log_file(json.dumps(item))
+    with pytest.raises(LimitError) as caught:
+        read_log(path)
+    assert "python -m json.tool FILE NEWFILE" in caught.value.fix
+    lines = path.with_name("lines.json")
+    subprocess.run([sys.executable, "-m", "json.tool", str(path), str(lines)], check=True, timeout=60)
+    assert len(read_log(lines).series.time) == count
