@@ -183,7 +183,7 @@ def test_several_places_are_refused_with_the_name_that_reads_one(log_file: Calla
     both = {"type": "NdArray", "axisNames": ["t", "y", "x"], "shape": [4, 1, 2], "values": [*map(float, range(8))]}
     item["ranges"] = {"wind_speed": both}
     path = log_file(json.dumps(item))
-    with pytest.raises(InputError, match="2 anemometers: x 5.0, x 6.0") as caught:
+    with pytest.raises(InputError, match=r"2 anemometers: x 5\.0, x 6\.0") as caught:
         read_log(path)
     assert "--wind 'x 5.0'" in caught.value.fix
     assert read_log(path, WindOptions(wind="x 5.0")).series.channels["wind_speed"].tolist() == [0, 2, 4, 6]
