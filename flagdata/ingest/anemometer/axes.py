@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from flagdata.ingest.anemometer import own_motion
 from flagdata.ingest.anemometer.headings import VERTICAL, Heading, words_of
 from flagdata.ingest.anemometer.layout import Layout
 
@@ -20,9 +21,18 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
     """The headings with components towards north and east as what they are, and whether there are such.
 
     One column of each, and none of south or west, which would be the sides of a mast. A lone U is no component, but
-    perhaps the speed itself.
+    perhaps the speed itself. A velocity that may be the platform's own is none of the wind (`own_motion`).
     """
-    words = [set(words_of(name)) for name in layout.names]
+    own, beside = own_motion.columns(layout), own_motion.components(layout)
+    headings = [
+        replace(heading, channel="", quantity="", label=()) if at in own
+        else replace(heading, channel=beside[at], quantity=beside[at], sure=False, label=()) if at in beside
+        else heading
+        for at, heading in enumerate(headings)
+    ]  # fmt: skip
+    if beside:
+        return headings, False
+    words = [set() if at in own else set(words_of(name)) for at, name in enumerate(layout.names)]
     found = list(headings)
     sides = [[at for at, said in enumerate(words) if _towards(said, headings[at], side)] for side in _AXES]
     if [len(side) for side in sides[:2]] == [1, 1] and not any(sides[2:]):

@@ -6,7 +6,6 @@ is taken without asking. What is in doubt is named with the one thing to say, an
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -45,21 +44,10 @@ from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.rows_above import rows_above
 from flagdata.ingest.anemometer.sites import site_of_all, sites
+from flagdata.ingest.anemometer.stated_unit import stated_unit
 from flagdata.ingest.anemometer.timechoice import TimeChoice
 from flagdata.ingest.anemometer.timecolumns import find_time
-from flagdata.units import spelled
-from flagdata.units import unit as unit_of
 
-_STATED = re.compile(
-    r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
-)
-"""How lines above a heading state a unit."""
-_UNIT_WORD = re.compile(
-    r"(?<![\w/])(?:km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
-    r"(?:kilomet|met)(?:er|re)s? per (?:hour|second)|miles per hour)(?![\w/])",
-    re.IGNORECASE,
-)
-"""Units of speed as a title names them."""
 _COMMENT = ("#", ";", "%", "!")
 """How lines begin that are no rows."""
 _BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
@@ -203,6 +191,7 @@ def draft(
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
         remarks = (*remarks, *unread.otherwise(layout, time, chosen))
+        remarks = (*remarks, *own_motion.remarks(layout))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
@@ -276,7 +265,9 @@ def _doubts(
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
-        found.append(Doubt(what=f"no column is surely a wind; the columns are {names}", fix=fix))
+        own = own_motion.doubt(layout)
+        what = f"no column is surely a wind; {f'{own}; ' if own else ''}the columns are {names}"
+        found.append(Doubt(what=what, fix=fix))
     for wind in winds if chosen is None else (chosen,):
         changing = mixed_units(layout, next(iter(wind.columns.values())).index)
         if changing:
@@ -292,7 +283,7 @@ def _doubts(
         fix = f"if it is the wind, name it: --wind {in_shell(unsure[0])}"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
-        own = next((told for wind in winds if (told := own_motion.doubt(layout, wind))), "")
+        own = own_motion.doubt(layout)
         what += f"; {own}" if own else ""
         found.append(Doubt(what=what, fix=fix))
     return found
@@ -323,27 +314,10 @@ def _directions(layout: Layout) -> list[str]:
     return [name for name in layout.names if understand(name).channel.endswith("wind_direction")]
 
 
-def _stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
-    """The one unit of speed that lines above the heading state, as "Units: mph", the line's number and the words."""
-    found: dict[str, tuple[str, int, str]] = {}
-    for number, line in enumerate(lines, start=1):
-        for match in _STATED.finditer(line):
-            name = spelled(match[1])
-            if name is not None and unit_of(name).si == "m/s":
-                found.setdefault(name, (name, number, match[0]))
-    if not found:
-        for number, line in enumerate(lines, start=1):
-            for match in _UNIT_WORD.finditer(line):
-                name = spelled(match[0])
-                if name is not None and unit_of(name).si == "m/s":
-                    found.setdefault(name, (name, number, match[0]))
-    return next(iter(found.values())) if len(found) == 1 else None
-
-
 def _unit_doubt(
     lines: Sequence[str], layout: Layout, time: TimeChoice | None, wind: Wind, missing: Sequence[str]
 ) -> Doubt:
-    above = _stated_unit(
+    above = stated_unit(
         [line if at < layout.preamble or line.lstrip()[:1] in _COMMENT else "" for at, line in enumerate(lines)]
     )
     if above is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata import compass
-from flagdata.ingest.anemometer import codes, unitcheck
+from flagdata.ingest.anemometer import codes, own_motion, unitcheck
 from flagdata.ingest.anemometer.angles import compass_unit, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.axes import along_axes
 from flagdata.ingest.anemometer.cells import Cell, Numbers, numbers
@@ -169,6 +169,7 @@ def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
                 f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind"
             )
         afloat = [name for name, said in zip(found.layout.names, words, strict=True) if said & _VESSEL]
+        afloat = afloat or list(filter(None, [own_motion.carried(found.layout)]))
         relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
         if speed is not None and afloat and not relative:
             found.warnings.append(

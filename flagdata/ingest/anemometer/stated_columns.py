@@ -19,7 +19,7 @@ import numpy as np
 
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer import counted, own_motion
 from flagdata.ingest.anemometer.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
@@ -301,7 +301,7 @@ def with_site(text: str, index: int) -> str:
 
 def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str:
     """The option with which the user says what the columns are, as far as they are known; "?" where they are not."""
-    width = layout.number_of_columns()
+    width, own = layout.number_of_columns(), own_motion.columns(layout)
     known = _known(layout, time, winds)
     speeds = [entry for entry in known.values() if entry.split("[")[0] in (*SPEEDS, *COMPONENTS)]
     if speeds:  # weather of a unit that nothing tells is not to be asked for with the wind
@@ -318,7 +318,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     else:
         line = ",".join(known.get(at, "") for at in range(width))
     others = [
-        name for at, name in enumerate(layout.names) if at not in known
+        name for at, name in enumerate(layout.names) if at not in {*known, *own}
         and understand(name, layout.units[at]).channel in (entry.split("[")[0] for entry in speeds)
     ]  # fmt: skip
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
@@ -408,7 +408,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     """Entries of columns by their index."""
     found = _understood(layout, time, winds)
     timed = time is not None
-    steady = None if timed else _steady(layout)
+    steady, own = None if timed else _steady(layout), own_motion.columns(layout)
     if steady is not None:
         found[steady] = "time[?]"
     for at, name in enumerate(layout.names):
@@ -418,6 +418,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         heading = understand(name, layout.units[at])
         if not timed and kinds and kinds[0] == "stamp" and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
+        elif at in own:
+            found |= {} if winds else {at: "?"}
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel

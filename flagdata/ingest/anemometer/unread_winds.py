@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from flagdata.ingest.anemometer import stated_columns
+from flagdata.ingest.anemometer import own_motion, stated_columns
 from flagdata.ingest.anemometer.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.headings import fits, understand, words_of
 from flagdata.ingest.anemometer.instruments import Wind
@@ -45,6 +45,7 @@ def remark(
     """
     taken = {column.index for one in winds for column in one.columns.values()}
     taken |= {column.index for column in wind.columns.values()} if wind is not None else set()
+    taken |= set(own_motion.columns(layout))
     taken |= set(time.columns) if time is not None else set()
     taken |= {index for index in layout.unit_columns if index is not None}
     taken |= {one.site[0] for one in winds if one.site is not None}

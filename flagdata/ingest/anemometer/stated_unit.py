@@ -1,0 +1,37 @@
+"""The unit of the wind that lines above a table's heading state."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flagdata.units import spelled
+from flagdata.units import unit as unit_of
+
+_STATED = re.compile(
+    r"\bunits?\s*[:=]\s*([A-Za-z/]{1,20}(?:\s?[A-Za-z/.]+){0,2}(?:-1)?)\s*(?=$|[,;)\]])", re.IGNORECASE
+)
+"""How lines above a heading state a unit."""
+_UNIT_WORD = re.compile(
+    r"(?<![\w/])(?:km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
+    r"(?:kilomet|met)(?:er|re)s? per (?:hour|second)|miles per hour)(?![\w/])",
+    re.IGNORECASE,
+)
+"""Units of speed as a title names them."""
+
+
+def stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
+    """The one unit of speed that lines above the heading state, as "Units: mph", the line's number and the words."""
+    found: dict[str, tuple[str, int, str]] = {}
+    for number, line in enumerate(lines, start=1):
+        for match in _STATED.finditer(line):
+            name = spelled(match[1])
+            if name is not None and unit_of(name).si == "m/s":
+                found.setdefault(name, (name, number, match[0]))
+    if not found:
+        for number, line in enumerate(lines, start=1):
+            for match in _UNIT_WORD.finditer(line):
+                name = spelled(match[0])
+                if name is not None and unit_of(name).si == "m/s":
+                    found.setdefault(name, (name, number, match[0]))
+    return next(iter(found.values())) if len(found) == 1 else None
