@@ -75,18 +75,20 @@ def set_back(time: Instants) -> tuple[Jump, ...]:
 
 def stepped_back(time: Instants) -> tuple[Jump, ...]:
     """Steps back by no more than `JITTER` that no buffer explains: the rows before and after them come at the usual
-    step, and none of those after makes up for it, as the row behind a late one does.
+    step, and none of those after makes up for it, as the row behind a late one does. Rows that share a stamp count as
+    one, since a clock of whole seconds may stamp several.
 
     Args:
         time: (n,) instants in the order of the rows.
     """
-    step, steps = usual(time), np.diff(time)
+    rows = np.concatenate(([0], np.flatnonzero(np.diff(time)) + 1))
+    step, steps = usual(time), np.diff(time[rows])
     regular = np.abs(steps - step) <= step // _REGULAR
     found: list[Jump] = []
     for at in np.flatnonzero(steps < 0).tolist():
         before, after = regular[max(0, at - _AROUND) : at], regular[at + 1 : at + 1 + _AROUND]
         if min(len(before), len(after)) == _AROUND and before.all() and after.all():
-            found.append(Jump(row=at + 1, size=int(steps[at]) - step, whole=False))
+            found.append(Jump(row=int(rows[at + 1]), size=int(steps[at]) - step, whole=False))
     return tuple(found) if len(found) <= MOST else ()
 
 

@@ -4,8 +4,9 @@
 
 The time in UTC, minutes since the row before, humidity and temperature indoors, humidity and temperature outdoors,
 absolute pressure in hPa, mean wind and gust in m/s, direction in sixteenths of a turn from north, rain in mm since the
-station was started, status (pywws, documentation of `pywws.storage`, class `RawStore`). Humidity, temperature and wind
-are empty where the outdoor sensor was not heard.
+station was started, status (pywws, documentation of `pywws.storage`, class `RawStore`); of stations with a solar sensor
+illuminance and UV index behind them. Humidity, temperature and wind are empty where the outdoor sensor was not heard.
+Calibrated data (`CalibStore`) have the relative pressure behind the absolute one, and directions with decimals.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from flagdata.ingest.anemometer.restated import rows_of, table
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d")
-_COLUMNS = 12
+_CALIBRATED = {12: False, 13: True, 14: False, 15: True}
+"""By the number of columns, whether the relative pressure is among them."""
 _NAMES = ("time [UTC]", "relative humidity [%]", "air temperature [degC]", "air pressure [hPa]",
           "wind speed [m/s]", "gust [m/s]", "wind direction [deg]")  # fmt: skip
 _LEAST, _SHARE = 5, 0.95
@@ -41,7 +43,12 @@ def as_table(source: TextFile) -> TableText | None:
 def _row(line: str) -> list[str] | None:
     """The cells of a row as `_NAMES` lists them; `None` where a line is none."""
     cells = [cell.strip() for cell in line.split(",")]
-    if len(cells) != _COLUMNS or not _STAMP.fullmatch(cells[0]):
+    if len(cells) not in _CALIBRATED or not _STAMP.fullmatch(cells[0]):
+        return None
+    calibrated = _CALIBRATED[len(cells)]
+    relative = cells.pop(7) if calibrated else ""
+    cells = cells[:12]
+    if relative and ((value := _number(relative)) is None or not _pressed(value)):
         return None
     numbers = [_number(cell) for cell in cells[1:]]
     if any(number is None and cell for number, cell in zip(numbers, cells[1:], strict=True)):
@@ -50,14 +57,19 @@ def _row(line: str) -> list[str] | None:
     right = (
         delay is not None and delay >= 0 and delay % 1 == 0,
         humidity is None or 0 <= humidity <= 100,
-        pressure is None or 500 < pressure < 1100,
+        pressure is None or _pressed(pressure),
         mean is None or gust is None or 0 <= mean <= gust + 0.5,
-        point is None or (0 <= point <= 15 and point % 1 == 0),
+        point is None or (0 <= point < 16 and (calibrated or point % 1 == 0)),
     )
     if not all(right):
         return None
     direction = "" if point is None else f"{point * _POINT:g}"
     return [cells[0], cells[4], cells[5], cells[6], cells[7], cells[8], direction]
+
+
+def _pressed(value: float) -> bool:
+    """Whether a number may be a pressure of the air [hPa]."""
+    return 500 < value < 1100
 
 
 def _number(cell: str) -> float | None:

@@ -131,6 +131,18 @@ def test_raw_data_of_pywws_are_told_by_their_columns(read: Read) -> None:
     assert "pywws" in {finding.kind for finding in log.findings}
 
 
+@pytest.mark.parametrize("solar", ["", ",512.3,2", ",,"])
+@pytest.mark.parametrize("relative", ["", "1015.2,"])
+def test_data_of_solar_stations_and_calibrated_data_of_pywws_are_read_alike(
+    read: Read, solar: str, relative: str
+) -> None:
+    text = raw_of_pywws(60).replace("1012.9,", f"1012.9,{relative}").replace("114.3,0\n", f"114.3,0{solar}\n")
+    channels = read(text).series.channels
+    np.testing.assert_allclose(channels["wind_speed"], [1 + k % 5 / 10 for k in range(60)])
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), [k % 16 * 22.5 for k in range(60)], atol=1e-9)
+    np.testing.assert_allclose(channels["air_pressure"], 101_290)
+
+
 def test_a_row_in_which_the_outdoor_sensor_was_not_heard_has_no_values(read: Read) -> None:
     log = read(raw_of_pywws(60, outdoor=",", wind=",,"))
     assert np.flatnonzero(np.isnan(log.series.channels["wind_speed"])).tolist() == [3]
