@@ -10,6 +10,9 @@ import click
 if TYPE_CHECKING:
     from flagdata.ingest.store import IngestResult
 
+_ANEMOMETERS = 4
+"""Of one table that are described each; beyond these their number is told."""
+
 
 def print_results(results: Sequence[IngestResult]) -> None:
     """What one source became, for people, on stdout."""
@@ -86,13 +89,20 @@ def _device_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     return lines
 
 
+def _few(reasons: Sequence[str]) -> list[str]:
+    """Reasons, of which those that tell how each of many anemometers is read stand for the first few alone."""
+    each = [reason for reason in reasons if reason.startswith("anemometer ")]
+    shown = [reason for reason in reasons if reason not in each[_ANEMOMETERS:]]
+    return shown if len(each) <= _ANEMOMETERS else [*shown, f"{len(each) - _ANEMOMETERS} anemometers more: see --json"]
+
+
 def print_sniffed(entry: Mapping[str, Any]) -> None:
     """One source and its guesses for people, on stdout."""
     click.echo(entry["source"])
     for guess in entry["guesses"]:
         recipe = f", recipe {guess['recipe']}" if guess["recipe"] else ""
         click.echo(f"  {guess['score']:.0%} {guess['kind']}: {guess['format']}{recipe}")
-        for reason in guess["reasons"]:
+        for reason in _few(guess["reasons"]):
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
             click.echo(f"    to do: {guess['fix']}")

@@ -20,7 +20,7 @@ _SPEED_UNITS = frozenset({"m/s", "km/h", "kn", "mph", "cm/s", "ft/s"})
 def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Heading], bool]:
     """The headings with components towards north and east as what they are, and whether there are such.
 
-    One column of each, and none of south or west, which would be the sides of a mast. A lone U is no component, but
+    One column of each, and none of south or west, which would be the sides of a mast. A lone U or V is no component, but
     perhaps the speed itself. A velocity that may be the platform's own is none of the wind (`own_motion`).
     """
     own, beside = own_motion.columns(layout), own_motion.components(layout)
@@ -49,10 +49,11 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
                 channel = f"wind_{name[1]}"
                 found[at] = replace(headings[at], channel=channel, quantity=channel, sure=False, label=())
             return found, False
-    if not any(heading.channel == "wind_y" for heading in headings):
-        for at, heading in enumerate(headings):
-            if heading.channel == "wind_x" and words_of(layout.names[at])[:1] == ["u"]:
-                found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=False)
+    for letter, own_axis, other in (("u", "wind_x", "wind_y"), ("v", "wind_y", "wind_x")):
+        if not any(heading.channel == other for heading in headings):
+            for at, heading in enumerate(headings):
+                if heading.channel == own_axis and words_of(layout.names[at])[:1] == [letter]:
+                    found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=False)
     return found, False
 
 

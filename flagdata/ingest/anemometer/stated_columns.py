@@ -319,7 +319,8 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         line = ",".join(known.get(at, "") for at in range(width))
     others = [
         name for at, name in enumerate(layout.names) if at not in {*known, *own}
-        and understand(name, layout.units[at]).channel in (entry.split("[")[0] for entry in speeds)
+        and ("wind_speed" if _alone(layout, at) else understand(name, layout.units[at]).channel)
+        in {entry.split("[")[0] for entry in speeds}
     ]  # fmt: skip
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
@@ -425,7 +426,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
                 found[at] = heading.channel
                 continue
             if heading.channel in COMPONENTS and _alone(layout, at):
-                found[at] = "?"  # v_wind may be a speed (v, velocity), or the component towards the north
+                # v_wind may be a speed (v, velocity), or the component towards the north
+                found |= {} if winds else {at: "?"}
                 continue
             guessed = heading.unit if fits(heading.channel, heading.unit) else None
             if guessed is None and CHANNELS[heading.channel].unit == "rad" and _in_doubt(layout, at):
@@ -443,9 +445,9 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
 
 
 def _alone(layout: Layout, index: int) -> bool:
-    """Whether no other column is a component of the wind."""
-    names = (pair for at, pair in enumerate(zip(layout.names, layout.units, strict=True)) if at != index)
-    return not any(understand(name, stated).channel in COMPONENTS for name, stated in names)
+    """Whether a column is a component of the wind, and none along another axis is beside it."""
+    along = {understand(name, stated).channel for name, stated in zip(layout.names, layout.units, strict=True)}
+    return along & set(COMPONENTS) == {understand(layout.names[index], layout.units[index]).channel}
 
 
 def _in_doubt(layout: Layout, index: int) -> bool:

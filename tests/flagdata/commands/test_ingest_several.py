@@ -84,3 +84,18 @@ def test_a_table_none_of_whose_anemometers_measured_is_refused(run: Run, lake: L
     assert code == 1
     assert "nothing to measure" in err
     assert lake.rows().num_rows == 0
+
+
+def test_of_many_stations_in_one_table_a_few_are_described_and_all_are_named(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "stations.csv"
+    stations = [f"S{number:02d}" for number in range(12)]
+    rows = [f"{station},{row}" for row in ROWS for station in stations]
+    path.write_text("\n".join(["station,time,wind speed (m/s),gust (m/s)", *rows]) + "\n")
+    code, out, err = run("--sniff", path)
+    assert code == 0, err
+    assert out.count("because anemometer 'S") == 4
+    assert "because 8 anemometers more: see --json" in out
+    assert f"12 anemometers, each becomes an artifact: {', '.join(stations)}" in out
+    code, out, _ = run("--sniff", path, "--json")
+    reasons = json.loads(out)["sources"][0]["guesses"][0]["reasons"]
+    assert sum(reason.startswith("anemometer 'S") for reason in reasons) == 12
