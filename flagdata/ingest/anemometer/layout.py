@@ -49,6 +49,9 @@ _UNITS_OF_OTHERS = frozenset(
 _ONE = r"(?:[umnkcµμ]?(?:mol|m|g|l|w|j|s|pa)|h|d|k|sr|deg|degc)"
 _COMPOUND = re.compile(rf"{_ONE}(?:(?:[. ]{_ONE}\^?-[123])+|/{_ONE}[23]?)")
 """Units of two parts that are not read, as mg.m-3, umol kg-1 or mg/L."""
+_BRACKETS = re.compile(r"[(\[（]([^()\[\]（）]{1,12})[)\]）]\s*$")
+_LEAST_UNITS = 2
+"""In brackets that make a second line of names one that tells units."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
 
@@ -411,7 +414,9 @@ def _heading(
     # A line that says what units there are ("Units: wind (m/s), dir (deg)") is none of names, however well it fits.
     named = [item for item in worded if not _SAYS_UNITS.match(lines[item[1]])] or worded
     _, at, names, plain = max(named, key=lambda item: (item[0], item[3], -item[1]))
-    units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), list(nothing))
+    units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), None)
+    if units is None:
+        units = next((own for number, cells, _ in candidates if number != at and (own := _in_brackets(cells))), nothing)
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
     by_name = plain and len(lines[at]) > 0
     return tuple(names), tuple(units), at, by_name, ()
@@ -449,6 +454,12 @@ def _worded(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell]
     words = [cell for cell in filled if cell_kind(cell) in ("text", "missing")]
     return len(filled) >= 0.6 * len(cells) and len(words) >= 0.8 * len(filled)
+
+
+def _in_brackets(cells: Sequence[str]) -> list[str]:
+    """Units in brackets behind the cells of a second line of names, in another language; empty where there are none."""
+    found = [match[1] if (match := _BRACKETS.search(cell)) and is_unit(match[1]) else "" for cell in cells]
+    return found if sum(map(bool, found)) >= _LEAST_UNITS else []
 
 
 def _are_units(cells: Sequence[str]) -> bool:

@@ -371,9 +371,10 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-us", frozenset({"us", "micros", "microseconds", "usec", "µs", "μs"})),
     ("elapsed-min", frozenset({"minutes", "mins", "minute"})),
     ("elapsed-s", frozenset({"s", "sec", "secs", "second", "seconds"})),
+    ("elapsed-h", frozenset({"h", "hr", "hrs", "hour", "hours"})),
 )
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
 _SLOW = 5000.0
 """Steps of a count from which it is as likely of microseconds as of milliseconds."""
-_SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0}
+_SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0, "elapsed-h": 3600.0}
 """Seconds a count."""

@@ -244,3 +244,13 @@ def test_a_component_called_v_is_no_voltage(log_file: Write) -> None:
     assert "not yet a speed" not in refusal(path).what
     channels = read_log(path, WindOptions(unit="m/s")).series.channels
     np.testing.assert_allclose(channels["wind_y"], np.array(SPEEDS) - 3)
+
+
+def test_units_in_brackets_of_a_second_line_of_names_are_those_of_the_columns(read: Read) -> None:
+    """Taiwan's weather service heads its tables in Chinese, with units, and in English, without."""
+    rows = "".join(f"{at:02d},{3 + at % 5},{40 + at},{18 + at % 3}\n" for at in range(1, 25))
+    headings = "觀測時間(hour),風速(m/s),風向(360degree),氣溫(℃)\nObsTime,WS,WD,Temperature\n"
+    log = read(headings + rows, start=1_675_184_400_000_000_000)
+    assert log.series.channels["wind_speed"].tolist() == [3 + at % 5 for at in range(1, 25)]
+    np.testing.assert_allclose(log.series.channels["air_temperature"], [291.15 + at % 3 for at in range(1, 25)])
+    assert np.diff(log.series.time).tolist() == [3600 * 10**9] * 23
