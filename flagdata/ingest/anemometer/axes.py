@@ -20,8 +20,8 @@ _SPEED_UNITS = frozenset({"m/s", "km/h", "kn", "mph", "cm/s", "ft/s"})
 def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Heading], bool]:
     """The headings with components towards north and east as what they are, and whether there are such.
 
-    One column of each, and none of south or west, which would be the sides of a mast. A lone U or V is no component, but
-    perhaps the speed itself. A velocity that may be the platform's own is none of the wind (`own_motion`).
+    One column of each, and none of south or west, which would be the sides of a mast. A lone U or V is no component,
+    but perhaps the speed itself. A velocity that may be the platform's own is none of the wind (`own_motion`).
     """
     own, beside = own_motion.columns(layout), own_motion.components(layout)
     headings = [

@@ -22,7 +22,7 @@ _SPEEDS = GUSTS | MAXIMA | MINIMA | frozenset({"peak", "lull", "hi", "high", "lo
 _NO_SPEEDS = frozenset(
     {
         "dir", "direction", "time", "date", "qc", "flag", "quality", "std", "sd", "count", "force", "beaufort", "bft",
-        "scale", "class", "run", "chill", "power",
+        "scale", "class", "run", "chill", "power", "angle", "bearing", "vane",
     }
 )  # fmt: skip
 """Words of headings whose numbers are no speeds of the wind."""

@@ -55,6 +55,11 @@ def test_an_interval_of_minutes_is_no_minimum(log_file: Write) -> None:
     assert '4=wind_speed[m/s]"' in _note(log_file(_table("wind_force_10min", "wind_gust_10min")), unit="m/s")
 
 
+@pytest.mark.parametrize("angle", ["GustAngle", "gust bearing", "gust vane"])
+def test_the_direction_of_a_gust_is_not_offered_as_its_speed(log_file: Write, angle: str) -> None:
+    assert '4=wind_speed[m/s]"' in _note(log_file(_table(angle, "GustStrength")), unit="m/s")
+
+
 def test_columns_that_the_user_names_are_left_without_a_note(log_file: Write) -> None:
     assert _note(log_file(_table("gust")), columns="time,wind_speed[m/s]") == ""
 
