@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import string
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Protocol
@@ -32,6 +33,7 @@ KINDS = (
     "flagdata.ingest.anemometer.station_lines",
     "flagdata.ingest.anemometer.aprs",
     "flagdata.ingest.anemometer.ft",
+    "flagdata.ingest.anemometer.thies",
     "flagdata.ingest.anemometer.uploads",
     "flagdata.ingest.anemometer.broken_headings",
     "flagdata.ingest.anemometer.line_breaks",
@@ -49,6 +51,8 @@ KINDS = (
 )
 LOOKED_AT = 60
 """Lines by which a kind is told."""
+_NOTHING = f"{string.whitespace}\x02\x03"
+"""What a line without content may hold: blanks, and the STX and ETX that serial instruments frame their lines with."""
 
 
 class Kind(Protocol):
@@ -99,7 +103,7 @@ def rows_of(source: TextFile, row: Callable[[str], list[str] | None]) -> tuple[l
             cells = row(line)
             if cells is not None:
                 found.append(cells)
-            elif line.strip():
+            elif line.strip(_NOTHING):
                 other += 1
     return found, other
 
