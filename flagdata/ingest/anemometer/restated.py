@@ -30,6 +30,8 @@ KINDS = (
     "flagdata.ingest.anemometer.published",
     "flagdata.ingest.anemometer.pywws",
     "flagdata.ingest.anemometer.hours_across",
+    "flagdata.ingest.anemometer.smet",
+    "flagdata.ingest.anemometer.campbell_arrays",
     "flagdata.ingest.anemometer.station_lines",
     "flagdata.ingest.anemometer.aprs",
     "flagdata.ingest.anemometer.ft",
