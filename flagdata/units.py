@@ -105,6 +105,8 @@ SPELLINGS: dict[str, str] = {
     "knoten": "kn", "knopen": "kn", "nudos": "kn", "nudo": "kn", "nœuds": "kn", "noeuds": "kn", "nœud": "kn",
     "nodi": "kn",
     "nós": "kn", "knop": "kn", "knob": "kn", "knuter": "kn", "węzły": "kn", "узлы": "kn", "solmua": "kn",
+    "meter/sekund": "m/s", "meterprsekund": "m/s",
+    "kilometer/timme": "km/h", "kilometer/time": "km/h", "km/tim": "km/h",
     "meter/sekunde": "m/s", "meter/seconde": "m/s", "mètres/seconde": "m/s", "mètre/seconde": "m/s", "m/seg": "m/s",
     "metros/segundo": "m/s", "metri/secondo": "m/s", "metro/secondo": "m/s", "m/sek": "m/s", "m/sn": "m/s",
     "м/с": "m/s", "kilometer/stunde": "km/h", "km/std": "km/h", "km/stunde": "km/h", "km/u": "km/h", "km/uur": "km/h",

@@ -196,7 +196,7 @@ def _time(alone: Layout, layout: Layout) -> TimeChoice | None:
 
 
 def _value(layout: Layout, rest: Sequence[int]) -> int | None:
-    """The column of the values: the only one that is called so, or the only one of numbers.
+    """The column of the values: the only one that is called so, or the only one of numbers; the first of equal ones.
 
     Where no line names the columns, numbers that stay the same (a place, a mark) and instants are none.
     """
@@ -206,10 +206,15 @@ def _value(layout: Layout, rest: Sequence[int]) -> int | None:
         and _share_of(layout, index, "number") >= _FEW
     ]  # fmt: skip
     numbers = [index for index in rest if _share_of(layout, index, "number") >= _SHARE and not _measured(layout, index)]
-    values = told if len(told) == 1 else numbers
+    values = told if len(told) == 1 or _alike(layout, told) else numbers
     if len(values) > 1 and not any(layout.names):
         values = [at for at in values if len(set(layout.column(at))) > 1 and not _instants(layout, at)]
-    return values[0] if len(values) == 1 else None
+    return values[0] if len(values) == 1 or _alike(layout, values) else None
+
+
+def _alike(layout: Layout, columns: Sequence[int]) -> bool:
+    """Whether there are columns, and all hold the same cells."""
+    return len({tuple(layout.column(index)) for index in columns}) == 1
 
 
 def _instants(layout: Layout, index: int) -> bool:

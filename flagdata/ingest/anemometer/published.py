@@ -7,8 +7,8 @@ ends the day, UT; direction 0 calm, 990 variable); Météo-France, descriptions 
 of hourly data (m/s; its zone is not stated); AEMET OpenData, metadata (m/s; daily directions in tens of degrees, 99
 variable, 88 none); MeteoSwiss, "Open Data: automatic weather stations", parameters, and legends of IDAweb and VQHA80
 (UTC; fkl, fk1 in m/s, fu3 in km/h, of 10 minutes (z), an hour (h) or a day (d); "-" missing); Meteostat, "Hourly Data"
-(km/h); WeeWX, "Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's archive
-shares.
+(km/h); Iowa Environmental Mesonet, "ASOS download" (sped in mph, M or null missing; the zone is chosen there); WeeWX,
+"Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's archive shares.
 """
 
 from __future__ import annotations
@@ -136,6 +136,15 @@ _PUBLISHED = (
         },
         stamp=_buoy,
         missing=dict.fromkeys(("WSPD", "WDIR", "WD", "GST", *_WEATHER_OF_BUOYS), _NO_BUOY),
+    ),
+    _Published(
+        about="the Iowa Environmental Mesonet's table of airports",
+        needs=(_need("station", "valid", "sped"),),
+        columns={
+            "station": "station", "valid": "time", "sped": "wind speed [mph]", "drct": "wind direction [deg]",
+            "gust_mph": "gust [mph]", "tmpc": "air temperature [degC]", "relh": "relative humidity [%]",
+        },
+        missing=dict.fromkeys(("sped", "drct", "gust_mph", "tmpc", "relh"), frozenset({"M", "null", "None"})),
     ),
     _Published(
         about="DWD's hourly wind",
@@ -302,7 +311,7 @@ def _find(lines: Sequence[str]) -> _Found | None:
             names = tuple(cell.strip().strip('"') for cell in cells)
             if names and names[0].startswith("# "):
                 names = (names[0][2:].strip(), *names[1:])
-            if len(names) < 4 or len(set(names)) < len(names) - names.count("") - 3:
+            if len(names) < 3 or len(set(names)) < len(names) - names.count("") - 3:
                 continue
             held = set(names)
             if held >= _WEEWX:

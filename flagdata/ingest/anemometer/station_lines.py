@@ -2,16 +2,18 @@
 
     2024 05 17 22   123    81 10123   230    42 -9999 -9999 -9999      NOAA's ISD-Lite
     17/05/24 22:00:00 14.1 71 8.9 17.3 25.6 231 … 3 km/h C hPa mm …    Cumulus, realtime.txt
+    17-05-24;22:00;14,1;71;8,9;17,3;25,6;231;0,0;0,0;1012,4;210,3;…    Cumulus, monthly log
     12345 5.7 8.5 232 12.3 77 1012.4 … 22 00 00 station … !!C1!!       Weather Display, clientraw.txt
     2024-05-17,22,12.3,8.1,77,0.0,,238,17.1,25.0,1012.3,,3             Meteostat, bulk data by the hour
     94846KORD ORD2024051716002200  0.113 D   229   8   229   12 …      NCEI DSI-6405, ASOS 1-minute
 
 Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
 Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (fields 6
-average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes); Weather Display's
-list of the fields of clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the
-clock, 35 and 36 day and month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2
-minutes and of 5 seconds).
+average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes) and "Standard log
+files" (day first; 6 average speed, 7 gust, 8 average bearing; units are the station's settings); Weather Display's list
+of the fields of clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock,
+35 and 36 day and month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes
+and of 5 seconds).
 """
 
 from __future__ import annotations
@@ -27,10 +29,13 @@ from flagdata.ingest.anemometer.source import TableText, TextFile
 _SHARE = 0.8
 _ISD = re.compile(r"\s*(\d{4})\s+(\d\d)\s+(\d\d)\s+(\d\d)((?:\s+-?\d{1,5}){8})\s*")
 _REALTIME = re.compile(r"\d{1,2}[-/.]\d{1,2}[-/.]\d{2}\s+\d{2}:\d{2}:\d{2}\s")
+_MONTHLY = re.compile(r"(\d{1,2})([-/.])(\d{1,2})\2(\d{2})([;,\t])(\d{1,2}:\d{2})\5")
 _DAY = re.compile(r"\d{4}-\d\d-\d\d")
 _UNITS = {"m/s": "m/s", "mph": "mph", "km/h": "km/h", "kts": "kn", "knots": "kn"}
 _ASOS = re.compile(r"\s*\d{5}[A-Z0-9]{4}\s+[A-Z0-9]{3}(?P<day>\d{8})(?P<local>\d{4})(?P<utc>\d{4})(?P<rest>\s.*)")
 _FOUR = re.compile(r"(?:^|\s)[DN]\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})(?:\s|$)")
+_CUMULUS = 15
+"""Fields of Cumulus' monthly log up to the latest gust; its later versions have more."""
 _CLIENTRAW = 142
 """Fields of clientraw.txt up to the year."""
 
@@ -84,6 +89,24 @@ def _realtime(line: str) -> list[str] | None:
     return [cells[0], cells[1], cells[5], cells[6], gust, cells[7], cells[2] if warm else "", _UNITS[cells[13]], warm]
 
 
+def _monthly(line: str) -> list[str] | None:
+    match = _MONTHLY.match(line)
+    if match is None:
+        return None
+    day, _, month, year, delimiter, clock = match.groups()
+    cells = [cell.strip().replace(",", ".") for cell in line.rstrip("\r\n").split(delimiter)]
+    if len(cells) < _CUMULUS or not all(re.fullmatch(r"-?\d+(?:\.\d+)?", cell) for cell in cells[2:_CUMULUS]):
+        return None
+    number = dict(enumerate(map(float, cells[2:_CUMULUS]), start=2))
+    shares = all(0 <= number[at] <= 100 for at in (3, 13))
+    pressed = 850 < number[10] < 1100 or 25 < number[10] < 32.5
+    if not (shares and pressed and 0 <= number[5] <= number[6] and 0 <= number[7] <= 360):
+        return None
+    if not (1 <= int(day) <= 31 and 1 <= int(month) <= 12):
+        return None
+    return [f"20{year}-{int(month):02d}-{int(day):02d} {clock}", *cells[5:8], cells[3]]
+
+
 def _clientraw(line: str) -> list[str] | None:
     cells = line.split()
     if len(cells) < _CLIENTRAW or cells[0] != "12345" or not cells[141].isdigit():
@@ -133,6 +156,10 @@ _KINDS = (
             "air temperature",
         ),
         row=_realtime,
+    ),
+    _Lines(
+        about="Cumulus' monthly log",
+        names=("time", "wind speed average", "gust", "wind direction [deg]", "relative humidity [%]"), row=_monthly,
     ),
     _Lines(
         about="Weather Display's clientraw.txt",

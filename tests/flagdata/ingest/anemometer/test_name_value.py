@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.errors import InputError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
 
 Write = Callable[[str], Path]
@@ -84,3 +85,15 @@ def test_a_date_and_a_clock_of_different_zones_are_not_joined(log_file: Write) -
     rows = "".join(f"2026-04-30,22:{at:02d},2026-05-01,05:{at:02d},{_SPEEDS[at]}\n" for at in range(20))
     log = read_log(log_file(f"Date Local,Time Local,Date GMT,Time GMT,wind speed (m/s)\n{rows}"))
     assert log.series.time.astype("datetime64[ns]")[0] == np.datetime64("2026-05-01T05:00")
+
+
+def test_of_columns_of_the_same_values_the_first_is_read_with_the_unit_beside_it(log_file: Write) -> None:
+    rows = "".join(
+        f'4,Vindhastighet,"medelvärde 10 min",meter per sekund,{_stamp(at)},{speed},{speed},G\n'
+        for at, speed in enumerate(_SPEEDS)
+    )
+    heading = "parameter_id,parameter_name,summary,unit,datetime_utc,value,value_numeric,quality\n"
+    np.testing.assert_allclose(read_log(log_file(heading + rows)).series.channels["wind_speed"], _SPEEDS)
+    other = rows.replace(f"{_SPEEDS[3]},{_SPEEDS[3]}", f"{_SPEEDS[3]},9.9")
+    with pytest.raises(InputError, match="no column is surely a wind"):
+        read_log(log_file(heading + other))

@@ -226,3 +226,24 @@ def test_twelve_whole_numbers_after_a_date_need_not_be_isd_lite(log_file: Write)
     with pytest.raises(FlagdataError) as caught:
         read_log(log_file("\n".join(lines)))
     assert "--columns" in (caught.value.fix or "")
+
+
+@pytest.mark.parametrize(("date", "delimiter", "comma"), [("%d-%m-%y", ";", True), ("%d/%m/%y", ",", False)])
+def test_cumulus_monthly_log_is_told_by_its_fields_and_its_day_comes_first(
+    read: Read, date: str, delimiter: str, comma: bool
+) -> None:
+    lines = []
+    for t, s, d in rows():
+        cells = ["7.9", "87", "5.9", f"{s:.1f}", f"{s + 2:.1f}", f"{d}", "0.0", "0.0", "1028.0", "210.3", "21.5", "52",
+                 f"{s + 1:.1f}", "7.9", "7.9"]  # fmt: skip
+        text = delimiter.join([t.strftime(date), t.strftime("%H:%M"), *cells])
+        lines.append(text.replace(".", ",") if comma else text)
+    log = read("\n".join(lines) + "\n", zone="UTC", unit="km/h")
+    check(log, 1 / 3.6)
+    np.testing.assert_allclose(log.series.channels["relative_humidity"], 0.87)
+
+
+def test_the_speeds_of_the_iowa_mesonet_are_miles_an_hour(read: Read) -> None:
+    lines = [f"EDXW,{t:%Y-%m-%d %H:%M},{'M' if at == 3 else s},{'M' if at == 3 else d}" for at, (t, s, d) in
+             enumerate(rows())]  # fmt: skip
+    check(read("station,valid,sped,drct\n" + "\n".join(lines), zone="UTC"), MILE, missing=3)
