@@ -52,6 +52,26 @@ def _iberian() -> dict[str, float]:
     return found
 
 
+def _russian() -> dict[str, float]:
+    """СЕВЕРО-ВОСТОК, of the wind СЕВЕРО-ВОСТОКА, as the weather pages rp5 say "Ветер, дующий с северо-востока"."""
+    of = {"N": "СЕВЕР", "E": "ВОСТОК", "S": "ЮГ", "W": "ЗАПАД"}
+    found: dict[str, float] = {}
+    for point, degrees in _DEGREES.items():
+        name = "".join(f"{of[letter]}О-" for letter in point[:-1]) + of[point[-1]]
+        found |= dict.fromkeys((name, f"{name}А", f"ВЕТЕР, ДУЮЩИЙ С {name}А"), degrees)
+    return found
+
+
+def _blowing() -> dict[str, float]:
+    """WIND BLOWING FROM THE SOUTH-SOUTHWEST, as the weather pages rp5 say in English."""
+    of = dict(zip("NESW", _WORDS["en"], strict=True))
+    return {
+        "WIND BLOWING FROM THE " + "-".join([*(of[letter] for letter in point[:-2]),
+                                             "".join(of[letter] for letter in point[-2:])]): degrees
+        for point, degrees in _DEGREES.items()
+    }  # fmt: skip
+
+
 def _letters(north: str, east: str, south: str, west: str) -> dict[str, float]:
     of = {"N": north, "E": east, "S": south, "W": west}
     return {"".join(of[letter] for letter in point): degrees for point, degrees in _DEGREES.items()}
@@ -63,9 +83,12 @@ _FAR_EAST = {
     "".join(_KANJI[letter] for letter in spelled): _DEGREES[point]
     for point in _ROSE for spelled in {point, point[:-2] + point[-2:][::-1]}
 }  # fmt: skip
-_NAMES: dict[str, float] = {
-    name: degrees for words in _WORDS.values() for name, degrees in _spelled(words).items()
-} | _iberian()
+_NAMES: dict[str, float] = (
+    {name: degrees for words in _WORDS.values() for name, degrees in _spelled(words).items()}
+    | _iberian()
+    | _russian()
+    | _blowing()
+)
 _COMMON = _NAMES | _FAR_EAST | {name.replace("東", "东"): degrees for name, degrees in _FAR_EAST.items()}
 
 POINTS: Mapping[str, float] = _COMMON | _DEGREES
@@ -89,13 +112,15 @@ _HEADINGS = {
 """Words of a heading that tell its language."""
 STILL = frozenset(
     {
-        "c", "calm", "calm wind", "calm winds", "still", "calma", "calmo", "windstille", "calme", "штиль", "stil",
-        "stille", "vindstille", "windstil", "no wind", "静穏", "静风", "靜風", "無風", "无风", "静稳",
+        "c", "calm", "calm wind", "calm winds", "calm, no wind", "still", "calma", "calmo", "windstille", "calme",
+        "штиль", "штиль, безветрие", "stil", "stille", "vindstille", "windstil", "no wind",
+        "静穏", "静风", "靜風", "無風", "无风", "静稳",
     }
 )  # fmt: skip
 """Words for calm air, which stand for a speed of 0 and for no direction."""
 CALM = STILL | {
     "none", "variable", "vrb", "var", "cvr", "cv", "cal", "umlaufend", "variabel", "風向不定", "风向不定", "不定",
+    "переменное направление", "ветер переменного направления", "variable wind direction",
 }  # fmt: skip
 """What stands in a column of points where there is no direction."""
 

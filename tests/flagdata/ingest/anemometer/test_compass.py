@@ -36,6 +36,11 @@ def _log(log_file: Write, heading: str, points: list[str], **options: str) -> Wi
         ("Wind direction", ["SV", "NØ", "VSV"], [225, 45, 247.5]),
         ("Wind direction", ["KKB", "D", "GB"], [337.5, 90, 225]),
         ("Wind direction", ["СЗ", "В", "ЮЮВ"], [315, 90, 157.5]),
+        ("DD", [f"Ветер, дующий с {point}" for point in ("юго-юго-запада", "севера", "востоко-северо-востока")],
+         [202.5, 0, 67.5]),
+        ("DD", [f"Wind blowing from the {point}" for point in ("south-southwest", "north", "east-northeast")],
+         [202.5, 0, 67.5]),
+        ("Wind direction", ["Северо-запад", "Юг", "Восток"], [315, 180, 90]),
         ("風向", ["南西", "北", "東北東"], [225, 0, 67.5]),
     ],
 )  # fmt: skip
@@ -55,7 +60,7 @@ def test_an_o_that_may_be_east_or_west_is_left_out_and_asked_for(log_file: Write
     assert np.rad2deg(_log(log_file, "Direction", ["O"], columns=line).series.channels["wind_direction"][0]) == 90
 
 
-@pytest.mark.parametrize("word", ["calm", "VRB", "cv", "Windstille"])
+@pytest.mark.parametrize("word", ["calm", "VRB", "cv", "Windstille", "Calm, no wind", "Штиль, безветрие"])
 def test_calm_and_variable_wind_have_no_direction(log_file: Write, word: str) -> None:
     direction = _log(log_file, "Wind Direction", ["N", word, "SW"]).series.channels["wind_direction"]
     assert np.isnan(direction[1])
