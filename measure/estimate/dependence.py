@@ -1,16 +1,13 @@
 """How alike the errors of a model are in two windows of one film: measured on simulated films, whose truth is known.
 
 All is on the targets' logits z, less the prior's mean and over its standard deviation; a window's posterior there has
-mean m and variance v. All pairs of windows of a film are looked at, over films, one film a simulation.
+mean m and variance v. Correlations are those of all pairs of windows of a film, over films, one film a simulation.
 
-- Of the wind, of which each window has its own posterior: the covariance of the errors (m − z)/√v. It is their
-  correlation where posteriors are as wide as their errors, and more where they are too narrow, so that
-  v (1/K + (1 − 1/K) covariance) is the variance of the mean of K windows whatever their widths say.
-- Of the cloth, of which likelihoods are multiplied: the correlation of the scores s = m/v − (1/v − 1) z, the
-  derivatives at the truth of the logarithms of the Gaussian likelihoods that the posteriors stand for. A window that
-  tells nothing has a score of 0, whereas its error is that of the prior, the same in both. Tempering by the
-  correlation of scores adjusts the magnitude of a composite likelihood (Ribatet, Cooley and Davison, Statistica Sinica
-  22, 2012).
+- Of the wind, of which each window has its own posterior: of the errors (m − z)/√v.
+- Of the cloth, of which likelihoods are multiplied: of the scores s = m/v − (1/v − 1) z, the derivatives at the truth
+  of the logarithms of the Gaussian likelihoods that the posteriors stand for. A window that tells nothing has a score
+  of 0, whereas its error is that of the prior, the same in both. Tempering by the correlation of scores adjusts the
+  magnitude of a composite likelihood (Ribatet, Cooley and Davison, Statistica Sinica 22, 2012).
 
 Windows of the films (`measure.estimate.long_films`) follow each other and do not overlap, as those do that an answer
 rests on. The result belongs to a model. It stands in the model's card under "window_correlation", where `of_model`
@@ -57,17 +54,17 @@ class Errors:
     names: tuple[str, ...]
     values: NDArray[np.float64]
 
-    def dependence_of(self, name: str, *, seed: int = 0) -> tuple[float, float]:
-        """How alike one target is told by two windows, a covariance or a correlation as the module's text says, and the
-        upper end of its one-sided 90 % interval by resampling films."""
-        own, found = self.values[..., self.names.index(name)], _covariance if name in OWN else _correlation
+    def correlation(self, name: str, *, seed: int = 0) -> tuple[float, float]:
+        """The correlation of one target in two windows, and the upper end of its one-sided 90 % interval by resampling
+        films."""
+        own = self.values[..., self.names.index(name)]
         generator = stream(seed, "window-correlation", name)
         drawn = generator.integers(len(own), size=(_RESAMPLES, len(own)))
-        return found(own), float(np.quantile([found(own[rows]) for rows in drawn], _UPPER))
+        return _about_zero(own), float(np.quantile([_about_zero(own[rows]) for rows in drawn], _UPPER))
 
     def dependence(self, *, seed: int = 0) -> Dependence:
         """What is used: upper ends, not below 0; of the cloth's targets the largest."""
-        ends = {name: min(max(self.dependence_of(name, seed=seed)[1], 0.0), 1.0) for name in self.names}
+        ends = {name: min(max(self.correlation(name, seed=seed)[1], 0.0), 1.0) for name in self.names}
         films, windows, _ = self.values.shape
         return Dependence(
             wind=max((end for name, end in ends.items() if name in OWN), default=1.0),
@@ -158,25 +155,22 @@ def errors_of(draws: NDArray[np.float64], truth: NDArray[np.float64], names: Seq
     return np.where(own, error, score)
 
 
-def _covariance(own: NDArray[np.float64]) -> float:
-    """Covariance of two windows of (film, window) values whose means are known to be 0, over all pairs of windows."""
-    films, count = own.shape
-    return float((np.square(own.sum(axis=1)).sum() - np.square(own).sum()) / (films * count * (count - 1)))
-
-
-def _correlation(own: NDArray[np.float64]) -> float:
-    """The same over the variance of a window; 1 where all values are 0."""
-    square = np.square(own).mean()
-    return float(_covariance(own) / square) if square > 0 else 1.0
+def _about_zero(own: NDArray[np.float64]) -> float:
+    """Correlation of two windows of (film, window) values whose means are known to be 0, over all pairs of windows; 1
+    where all are 0."""
+    count = own.shape[1]
+    square = np.square(own).sum()
+    pairs = np.square(own.sum(axis=1)).sum() - square
+    return float(pairs / (count - 1) / square) if square > 0 else 1.0
 
 
 def card_entry(found: Errors, *, seed: int = 0) -> dict[str, Any]:
     """What a model's card says of it."""
     used = found.dependence(seed=seed)
-    each = {name: found.dependence_of(name, seed=seed) for name in found.names}
+    each = {name: found.correlation(name, seed=seed) for name in found.names}
     return {
         "wind": used.wind, "cloth": used.cloth, "source": used.source,
-        "targets": {name: {"value": value, "upper": upper} for name, (value, upper) in each.items()},
+        "targets": {name: {"correlation": value, "upper": upper} for name, (value, upper) in each.items()},
     }  # fmt: skip
 
 
@@ -216,7 +210,7 @@ def main(name: str, films: int, windows: int, seed: int, out: Path) -> None:
         )
     card = {key: value for key, value in read_card(out / name).items() if key != "format"}
     write_card(out / name, {**card, CARD_KEY: entry})
-    say(f"two windows depend on each other by {entry['wind']:.2f} in wind and {entry['cloth']:.2f} in cloth")
+    say(f"errors of two windows correlate by {entry['wind']:.2f} in wind and {entry['cloth']:.2f} in cloth")
 
 
 def _counted(films: Iterable[LongFilm], advance: Callable[[int], None]) -> Iterable[LongFilm]:

@@ -34,27 +34,15 @@ def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
 def test_the_correlation_of_the_cloths_likelihoods_is_found_whether_they_tell_much_or_little(
     correlation: float, noise: float
 ) -> None:
-    value, upper = simulated(correlation, noise=noise).dependence_of("density")
+    value, upper = simulated(correlation, noise=noise).correlation("density")
     assert value == pytest.approx(correlation, abs=0.04)
     assert value <= upper <= value + 0.05
 
 
 def test_the_winds_errors_count_with_what_the_prior_has_in_common() -> None:
     # With noise ≫ 1 both posteriors are the prior, whose error is the same in both.
-    assert simulated(0.0, noise=50.0).dependence_of("wind_speed")[0] > 0.9
-    assert simulated(0.0, noise=0.01).dependence_of("wind_speed")[0] < 0.1
-
-
-def test_winds_whose_posteriors_are_too_narrow_covary_by_more_than_they_correlate() -> None:
-    """K windows with errors of variance s² and correlation ρ, all told with variance 1: the variance of their mean is
-    s² (ρ + (1 - ρ)/K), of which the covariance s² ρ is what does not fall with K."""
-    rng, correlation, spread = stream(2, "films"), 0.6, 1.2
-    common, own = rng.normal(size=(4000, 1, 1)), rng.normal(size=(4000, 4, 1))
-    values = spread * (np.sqrt(correlation) * common + np.sqrt(1 - correlation) * own)
-    value, upper = Errors(names=("wind_speed",), values=values).dependence_of("wind_speed")
-    assert value == pytest.approx(spread**2 * correlation, abs=0.04)
-    assert value <= upper <= value + 0.05
-    assert np.var(values.mean(axis=1)) == pytest.approx(value + (spread**2 - value) / 4, abs=0.04)
+    assert simulated(0.0, noise=50.0).correlation("wind_speed")[0] > 0.9
+    assert simulated(0.0, noise=0.01).correlation("wind_speed")[0] < 0.1
 
 
 def test_a_window_as_wide_as_the_prior_has_no_score() -> None:
@@ -72,6 +60,6 @@ def test_the_cards_entry_is_what_was_measured(model: Estimator) -> None:
     entry = card_entry(found)
     told = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
     assert told == found.dependence()
-    assert told.cloth >= entry["targets"]["density"]["value"]
+    assert told.cloth >= entry["targets"]["density"]["correlation"]
     with pytest.raises(CorruptError, match="measure it anew"):
         of_model(replace(model, card={**model.card, CARD_KEY: {"wind": 3}}))
