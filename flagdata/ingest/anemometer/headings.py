@@ -130,6 +130,7 @@ _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
 _RATE = re.compile(r"(?<![\d.])\d+(?:\.\d+)?\s?k?Hz(?![^\W_])", re.IGNORECASE)
 """The rate of samples in a heading ("u_20Hz"), which is no unit."""
 _OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
+_U_SONIC = re.compile(r"\bu[- ]?sonic\b", re.IGNORECASE)  # an ultrasonic anemometer, as METOS writes; no component u
 """How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
 _TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
 """What a heading says of numbers that are ten or a hundred times the quantity, or a tenth: it is to be asked."""
@@ -188,7 +189,7 @@ def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
     text = _RATE.sub(" ", text)
-    text = _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text))
+    text = _U_SONIC.sub("sonic", _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text)))
     tenfold = _TENFOLD.search(text)
     text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)

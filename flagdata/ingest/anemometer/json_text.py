@@ -43,6 +43,8 @@ _PLATFORM = frozenset(
 _REPEAT = "sequence_num"
 """The number of a repeat of one radio message, from 0, as rtl_433 writes it."""
 _NUMBERED = re.compile(r"[0-9]{1,9}")
+_OF_RECORDING = re.compile(r"@([0-9]+(?:\.[0-9]+)?)s")
+"""Seconds since the beginning of a radio recording, as rtl_433 stamps what it reads from a file."""
 _DATE_AND_TIME = re.compile(
     r"\s*\[?(?P<date>\d{4}[-/]\d{1,2}[-/]\d{1,2}),?\s+(?P<time>\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?)\]?(?=\s|$)"
 )
@@ -112,6 +114,7 @@ def as_table(source: TextFile) -> TableText | None:
     if not names:
         return None
     table, repeats = _once(table)
+    table, names = _of_recording(table, names)
     kept, others = _of_wind(table, tuple(names))
     if others:
         names = dict.fromkeys(name for name in names if any(name in row for row in kept))
@@ -166,6 +169,19 @@ def _once(table: Sequence[dict[str, str]]) -> tuple[list[dict[str, str]], int]:
         kept.append(row)
         last = row
     return kept, len(table) - len(kept)
+
+
+def _of_recording(table: list[dict[str, str]], names: dict[str, None]) -> tuple[list[dict[str, str]], dict[str, None]]:
+    """The rows and columns, with seconds since the beginning of a radio recording made numbers."""
+    said = [row["time"] for row in table if row.get("time")]
+    if not said or not all(_OF_RECORDING.fullmatch(text) for text in said):
+        return table, names
+    counted = [
+        {"time [s]" if name == "time" else name: cell for name, cell in row.items()}
+        | ({"time [s]": _OF_RECORDING.sub(r"\1", row["time"])} if row.get("time") else {})
+        for row in table
+    ]
+    return counted, dict.fromkeys("time [s]" if name == "time" else name for name in names)
 
 
 def _of_wind(table: Sequence[dict[str, str]], names: Sequence[str]) -> tuple[list[dict[str, str]], int]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.errors import FlagdataError, InputError, LimitError
+from flagdata.errors import FlagdataError, InputError, LimitError, TimeError
 from flagdata.ingest.anemometer import WindOptions, read_log, sniff
 from flagdata.signals import WindLog
 
@@ -38,6 +38,15 @@ def test_members_within_members_are_named_by_their_path_and_need_a_unit(read: Re
     with pytest.raises(InputError, match=r"unit of column 'data.wind.speed' is not stated"):
         read(text)
     assert read(text, unit="m/s").series.channels["wind_speed"].tolist() == SPEEDS
+
+
+def test_seconds_of_a_radio_recording_count_from_its_start(read: Read) -> None:
+    text = lines([{"time": f"@{at:.6f}s", "wind_avg_km_h": 3.6 * speed} for at, speed in enumerate(SPEEDS)])
+    with pytest.raises(TimeError, match="count from a start"):
+        read(text)
+    series = read(text, start=START * 10**9).series
+    assert series.time.tolist() == [(START + at) * 10**9 for at in range(len(SPEEDS))]
+    assert series.channels["wind_speed"].tolist() == pytest.approx(SPEEDS)
 
 
 def test_tempest_observations_are_arrays_in_the_order_of_its_reference(read: Read) -> None:

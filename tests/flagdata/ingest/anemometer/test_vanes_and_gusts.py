@@ -81,3 +81,9 @@ def test_a_direction_in_a_unit_of_speed_with_values_of_either_is_left_out_and_to
     assert "wind_direction" not in log.series.channels
     (left,) = [finding.what for finding in log.findings if finding.kind == "columns-not-read"]
     assert "Wind direction (m/s)" in left
+
+
+def test_the_u_of_u_sonic_is_no_component() -> None:
+    heading = understand("U-sonic wind speed [m/s]")
+    assert (heading.channel, heading.sure, heading.unit) == ("wind_speed", True, "m/s")
+    assert understand("U wind [m/s]").channel == "wind_x"
