@@ -49,7 +49,11 @@ _BEHIND: dict[str, tuple[str, frozenset[str]]] = {
     "second": (r"s", frozenset({"minute"})),
 }  # fmt: skip
 """Headings that are of a part of a time only behind another part: they are short, or mean other things as well."""
-_ZONES = r"( utc| gmt| local| lst)?"
+_ZONES = (
+    r"( (?:d[aeo] |de la |del |della )?(?:medi[cç][aã]o|medici[oó]n|observa[cç][aã]o|observaci[oó]n|leitura|lectura|"
+    r"misura|osservazione|mesure|observation))?( utc| gmt| local| lst)?"
+)
+"""What may stand behind the heading of a part of a time: that it is the measurement's, and in which zone."""
 _LIMITS = {
     "year": (0, 2100), "month": (1, 12), "day": (1, 31), "doy": (1, 367), "hour": (0, 24), "minute": (0, 59),
     "second": (0, 60),

@@ -55,8 +55,8 @@ VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", 
 """Words of the component of the wind upwards, which is no speed of wind."""
 _OTHER = frozenset(
     {
-        "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "rotor",
-        "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
+        "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "sos",
+        "rotor", "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
         "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
@@ -130,6 +130,7 @@ _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
 _RATE = re.compile(r"(?<![\d.])\d+(?:\.\d+)?\s?k?Hz(?![^\W_])", re.IGNORECASE)
 """The rate of samples in a heading ("u_20Hz"), which is no unit."""
 _OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
+_GLUED = re.compile(r"(?:speed|velocity|wind|gust)(?P<unit>km[/._]h|m[/._]s)$", re.IGNORECASE)
 _U_SONIC = re.compile(r"\bu[- ]?sonic\b", re.IGNORECASE)  # an ultrasonic anemometer, as METOS writes; no component u
 """How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
 _TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
@@ -347,6 +348,9 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
     mangled = re.search(r"\.+((?:X\.)?(?:m\.s|km\.h|mph|kn|kts|knots|m\.s\.1|deg|C|hPa|mbar))\.*$", text)
     if mangled is not None and (inside := _known(mangled[1].replace(".1", "-1").replace(".", "/"))) is not None:
         return text[: mangled.start()], inside
+    glued = _GLUED.search(text)
+    if glued is not None and (inside := _known(re.sub(r"[._]", "/", glued["unit"]))) is not None:
+        return text[: glued.start("unit")], inside
     pieces = re.split(r"(\s*,\s*|\s+|_|;|:|-(?=[a-zA-Z]))", text)
     for count in (5, 3, 1):
         # At the end ("wind_speed_km_h", "Wind Speed, m/s") and at the beginning ("m/s Wind Speed").

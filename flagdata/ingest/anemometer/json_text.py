@@ -23,7 +23,7 @@ from typing import Any
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import coverage_json, json_measures, json_series
-from flagdata.ingest.anemometer.headings import understand, words_of
+from flagdata.ingest.anemometer.headings import names_time, understand, words_of
 from flagdata.ingest.anemometer.layout import cell_kind
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
@@ -259,11 +259,28 @@ def _items(whole: Any) -> list[Any]:
         # Beside readings there may be a list of stations, which has no times.
         lists = [one for one in lists if _timed(one)] or lists
         if len(lists) == 1:
-            return json_measures.by_station(lists[0])
+            return json_measures.by_station(_readings_within(lists[0]))
         level = [member for item in level for member in item.values() if isinstance(member, dict)]
         if lists or not level:
             break
     return [whole]
+
+
+def _readings_within(items: list[Any]) -> list[Any]:
+    """The readings of sensors that hold a list of them each, beside what is said of the sensor; else the items.
+
+    {"sensors":[{"lsid":1,"data":[{"ts":1777636800,"wind_speed_avg":3}, …]}, …]}   Davis, "WeatherLink v2 API"
+    """
+    found: list[Any] = []
+    for item in items:
+        lists = {key: value for key, value in item.items() if isinstance(value, list)} if isinstance(item, dict) else {}
+        if len(lists) != 1:
+            return items
+        ((key, readings),) = lists.items()
+        if not readings or not all(isinstance(one, dict) and any(map(names_time, one)) for one in readings):
+            return items
+        found += [{name: value for name, value in item.items() if name != key} | one for one in readings]
+    return found if len(found) > len(items) else items
 
 
 def _timed(items: Sequence[Any]) -> bool:

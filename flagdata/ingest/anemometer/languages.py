@@ -16,13 +16,15 @@ _SPEED = (
     r"r[ýy]chlos[ťt][\s_]*vetra|r[üu]zgar[\s_]*h[ıi]z[ıi]|kecepatan\s*angin|tuulen\s*(?:keski)?nopeus|tuule\s*kiirus|"
     r"vindhastighe[dt]|vindstyrka|middelvind|medelvind|szélsebesség|vitez[aă]\s*v[aâ]ntului|hitrost\s*vetra|"
     r"brzina\s*vjetra|ταχύτητα\s*(?:του\s*)?ανέμου|מהירות\s*ה?רוח|سرعة\s*الرياح|tốc\s*độ\s*gió|vēja\s*ātrums|"
-    r"vėjo\s*greitis|velocita\s*vento|velocidad\s*viento"
+    r"vėjo\s*greitis|velocita\s*vento|velocidad\s*viento|(?:meðal)?vindhraði|velocitat\s*(?:mitjana\s*)?(?:del\s*)?vent|"
+    r"haizearen\s*abiadura|ความเร็วลม|سرعت\s*باد|shpejtësia\s*e\s*erës"
 )
 _DIRECTION = (
     r"风向|風向|풍향|направление\s*ветра|напрям(?:ок)?\s*вітру|посока\s*на\s*вятъра|kierunek[\s_]*wiatru|sm[ěe]r[\s_]*v[ěe]tru|"
     r"smer[\s_]*vetra|r[üu]zgar[\s_]*y[öo]n[üu]|arah\s*angin|tuulen\s*suun\w*|tuule\s*suund|vindretning|vindriktning|"
     r"szélirány|direc[tț]i[ae]\s*v[aâ]ntului|smjer\s*vjetra|(?:διεύθυνση|κατεύθυνση)\s*(?:του\s*)?ανέμου|"
-    r"כיוון\s*ה?רוח|اتجاه\s*الرياح|hướng\s*gió|vēja\s*virziens|vėjo\s*kryptis"
+    r"כיוון\s*ה?רוח|اتجاه\s*الرياح|hướng\s*gió|vēja\s*virziens|vėjo\s*kryptis|vindátt|vindstefna|"
+    r"direcció\s*(?:mitjana\s*)?(?:del\s*)?vent|haizearen\s*norabidea|ทิศทางลม|جهت\s*باد|drejtimi\s*i\s*erës"
 )
 _TIME = (
     r"时间|時間|时刻|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|годин[аи]|godzina|čas|zaman|waktu|tanggal|aika|"
@@ -42,14 +44,15 @@ _WORDS = tuple(
         (r"\b(?:дата|päivämäärä|dátum|ημερομηνία|תאריך|التاريخ|ngày)\b", "date"),
         (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"), (r"^\s*[日일]\s*$", "day"),
         (r"^\s*[時时시]\s*$", "hour"), (r"^\s*[分분]\s*$", "minute"), (r"^\s*[秒초]\s*$", "second"),
-        (r"м/с|מטר\s*לשנ\w*", "m/s"), (r"μοίρες|מעלות|asteet", "deg"),
-        (r"м/с", "m/s"), (r"км/ч", "km/h"), (r"\bград(?:усы)?\b\.?", "deg"), (r"℃", "°C"),
+        (r"м/с(?:ек)?|מטר\s*לשנ\w*|מ/ש|م/ث|متر/ثانیه|เมตร/วินาที|mét/giây", "m/s"), (r"км/ч", "km/h"),
+        (r"μοίρες|מעלות|asteet|(?<=\[)fok(?=\])|(?<=\()fok(?=\))|องศา|درجه|درجة", "deg"),
+        (r"\bград(?:усы)?\b\.?", "deg"), (r"℃", "°C"),
     )
 )  # fmt: skip
 
 
 _ASCII = re.compile(
-    r"angin|poryw|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|wiatru|pomiaru|vetru|vjetra|vetra|vantului|viento|vento",
+    r"angin|poryw|ruzgar|godzina|zaman|waktu|tanggal|maks|tuule|\baika\b|vind|wiatru|pomiaru|vetru|vjetra|vetra|vantului|viento|vento|velocitat|haizea",
     re.IGNORECASE,
 )
 """What there is of these words in letters of ASCII."""

@@ -31,6 +31,7 @@ KINDS = (
     "flagdata.ingest.anemometer.pywws",
     "flagdata.ingest.anemometer.hours_across",
     "flagdata.ingest.anemometer.smet",
+    "flagdata.ingest.anemometer.lvm",
     "flagdata.ingest.anemometer.campbell_arrays",
     "flagdata.ingest.anemometer.station_lines",
     "flagdata.ingest.anemometer.aprs",

@@ -32,8 +32,17 @@ _FEWEST, _SHARE = 3, 0.6
 """Rows of a site, and the share of the sites that a stamp holds, by which words alone tell sites apart."""
 _AT_ONCE = 3
 """Rows of one stamp, all of other words, from which on they are sites though each has that row alone."""
+_HIGHEST = 200
+"""Heights of a mast or a profiler."""
 _ADDRESS = re.compile(r"(?:[0-9a-f]{2}[:-]){5,7}[0-9a-f]{2}|(?=.*[a-f])(?:[0-9a-f]{12}|[0-9a-f]{16})", re.IGNORECASE)
 """Addresses of network cards and radio nodes (EUI-48, EUI-64), which are sites whatever their column is called."""
+_HEIGHTS = frozenset(
+    {
+        "height", "heights", "level", "altitude", "elevation", "vertical", "position", "agl", "höhe", "hoehe", "altura",
+        "hauteur", "quota", "m",
+    }
+)  # fmt: skip
+"""Words of a heading whose numbers tell the heights of a mast or a profiler apart, where each stamp has each once."""
 _RELAYS = frozenset({"gateway", "gateways", "gw", "gtw", "rx", "receiver", "router", "bridge", "bssid"})
 _NUMBERED = frozenset({"code", "number", "no", "nr", "num", "dev", "end"})
 """Words beside which a heading is still that of a site."""
@@ -51,7 +60,11 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
         cells = layout.column(index)
         kinds = sorted({cell for cell in cells if cell})
         addresses = _addresses(words, kinds)
-        if index in time or not (words & _SITES or addresses) or understand(name).quantity:
+        if index in time or understand(name).quantity:
+            continue
+        if words - {"m"} and words <= _HEIGHTS and _each_once(cells, stamps):
+            return index, tuple(kinds)
+        if not (words & _SITES or addresses):
             continue
         if not 2 <= len(kinds) <= _MOST:
             continue
@@ -65,6 +78,15 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
     if apart_by:  # a number that each row has for itself tells rows apart, too, but no sites
         return min(apart_by, key=lambda column: len(column[1]))
     return _in_every_stamp(layout, time, stamps) if shared else None
+
+
+def _each_once(cells: Sequence[str], stamps: Sequence[str]) -> bool:
+    """Whether each stamp holds a number of a column once, and the same few numbers return with the stamps."""
+    kinds = set(cells)
+    rows = len(set(stamps))
+    if not 2 <= len(kinds) <= _HIGHEST or rows < 2 or any(cell_kind(kind) != "number" for kind in kinds):
+        return False
+    return len(set(zip(stamps, cells, strict=True))) == len(cells) >= _SHARE * len(kinds) * rows
 
 
 def _is_place(cell: str) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted, dateparts, months, second_times, yearless_columns
@@ -337,6 +338,9 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     heading = understand(name, layout.units[index])
     if "wind" in heading.quantity and (heading.sure or not names_time(name)):
         return  # the s of m/s is none of seconds
+    if _hours_of_a_day(words, name, texts, value):
+        yield time_choice(layout, (index,), "elapsed-h", counted.parse(texts, "elapsed-h"), 0.1)
+        return
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
@@ -366,6 +370,15 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     yield choice
 
 
+def _hours_of_a_day(words: Sequence[str], name: str, texts: Sequence[str], value: NDArray[np.float64]) -> bool:
+    """Whether a column without a date counts the hours of one day: its heading is the hour, or 01, 02 … stand in it."""
+    if not bool(np.all((value >= 0) & (value <= 24)) and np.all(np.diff(value) == 1)):
+        return False
+    if not all(re.fullmatch(r"\s*\d{1,2}\s*", text) for text in texts):
+        return False
+    return set(words) <= _HOURS or (names_time(name) and any(re.match(r"\s*0\d", text) for text in texts))
+
+
 _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-ms", frozenset({"ms", "millis", "milliseconds", "millisecond", "msec", "msecs"})),
     ("elapsed-us", frozenset({"us", "micros", "microseconds", "usec", "µs", "μs"})),
@@ -374,6 +387,7 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-h", frozenset({"h", "hr", "hrs", "hour", "hours"})),
 )
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
+_HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
 _SLOW = 5000.0
 """Steps of a count from which it is as likely of microseconds as of milliseconds."""
 _SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0, "elapsed-h": 3600.0}

@@ -10,6 +10,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.headings import understand
 from flagdata.signals import WindLog
 from flagdata.units import spelled, unit
 
@@ -254,3 +255,27 @@ def test_units_in_brackets_of_a_second_line_of_names_are_those_of_the_columns(re
     assert log.series.channels["wind_speed"].tolist() == [3 + at % 5 for at in range(1, 25)]
     np.testing.assert_allclose(log.series.channels["air_temperature"], [291.15 + at % 3 for at in range(1, 25)])
     assert np.diff(log.series.time).tolist() == [3600 * 10**9] * 23
+
+
+@pytest.mark.parametrize(
+    ("heading", "channel", "unit"),
+    [
+        ("Wind SpeedKm/h", "wind_speed", "km/h"),
+        ("Wind.SpeedKm.h", "wind_speed", "km/h"),
+        ("WindSpeedm/s", "wind_speed", "m/s"),
+        ("Szélirány [fok]", "wind_direction", "deg"),
+        ("מהירות רוח (מ/ש)", "wind_speed", "m/s"),
+        ("سرعة الرياح (م/ث)", "wind_speed", "m/s"),
+        ("Vindhraði (m/s)", "wind_speed", "m/s"),
+        ("Vindátt", "wind_direction", None),
+        ("Velocitat mitjana del vent (m/s)", "wind_speed", "m/s"),
+        ("ความเร็วลม (เมตร/วินาที)", "wind_speed", "m/s"),
+        ("SOS (m/s)", "", "m/s"),
+    ],
+)
+def test_headings_of_further_languages_and_glued_units_are_understood(
+    heading: str, channel: str, unit: str | None
+) -> None:
+    found = understand(heading)
+    assert (found.channel, found.unit) == (channel, unit)
+    assert found.sure or not channel

@@ -53,3 +53,13 @@ def test_a_count_whose_unit_is_wrong_for_the_rows_is_still_named_with_all_units(
     with pytest.raises(FlagdataError, match="unit is not stated") as caught:
         read_log(path)
     assert "elapsed-h" in (caught.value.fix or "")
+
+
+@pytest.mark.parametrize("heading", ["hour", "ObsTime", "時"])
+def test_hours_without_a_date_count_from_the_start_that_the_user_gives(log_file: Write, heading: str) -> None:
+    path = log_file(f"{heading},wind speed (m/s)\n" + "".join(f"{at:02d},{3 + at % 4}.2\n" for at in range(1, 25)))
+    with pytest.raises(FlagdataError, match="elapsed-h") as caught:
+        read_log(path, WindOptions())
+    assert "--start" in (caught.value.fix or "")
+    series = read_log(path, WindOptions(start=_START)).series
+    np.testing.assert_array_equal(series.time, _START + np.arange(24) * 3600 * NANOSECONDS)

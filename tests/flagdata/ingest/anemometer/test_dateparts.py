@@ -193,3 +193,11 @@ def test_a_year_a_month_a_day_and_an_hour_that_nothing_names_are_offered_as_such
     assert caught.value.fix
     columns = "year,month,day,hour,wind_speed[m/s],wind_direction[deg]"
     assert np.all(np.diff(_times(log_file(rows), zone="UTC", columns=columns)) == _HOUR)
+
+
+@pytest.mark.parametrize(("date", "hour"), [("Data Medicao", "Hora Medicao"), ("Fecha", "Hora de la medición")])
+def test_the_hour_of_the_measurement_is_one(log_file: Write, date: str, hour: str) -> None:
+    rows = "".join(f"2026-05-01;{at:02d}00;{3 + at % 2},5\n" for at in range(12))
+    time = _times(log_file(f"{date};{hour};VENTO, VELOCIDADE HORARIA(m/s)\n{rows}"), zone="UTC")
+    assert time[0] == np.datetime64("2026-05-01T00:00")
+    assert np.all(np.diff(time) == _HOUR)

@@ -49,6 +49,15 @@ def test_seconds_of_a_radio_recording_count_from_its_start(read: Read) -> None:
     assert series.channels["wind_speed"].tolist() == pytest.approx(SPEEDS)
 
 
+def test_readings_of_several_sensors_are_rows_beside_their_sensor(read: Read) -> None:
+    wind = [{"ts": START + at, "wind_speed_avg": speed, "wind_speed_hi": 9.0} for at, speed in enumerate(SPEEDS)]
+    indoors = [{"ts": START + at, "temp_in": 70} for at in range(3)]
+    sensors = [{"lsid": 2, "sensor_type": 243, "data": indoors}, {"lsid": 1, "sensor_type": 43, "data": wind}]
+    series = read(json.dumps({"sensors": sensors, "station_id": 1}), unit="m/s").series
+    assert series.channels["wind_speed"].tolist() == SPEEDS
+    assert series.time.tolist() == [(START + at) * 10**9 for at in range(3)]
+
+
 def test_tempest_observations_are_arrays_in_the_order_of_its_reference(read: Read) -> None:
     text = lines([{"type": "obs_st", "obs": [[START + 60 * at, 1.0, speed, 9.0, 210, 6, 1013.2, 12.0, 60.0]]}
                   for at, speed in enumerate(SPEEDS)])  # fmt: skip

@@ -86,3 +86,20 @@ def test_tables_of_meteoswiss_state_their_units_by_their_headings(
     np.testing.assert_allclose(series.channels["wind_speed"], np.array([13, 14, 15]) * scale)
     np.testing.assert_allclose(np.rad2deg(series.channels["wind_direction"]), [200, 201, 202])
     assert series.time[0] == 1_777_636_800 * 10**9
+
+
+@pytest.mark.parametrize("heading", ["height", "height (m)", "level_m", "verticalPosition"])
+@pytest.mark.parametrize("by_height", [True, False])
+def test_heights_of_a_profile_are_anemometers(log_file: Write, heading: str, by_height: bool) -> None:
+    rows = [(at, height) for at in range(4) for height in ("40", "100", "60")]
+    rows.sort(key=(lambda row: row[1]) if by_height else (lambda row: row[0]))
+    text = "".join(f"2026-05-01T12:{at}0:00Z,{height},{float(height) / 10 + at}\n" for at, height in rows)
+    path = log_file(f"time,{heading},wind speed (m/s)\n{text}")
+    assert set(anemometers(path, WindOptions())) == {"40", "60", "100"}
+    series = read_log(path, WindOptions(wind="60")).series
+    assert series.channels["wind_speed"].tolist() == [6, 7, 8, 9]
+
+
+def test_heights_that_do_not_return_with_each_stamp_are_no_anemometers(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:0{at}:00Z,{100 + at},{3 + at}.1\n" for at in range(9))
+    assert len(read_log(log_file(f"time,altitude,wind speed (m/s)\n{rows}"), WindOptions()).series) == 9
