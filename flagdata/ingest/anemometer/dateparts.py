@@ -75,6 +75,7 @@ _OF_YEAR = (
     "are wrong: add a column of the month"
 )
 _SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
+_TWO_BEHIND = re.compile(r"\d[T ,;_](\d{1,2})\s*$")
 _MONTH_NAME = re.compile(r"^\s*(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?\s*$", re.IGNORECASE)
 _DECIMAL = re.compile(r"^\s*\d{1,3}\.\d+\s*$")
 _CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$")
@@ -84,6 +85,21 @@ CLOCKS = (
     "%H:%M:%S:%L",
 )  # fmt: skip
 """How a time of day may be written."""
+
+
+def clocks_of(texts: Sequence[str], *, heading: str = "") -> tuple[str, ...]:
+    """How the times of day behind dates may be written: one or two digits that are hours throughout are no minutes.
+
+    Args:
+        texts: stamps with their dates.
+        heading: of their columns; one that says HHMM settles it.
+    """
+    behind = [_TWO_BEHIND.search(text) for text in texts if text.strip()]
+    if not behind or _SAYS_MINUTES.search(" ".join(words_of(heading))):
+        return CLOCKS
+    if any(found is None or int(found[1]) > 24 for found in behind):
+        return CLOCKS
+    return ("%H",)
 
 
 def choices(

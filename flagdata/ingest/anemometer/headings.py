@@ -80,7 +80,12 @@ _AXES = frozenset(
     {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down"}
 )
 """Words of a component of the wind along an axis of the Earth, which is no speed of wind."""
-_MEAN = frozenset({"avg", "average", "mean", "ave", "av", "moy", "mittel", "mittelwert", "media", "medio", "smp"})
+_MEAN = frozenset(
+    {
+        "avg", "average", "mean", "ave", "av", "moy", "moyen", "moyenne", "promedio", "mittel", "mittelwert", "media",
+        "medio", "smp",
+    }
+)  # fmt: skip
 _PLAIN = frozenset(
     {
         "sensor", "value", "instant", "instantaneous", "inst", "current", "latest", "horizontal", "hor", "data",

@@ -31,6 +31,8 @@ WIDEST = 2000
 """Columns of the widest table that is read."""
 _DEEPEST = 8
 """Objects within objects that are looked into."""
+_EPOCH = 1e8
+"""Seconds from 1970 to 1973, from which on numbers are instants."""
 _LONGEST = 20_000
 """Characters of the longest dictionary that is read as Python prints it."""
 _LOOKED_AT = 50
@@ -277,10 +279,19 @@ def _readings_within(items: list[Any]) -> list[Any]:
         if len(lists) != 1:
             return items
         ((key, readings),) = lists.items()
-        if not readings or not all(isinstance(one, dict) and any(map(names_time, one)) for one in readings):
+        if not readings or not all(isinstance(one, dict) for one in readings):
+            return items
+        if not all(any(_is_instant(name, value) for name, value in one.items()) for one in readings):
             return items
         found += [{name: value for name, value in item.items() if name != key} | one for one in readings]
     return found if len(found) > len(items) else items
+
+
+def _is_instant(key: str, value: object) -> bool:
+    """Whether a member is the instant of a reading: a stamp, or Unix seconds or milliseconds."""
+    if not names_time(key) or isinstance(value, bool):
+        return False
+    return cell_kind(value) == "stamp" if isinstance(value, str) else isinstance(value, int | float) and value > _EPOCH
 
 
 def _timed(items: Sequence[Any]) -> bool:

@@ -22,7 +22,7 @@ from flagdata.ingest.anemometer.timecolumns import find_time
 from flagdata.units import spelled
 
 _STAMP = re.compile(
-    r"(?:\s*[A-Za-z][\w.-]{0,20}:\s+(?=\d{4}-\d\d-))?"
+    r"(?:\s*[A-Za-z][\w.-]{0,20}(?::\s+|=)(?=\d{4}-\d\d-))?"
     r"[\s\[(\"]*(?P<stamp>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
     r"(?:\s?[AaPp]\.?[Mm]\b\.?|\s?Z|[+-]\d{2}:?\d{2})?"
     r"|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}[T ,_]+\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp]\.?[Mm]\b\.?)?"

@@ -21,6 +21,9 @@ TAIL = 200
 _LEAST = 3
 """Lines at the end that may tell the delimiter where more of them do not."""
 _CANDIDATES = (";", "\t", ",", "|", " ")
+_STRONG = (";", "\t", "|")
+_CELLS = 4
+"""Cells of a line that these signs divide, from which on they do and no other."""
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 _STAMP = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,_-]+\d{1,2}([:-]\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
@@ -293,7 +296,10 @@ def _first(rows: Sequence[Sequence[str]], index: int) -> str:
 def _delimiter(lines: Sequence[str]) -> str | None:
     """The delimiter that cuts most lines into equally many cells of which most are numbers or stamps."""
     best: tuple[float, str] | None = None
+    strong = [sign for sign in _STRONG if _divides(lines, sign)]
     for delimiter in _CANDIDATES:
+        if strong and delimiter not in strong:
+            continue  # a comma between decimals, or a blank within a cell
         table = [cut(line, delimiter) for line in lines]
         width = _width(table)
         rows = [_trimmed(cells, width) for cells in table]
@@ -308,6 +314,13 @@ def _delimiter(lines: Sequence[str]) -> str | None:
         if best is None or score > best[0] + (0.05 if delimiter == " " else 0.0):
             best = (score, delimiter)
     return best[1] if best is not None and best[0] > 0.1 else None
+
+
+def _divides(lines: Sequence[str], sign: str) -> bool:
+    """Whether a sign that seldom stands in a cell divides all lines but one of ten into equally many cells."""
+    counts = Counter(len(cut(line, sign)) for line in lines)
+    width, often = counts.most_common(1)[0] if counts else (0, 0)
+    return width >= _CELLS and often >= 0.9 * len(lines)
 
 
 def _width(table: Sequence[Sequence[str]], above: Sequence[Sequence[str]] = ()) -> int:

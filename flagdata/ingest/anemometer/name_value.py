@@ -31,7 +31,7 @@ from flagdata.units import spelled
 _VALUES = frozenset({"value", "val", "state", "payload", "reading", "measurement", "wert", "valor", "valeur", "data"})
 _NUMBERED = frozenset({"code", "id", "number", "num", "no"})
 """Words beside which a state is one of a country."""
-_UNITS = frozenset({"unit", "units", "einheit", "unidad", "unité"})
+_UNITS = frozenset({"unit", "units", "einheit", "unidad", "unité", "eenheid", "unidade", "unità", "enhet", "enhed"})
 _SHORT = re.compile(r"(?<![A-Za-z\d])W(?:S|SPD?|DS?P)(?![A-Za-z])", re.IGNORECASE)
 """How a name says the speed of the wind shortly: WS_ms_Avg, ws, WSP."""
 _MOST = 500

@@ -39,7 +39,7 @@ _ADDRESS = re.compile(r"(?:[0-9a-f]{2}[:-]){5,7}[0-9a-f]{2}|(?=.*[a-f])(?:[0-9a-
 _HEIGHTS = frozenset(
     {
         "height", "heights", "level", "altitude", "elevation", "vertical", "position", "agl", "höhe", "hoehe", "altura",
-        "hauteur", "quota", "m",
+        "hauteur", "quota", "range", "gate", "gates", "m",
     }
 )  # fmt: skip
 """Words of a heading whose numbers tell the heights of a mast or a profiler apart, where each stamp has each once."""

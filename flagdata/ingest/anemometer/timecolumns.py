@@ -14,7 +14,7 @@ from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import counted, dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.cells import Cell, numbers
-from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, date_forms, order_of
+from flagdata.ingest.anemometer.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
 from flagdata.ingest.anemometer.dates import Order, decide
 from flagdata.ingest.anemometer.extremes import of_extreme
 from flagdata.ingest.anemometer.headings import names_time, understand, words_of, zone_of
@@ -41,8 +41,8 @@ _STAMPLIKE = re.compile(
     r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
-_BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}:\d{2}")
-"""A date whose numbers are divided by blanks, and a clock."""
+_BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}(?::\d{2}|\s*$)")
+"""A date whose numbers are divided by blanks, and a clock or an hour."""
 _DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
 _MILLISECONDS = "%H:%M:%S:%L"
 """A clock with its milliseconds behind a colon, as LabVIEW's and .NET's programs write it."""
@@ -216,7 +216,8 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         if cell_kind(texts[0]) != "stamp":
             return None
         return _with_month_names(layout, columns, texts, zoned)
-    order = order or order_of(" ".join(layout.names[index] for index in columns))
+    heading = " ".join(layout.names[index] for index in columns)
+    order = order or order_of(heading)
     try:
         date = decide(texts, told=order, where="")
     except TimeError as error:
@@ -226,7 +227,7 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
             return TimeChoice(
                 columns=columns, form=None, zone=None, zoned=False, score=2.5, doubt=error.what, fix=error.fix
             )
-        found = next((f for f in _dated(texts, "%d", "%m", zoned) if f is not None), None)
+        found = next((f for f in _dated(texts, "%d", "%m", zoned, heading) if f is not None), None)
         if found is None:
             return None
         form, stamps = found
@@ -237,7 +238,9 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
             doubt=f"dates may be {form!r} or {swapped!r}, and nothing in the first rows tells which",
             fix="say which number is the day: --date-order dmy or mdy",
         )  # fmt: skip
-    for form in (f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in CLOCKS):
+    for form in (
+        f"{date.directives()}{gap}{clock}{zoned}" for gap in _gaps(shape) for clock in clocks_of(texts, heading=heading)
+    ):
         found, _ = parse_with_bare_dates(texts, form)
         if fits(found):
             return time_choice(layout, columns, form, found, 2.0)
@@ -252,7 +255,9 @@ def _blank_divided(
     found = _whole(layout, columns, hyphened, order)
     if found is None or found.form is None:
         return found
-    forms = [found.form.replace("-", " ")] if found.form != "iso" else [f"%Y %m %d {clock}" for clock in CLOCKS[:2]]
+    forms = [found.form.replace("-", " ")]
+    if found.form == "iso":
+        forms = [f"%Y %m %d {clock}" for clock in CLOCKS[:2]]
     form = next((form for form in forms if fits(parse_with_bare_dates(texts, form)[0])), None)
     return None if form is None else replace(found, form=form)
 
@@ -281,12 +286,14 @@ def _gaps(shape: str) -> tuple[str, ...]:
     return (found[1],) if found else (" ",)
 
 
-def _dated(texts: Sequence[str], first: str, second: str, zoned: str) -> Iterator[tuple[str, Stamps] | None]:
+def _dated(
+    texts: Sequence[str], first: str, second: str, zoned: str, heading: str
+) -> Iterator[tuple[str, Stamps] | None]:
     parts = re.match(r"\s*\d{1,2}([-/.])\d{1,2}[-/.](\d{4}|\d{2})(?!\d)", texts[0])
     if parts is None:
         return
     year = "%Y" if len(parts[2]) == 4 else "%y"
-    for clock in CLOCKS:
+    for clock in clocks_of(texts, heading=heading):
         form = f"{first}{parts[1]}{second}{parts[1]}{year} {clock}{zoned}"
         found, _ = parse_with_bare_dates(texts, form)
         yield (form, found) if fits(found) else None
@@ -376,7 +383,9 @@ def _hours_of_a_day(words: Sequence[str], name: str, texts: Sequence[str], value
         return False
     if not all(re.fullmatch(r"\s*\d{1,2}\s*", text) for text in texts):
         return False
-    return set(words) <= _HOURS or (names_time(name) and any(re.match(r"\s*0\d", text) for text in texts))
+    return (bool(words) and set(words) <= _HOURS) or (
+        names_time(name) and any(re.match(r"\s*0\d", text) for text in texts)
+    )
 
 
 _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (

@@ -268,6 +268,8 @@ def test_units_in_brackets_of_a_second_line_of_names_are_those_of_the_columns(re
         ("سرعة الرياح (م/ث)", "wind_speed", "m/s"),
         ("Vindhraði (m/s)", "wind_speed", "m/s"),
         ("Vindátt", "wind_direction", None),
+        ("vent_moyen", "wind_speed", None),
+        ("Viento promedio (km/h)", "wind_speed", "km/h"),
         ("Velocitat mitjana del vent (m/s)", "wind_speed", "m/s"),
         ("ความเร็วลม (เมตร/วินาที)", "wind_speed", "m/s"),
         ("SOS (m/s)", "", "m/s"),

@@ -201,3 +201,25 @@ def test_the_hour_of_the_measurement_is_one(log_file: Write, date: str, hour: st
     time = _times(log_file(f"{date};{hour};VENTO, VELOCIDADE HORARIA(m/s)\n{rows}"), zone="UTC")
     assert time[0] == np.datetime64("2026-05-01T00:00")
     assert np.all(np.diff(time) == _HOUR)
+
+
+@pytest.mark.parametrize(
+    "form", ["%d.%m.2026 %H", "%d/%m/2026 %H", "2026-%m-%d %H", "2026 %m %d %H", "%d/%m/2026 {}"], ids=str
+)
+@pytest.mark.parametrize("first", [0, 1])
+def test_an_hour_behind_a_date_is_no_minute(log_file: Write, form: str, first: int) -> None:
+    days = [dt.date(2026, 5, day) for day in (13, 14)]
+    stamps = [
+        day.strftime(form.replace("%H", f"{hour:02d}").replace("{}", str(hour)))
+        for day in days for hour in range(first, first + 24)
+    ]  # fmt: skip
+    path = log_file("date;wind speed (m/s)\n" + "".join(f"{stamp};{3 + at % 5}.5\n" for at, stamp in enumerate(stamps)))
+    time = _times(path, zone="UTC")
+    assert time[0] == np.datetime64("2026-05-13T00:00") + first * _HOUR
+    assert np.all(np.diff(time) == _HOUR)
+
+
+def test_a_heading_of_hours_and_minutes_keeps_minutes_after_midnight(log_file: Write) -> None:
+    rows = "".join(f"2026-05-13 {minute};{3 + minute % 5}.5\n" for minute in range(20))
+    time = _times(log_file(f"date hhmm;wind speed (m/s)\n{rows}"), zone="UTC")
+    assert time[-1] == np.datetime64("2026-05-13T00:19")

@@ -77,3 +77,10 @@ def test_the_vertical_speed_beside_a_speed_is_no_anemometer(read: Read) -> None:
     rows = "".join(f"{1777636800 + at},{200 + at},{3 + at},0.1\n" for at in range(20))
     log = read(f"timestamp,direction,speed,speed_z\n{rows}", unit="m/s")
     assert log.series.channels["wind_speed"][[0, 19]].tolist() == [3, 22]
+
+
+def test_a_stamp_behind_its_key_and_an_equals_sign_is_the_lines(read: Read) -> None:
+    lines = [f"time=2026-05-01T10:00:{at:02d}Z wind_speed={3 + at % 4}.5 wind_dir={200 + at}" for at in range(12)]
+    series = read("\n".join([*lines, ""]), unit="m/s").series
+    assert series.channels["wind_speed"].tolist() == [3.5 + at % 4 for at in range(12)]
+    assert str(np.datetime64(int(series.time[1]), "ns"))[:19] == "2026-05-01T10:00:01"

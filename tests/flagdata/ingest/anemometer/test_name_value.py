@@ -97,3 +97,11 @@ def test_of_columns_of_the_same_values_the_first_is_read_with_the_unit_beside_it
     other = rows.replace(f"{_SPEEDS[3]},{_SPEEDS[3]}", f"{_SPEEDS[3]},9.9")
     with pytest.raises(InputError, match="no column is surely a wind"):
         read_log(log_file(heading + other))
+
+
+def test_semicolons_divide_rows_of_few_numbers_with_decimal_commas(log_file: Write) -> None:
+    head = "MEETPUNT;LOCATIE_CODE;GROOTHEID_CODE;GROOTHEID_OMSCHRIJVING;EENHEID_CODE;DATUM;TIJD (MET/CET);WAARDE\n"
+    rows = [f";VLIS;WINDSHD;Windsnelheid;m/s;13-05-2026;12:00:{at:02d};{speed}" for at, speed in enumerate(_SPEEDS)]
+    log = read_log(log_file(head + "\n".join(rows).replace(".", ",") + "\n"), WindOptions())
+    assert log.series.channels["wind_speed"].tolist() == _SPEEDS
+    assert str(log.series.time[0].astype("datetime64[ns]"))[:19] == "2026-05-13T11:00:00"

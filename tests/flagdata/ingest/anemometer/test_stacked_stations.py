@@ -88,7 +88,7 @@ def test_tables_of_meteoswiss_state_their_units_by_their_headings(
     assert series.time[0] == 1_777_636_800 * 10**9
 
 
-@pytest.mark.parametrize("heading", ["height", "height (m)", "level_m", "verticalPosition"])
+@pytest.mark.parametrize("heading", ["height", "height (m)", "level_m", "verticalPosition", "Range Gate (m)"])
 @pytest.mark.parametrize("by_height", [True, False])
 def test_heights_of_a_profile_are_anemometers(log_file: Write, heading: str, by_height: bool) -> None:
     rows = [(at, height) for at in range(4) for height in ("40", "100", "60")]
