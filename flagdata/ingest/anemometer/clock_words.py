@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.source import TableText, TextFile
 
-_CLOCK = r"\d{1,2}[:.]\d{2}(?:[:.]\d{2}(?:[.,]\d{1,9})?)?"
+_CLOCK = r"(?:[01]?\d|2[0-4])[:.][0-5]\d(?:[:.][0-5]\d(?:[.,]\d{1,9})?)?"
 _BEHIND = re.compile(
     rf"(?<![\d:.])(?P<clock>{_CLOCK})\s?(?P<word>Uhr|hrs?|hs|horas?|godz|h)\.?(?![^\W_])", re.IGNORECASE
 )

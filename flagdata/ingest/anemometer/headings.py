@@ -56,7 +56,7 @@ VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", 
 _OTHER = frozenset(
     {
         "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "sos",
-        "rotor", "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
+        "rotor", "radial", "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
         "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",

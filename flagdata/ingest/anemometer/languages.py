@@ -39,7 +39,7 @@ _WORDS = tuple(
     for pattern, word in (
         (r"godzina[\s_]*pomiaru", "hour"), (r"data[\s_]*pomiaru", "date"),
         (_STATION, "station"), (_GUST, "gust"), (_SPEED, "wind speed"), (_DIRECTION, "wind direction"), (_TIME, "time"),
-        (r"平均|평균", "mean"), (r"[\d一二三五十]+\s*(?:分[鐘钟間间]?|분)", "10 min"),
+        (r"平均|평균", "mean"), (r"径向|徑向", "radial"), (r"[\d一二三五十]+\s*(?:分[鐘钟間间]?|분)", "10 min"),
         (r"\((?:十六|16)?\s*方位[點点]?\)", ""),
         (r"\b(?:дата|päivämäärä|dátum|ημερομηνία|תאריך|التاريخ|ngày)\b", "date"),
         (r"^\s*[年년]\s*$", "year"), (r"^\s*[月월]\s*$", "month"), (r"^\s*[日일]\s*$", "day"),

@@ -32,6 +32,7 @@ KINDS = (
     "flagdata.ingest.anemometer.hours_across",
     "flagdata.ingest.anemometer.smet",
     "flagdata.ingest.anemometer.lvm",
+    "flagdata.ingest.anemometer.scintec",
     "flagdata.ingest.anemometer.campbell_arrays",
     "flagdata.ingest.anemometer.station_lines",
     "flagdata.ingest.anemometer.aprs",

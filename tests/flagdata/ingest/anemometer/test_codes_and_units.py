@@ -273,6 +273,8 @@ def test_units_in_brackets_of_a_second_line_of_names_are_those_of_the_columns(re
         ("Velocitat mitjana del vent (m/s)", "wind_speed", "m/s"),
         ("ความเร็วลม (เมตร/วินาที)", "wind_speed", "m/s"),
         ("SOS (m/s)", "", "m/s"),
+        ("90m 径向风速(m/s)", "", "m/s"),
+        ("radial wind speed [m/s]", "", "m/s"),
     ],
 )
 def test_headings_of_further_languages_and_glued_units_are_understood(

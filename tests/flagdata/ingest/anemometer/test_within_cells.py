@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Callable
 
 import numpy as np
@@ -53,6 +54,15 @@ def test_words_of_the_afternoon_stay(read: Read) -> None:
     log = read(f"time;wind (m/s)\n{rows}", zone="UTC", date_order="dmy")
     assert log.series.time[0] == (START + 3600) * NANOSECONDS
     assert "clock-in-words" not in kinds(log)
+
+
+def test_a_letter_behind_a_number_that_is_no_clock_stays(read: Read) -> None:
+    lines = "".join(
+        f"12:{k:02d}:00 S {speed(k):05.2f} D {angle(k)} T 01.{70 + k} H 38.{50 + k}\n" for k in range(MINUTES)
+    )
+    log = read(lines, zone="UTC", date=dt.date(2026, 5, 1))
+    assert "clock-in-words" not in kinds(log)
+    np.testing.assert_allclose(log.series.channels["relative_humidity"], [0.385 + k / 1e4 for k in range(MINUTES)])
 
 
 @pytest.mark.parametrize("cell", ["{p} ({d}°)", "{d}° {p}", "{d}°({p})", "{d} ({p})", "{p} {d}", "{p}({d})"])
