@@ -18,6 +18,10 @@ _ISO = re.compile(r"^\s*\d{4}[-/.]")
 _PARTS = re.compile(r"^\s*(\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{2})(?!\d)")
 
 
+_TWELVE = re.compile(r"\d\s*[AaPp]\.?[Mm]\b")
+"""A clock of twelve hours, which no such locale has: program settings were mixed."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Decision:
     """The order of the numbers of a date.
@@ -44,8 +48,9 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
     """The order in which dates at the start of `texts` are written.
 
     Evidence: a number above 12 is a day; where there is none, points between the numbers (every locale of the Unicode
-    CLDR that writes them so puts the day first), or the order in which the log moves on by less than two days between
-    rows while the other jumps. Years of two digits may also stand first, between hyphens ("26-03-14").
+    CLDR that writes them so puts the day first; not beside AM and PM), or the order in which the log moves on by less
+    than two days between rows while the other jumps. Years of two digits may also stand first, between hyphens
+    ("26-03-14").
 
     Args:
         told: the user's word; refused when a date contradicts it.
@@ -90,7 +95,7 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
         raise TimeError("years of four digits do not come first here", where=where, fix="give --date-order dmy or mdy")
     if told is not None:
         return Decision(order=told, separator=separator, long_year=long_year, reason=f"the date order {told} was given")
-    if separator == ".":
+    if separator == "." and not any(map(_TWELVE.search, dated)):
         reason = "dates whose numbers are divided by points are written with the day first"
         return Decision(order="dmy", separator=separator, long_year=long_year, reason=reason)
     candidates: tuple[Literal["dmy", "mdy"], ...] = ("dmy", "mdy")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer.headings import understand
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -84,3 +85,13 @@ def test_a_stamp_behind_its_key_and_an_equals_sign_is_the_lines(read: Read) -> N
     series = read("\n".join([*lines, ""]), unit="m/s").series
     assert series.channels["wind_speed"].tolist() == [3.5 + at % 4 for at in range(12)]
     assert str(np.datetime64(int(series.time[1]), "ns"))[:19] == "2026-05-01T10:00:01"
+
+
+def test_points_beside_am_and_pm_do_not_tell_the_day(read: Read) -> None:
+    text = "time,wind [m/s]\n" + "".join(f"06.07.20 01:{at:02d}:11 PM,{3 + at % 4}.5\n" for at in range(12))
+    with pytest.raises(FlagdataError) as caught:
+        read(text, zone="UTC")
+    assert "--date-order" in (caught.value.fix or "")
+    assert np.datetime64(int(read(text, zone="UTC", date_order="mdy").series.time[0]), "ns") == np.datetime64(
+        "2020-06-07T13:00:11"
+    )
