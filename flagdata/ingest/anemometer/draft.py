@@ -38,7 +38,7 @@ from flagdata.ingest.anemometer.instruments import (
     mixed_units,
     named_wind,
 )
-from flagdata.ingest.anemometer.layout import Layout, lay_out
+from flagdata.ingest.anemometer.layout import Layout, cell_kind, lay_out
 from flagdata.ingest.anemometer.no_speeds import beaufort, counts
 from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.ingest.anemometer.recipe import DELIMITERS
@@ -264,6 +264,10 @@ def _doubts(
         found.append(Doubt(what=what, fix=fix))
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
+        if time is not None and (only := _only_numbers(layout, time)) is not None:
+            name = in_shell(layout.names[only] if layout.by_name else str(only + 1))
+            fix = f"if column {only + 1}, the only one of numbers, is the wind's speed: --wind {name} --unit m/s"
+            fix += " (or its unit)"
         fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
         own = own_motion.doubt(layout)
         what = f"no column is surely a wind; {f'{own}; ' if own else ''}the columns are {names}"
@@ -308,6 +312,13 @@ def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         )
         found.append(Doubt(what=what, fix=fix))
     return found
+
+
+def _only_numbers(layout: Layout, time: TimeChoice) -> int | None:
+    """The one column beside the time whose cells are numbers; `None` where there are none or several."""
+    columns = [index for index in range(layout.number_of_columns()) if index not in time.columns]
+    found = [index for index in columns if {*map(cell_kind, layout.column(index))} <= {"number", "missing"}]
+    return found[0] if len(found) == 1 else None
 
 
 def _directions(layout: Layout) -> list[str]:

@@ -153,3 +153,15 @@ def test_twelve_columns_of_other_numbers_are_no_raw_data_of_pywws(log_file: Writ
     with pytest.raises(FlagdataError) as refused:
         read_log(path, WindOptions(zone="UTC"))
     assert "--columns" in str(refused.value.fix)
+
+
+@pytest.mark.parametrize(("heading", "name"), [("timestamp,value\n", "value"), ("", "2")])
+def test_the_only_column_of_numbers_is_offered_by_its_name(
+    log_file: Callable[[str], Path], heading: str, name: str
+) -> None:
+    path = log_file(heading + "".join(f"2026-05-01T12:00:{at:02d}Z,{3 + at % 5}.5\n" for at in range(20)))
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path, WindOptions())
+    assert f"--wind {name} --unit m/s" in (caught.value.fix or "")
+    series = read_log(path, WindOptions(wind=name, unit="m/s")).series
+    assert series.channels["wind_speed"].tolist() == [3.5 + at % 5 for at in range(20)]
