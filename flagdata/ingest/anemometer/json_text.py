@@ -17,7 +17,7 @@ import csv
 import io
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from flagdata.errors import InputError, LimitError
@@ -261,7 +261,8 @@ def _items(whole: Any) -> list[Any]:
         # Beside readings there may be a list of stations, which has no times.
         lists = [one for one in lists if _timed(one)] or lists
         if len(lists) == 1:
-            return json_measures.by_station(_readings_within(lists[0]))
+            above = next(item for item in level if any(member is lists[0] for member in item.values()))
+            return json_measures.by_station(_at_one_time(above, _readings_within(lists[0])))
         level = [member for item in level for member in item.values() if isinstance(member, dict)]
         if lists or not level:
             break
@@ -285,6 +286,20 @@ def _readings_within(items: list[Any]) -> list[Any]:
             return items
         found += [{name: value for name, value in item.items() if name != key} | one for one in readings]
     return found if len(found) > len(items) else items
+
+
+def _at_one_time(above: Mapping[str, Any], items: list[Any]) -> list[Any]:
+    """Readings that tell no time, at the one instant that the object around their list tells; others as they are."""
+    plain = all(isinstance(item, dict) for item in items)
+    if not plain or any(_is_instant(name, value) for item in items for name, value in item.items()):
+        return items
+    told = {name: value for name, value in above.items() if _is_instant(name, value) or _is_update(name, value)}
+    return [told | item for item in items] if len(told) == 1 else items
+
+
+def _is_update(key: str, value: object) -> bool:
+    """Whether a member tells when what is beside it was brought up to date."""
+    return "updated" in words_of(key) and isinstance(value, str) and cell_kind(value) == "stamp"
 
 
 def _is_instant(key: str, value: object) -> bool:

@@ -4,11 +4,12 @@ Each is told by headings that no other table has together, and stated again with
 NOAA NDBC, "Measurement Descriptions and Units" (UTC, m/s; 99, 999 and MM missing); DWD, descriptions of the hourly and
 10-minute wind (m/s, -999 missing; UTC, of 10 minutes before 2000 CET); KNMI, headings of its files (0.1 m/s, hour 24
 ends the day, UT; direction 0 calm, 990 variable); Météo-France, descriptions of SYNOP (UTC, m/s, K, Pa; mq missing) and
-of hourly data (m/s; its zone is not stated); AEMET OpenData, metadata (m/s; daily directions in tens of degrees, 99
-variable, 88 none); MeteoSwiss, "Open Data: automatic weather stations", parameters, and legends of IDAweb and VQHA80
-(UTC; fkl, fk1 in m/s, fu3 in km/h, of 10 minutes (z), an hour (h) or a day (d); "-" missing); Meteostat, "Hourly Data"
-(km/h); Iowa Environmental Mesonet, "ASOS download" (sped in mph, M or null missing; the zone is chosen there); WeeWX,
-"Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's archive shares.
+of hourly and daily data (m/s, FFM the daily mean; no zone is stated); AEMET OpenData, metadata (m/s; daily directions
+in tens of degrees, 99 variable, 88 none); MeteoSwiss, "Open Data: automatic weather stations", parameters, and legends
+of IDAweb and VQHA80 (UTC; fkl, fk1 in m/s, fu3 in km/h, of 10 minutes (z), an hour (h) or a day (d); "-" missing);
+Meteostat, "Hourly Data" (km/h); Iowa Environmental Mesonet, "ASOS download" (sped in mph, M or null missing; the zone
+is chosen there); WeeWX, "Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's
+archive shares.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ class _Published:
         stamp: the instant of a row with its zone, "" for a damaged one; `None` keeps the stamps of the file.
         missing: heading in the file → texts for no value.
         whole: whether other columns are kept.
+        zoned: whether `stamp` tells the zone.
         clean: of a cell.
     """
 
@@ -46,6 +48,7 @@ class _Published:
     stamp: Callable[[Row], str] | None = None
     missing: Mapping[str, frozenset[str]] = field(default_factory=dict)
     whole: bool = False
+    zoned: bool = True
     clean: Callable[[str], str] = str.strip
 
 
@@ -60,6 +63,11 @@ def _digits(*names: str, zone: str = "Z") -> Callable[[Row], str]:
         return f"{parts[:4]}-{parts[4:6]}-{parts[6:8]}T{parts[8:10]}:{parts[10:12]}:{parts[12:14]}{zone}"
 
     return read
+
+
+def _pointed(cell: str) -> str:
+    """A number with a decimal point."""
+    return cell.strip().replace(",", ".")
 
 
 def _dwd_ten_minutes(row: Row) -> str:
@@ -192,7 +200,16 @@ _PUBLISHED = (
             "NUM_POSTE": "station", "FF": "wind speed [m/s]", "DD": "wind direction [deg]", "FXI": "gust [m/s]",
             "T": "air temperature [degC]", "U": "relative humidity [%]",
         },
-        stamp=_digits("AAAAMMJJHH", zone=""),
+        stamp=_digits("AAAAMMJJHH", zone=""), zoned=False,
+    ),
+    _Published(
+        about="Météo-France's daily values",
+        needs=(_need("POSTE", "DATE", "FFM", "QFFM"), _need("NUM_POSTE", "AAAAMMJJ", "FFM", "QFFM")),
+        columns={
+            "POSTE": "station", "NUM_POSTE": "station", "FFM": "wind speed [m/s]", "FXI": "gust [m/s]",
+            "TM": "air temperature [degC]",
+        },
+        stamp=_digits("DATE", "AAAAMMJJ", zone=""), zoned=False, clean=_pointed,
     ),
     _Published(
         about="AEMET's observations",
@@ -237,7 +254,8 @@ _PUBLISHED = (
 )  # fmt: skip
 _DATES = frozenset(
     {
-        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH", "eor",
+        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH", "AAAAMMJJ",
+        "DATE", "eor",
         "reference_timestamp", "time", "Date",
     }
 )  # fmt: skip
@@ -267,8 +285,7 @@ def as_table(source: TextFile) -> TableText | None:
         return None
     kind = found.kind
     taken = [name for name in found.names if name and (name in kind.columns or kind.whole)]
-    zoned = kind.stamp is not None and kind.about != "Météo-France's hourly data"
-    heading = [] if kind.stamp is None else ["time [UTC]" if zoned else "time"]
+    heading = [] if kind.stamp is None else ["time [UTC]" if kind.zoned else "time"]
     heading += [kind.columns.get(name, name) for name in taken]
     other = [0]
     rows = list(_rows(source, found, taken, other))

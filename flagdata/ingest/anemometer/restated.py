@@ -34,6 +34,8 @@ KINDS = (
     "flagdata.ingest.anemometer.lvm",
     "flagdata.ingest.anemometer.scintec",
     "flagdata.ingest.anemometer.campbell_arrays",
+    "flagdata.ingest.anemometer.clientrawhour",
+    "flagdata.ingest.anemometer.noaa_summary",
     "flagdata.ingest.anemometer.station_lines",
     "flagdata.ingest.anemometer.aprs",
     "flagdata.ingest.anemometer.ft",

@@ -75,7 +75,8 @@ def unknown(source: TextFile) -> Guess:
         return Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix)
     if sum(bool(_METAR.search(line)) for line in source.head()) > len(source.head()) / 3:
         text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"
-        fix = "decode them to a table with one row a report: its time, speed and direction, each with its unit"
+        fix = "their month is not told: put the date and time of each report [UTC] before it, as archives do "
+        fix += '("202601271850 METAR EFHK 271850Z 08006KT …"), or decode them to a table with one row a report'
         return Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix)
     if any(_SYNOP.search(line) for line in source.head()):
         text = "SYNOP reports (WMO-No. 306), of ships, or of land stations without a day, a wind or its unit (iw)"

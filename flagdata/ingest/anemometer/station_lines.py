@@ -109,7 +109,7 @@ def _monthly(line: str) -> list[str] | None:
 
 def _clientraw(line: str) -> list[str] | None:
     cells = line.split()
-    if len(cells) < _CLIENTRAW or cells[0] != "12345" or not cells[141].isdigit():
+    if len(cells) < _CLIENTRAW or cells[0] != "12345" or not re.fullmatch(r"(?:19|20)\d\d", cells[141]):
         return None
     year, month, day, clock = cells[141], cells[36], cells[35], cells[29:32]
     if not all(part.isdigit() for part in (month, day, *clock)):
