@@ -19,7 +19,7 @@ import numpy as np
 
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer import counted, own_motion
+from flagdata.ingest.anemometer import counted, headings, own_motion
 from flagdata.ingest.anemometer.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.cells import Cell, numbers
 from flagdata.ingest.anemometer.dateparts import CLOCKS, date_forms
@@ -410,6 +410,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     found = _understood(layout, time, winds)
     timed = time is not None
     steady, own = None if timed else _steady(layout), own_motion.columns(layout)
+    stamped = _stamped(layout)
     if steady is not None:
         found[steady] = "time[?]"
     for at, name in enumerate(layout.names):
@@ -417,7 +418,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = understand(name, layout.units[at])
-        if not timed and kinds and kinds[0] == "stamp" and not any(e.startswith("time") for e in found.values()):
+        if not timed and at == stamped and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
         elif at in own:
             found |= {} if winds else {at: "?"}
@@ -442,6 +443,18 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         ):
             found[at] = "?"
     return found
+
+
+def _stamped(layout: Layout) -> int | None:
+    """The first column of stamps, or else the first whose heading is a time above words with digits."""
+    columns = [[cell for cell in layout.column(at) if cell_kind(cell) != "missing"] for at in range(len(layout.names))]
+    stamps = (at for at, cells in enumerate(columns) if cells and cell_kind(cells[0]) == "stamp")
+    worded = (
+        at for at, cells in enumerate(columns)
+        if cells and cell_kind(cells[0]) == "text" and re.search(r"\d", cells[0])
+        and headings.names_time(layout.names[at])
+    )  # fmt: skip
+    return next(stamps, next(worded, None))
 
 
 def _alone(layout: Layout, index: int) -> bool:

@@ -275,3 +275,16 @@ def test_a_program_of_unknown_names_is_read_by_its_headings_for_all_heights(log_
     assert anemometers(path, options) == ("WindSpeed_S_L", "WindSpeed_S_U")
     upper = read_log(path, WindOptions(format="delimited", unit="m/s", zone="UTC", wind="WindSpeed_S_U")).series
     assert upper.channels["wind_speed"].tolist() == [4.5 + at % 4 for at in range(10)]
+
+
+def test_a_time_in_words_is_offered_for_its_format(log_file: Callable[[str], Path]) -> None:
+    stamp = '"As of 11:{:02d} PM, Thu Sep 27 2018"'
+    path = log_file("date,Wind Speed\n" + "".join(f"{stamp.format(at)},{3 + at % 4} mph\n" for at in range(20)))
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path, WindOptions(zone="UTC"))
+    line = (caught.value.fix or "").partition('--columns "')[2].partition('"')[0]
+    assert line == "time[?],wind_speed[mph]"
+    columns = line.replace("?", "As of %I:%M %p, %a %b %d %Y")
+    series = read_log(path, WindOptions(zone="UTC", columns=columns)).series
+    assert str(series.time[1].astype("datetime64[ns]"))[:16] == "2018-09-27T23:01"
+    assert series.channels["wind_speed"][0] == pytest.approx(3 * 0.44704)
