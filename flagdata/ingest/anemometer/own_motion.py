@@ -40,7 +40,8 @@ def columns(layout: Layout) -> tuple[int, ...]:
     named = _velocities(layout)
     if not named or not (_moving(layout) or _turned(layout) or _windy(layout, named) or _others(layout, named)):
         return ()
-    return () if _stands_still(layout) and not _windy(layout, named) else named
+    other_wind = _windy(layout, named) or bool(_others(layout, named))
+    return () if _stands_still(layout) and not other_wind else named
 
 
 def components(layout: Layout) -> Mapping[int, str]:

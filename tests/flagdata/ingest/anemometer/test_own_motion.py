@@ -59,6 +59,14 @@ def test_beside_um_vm_wm_the_doubt_names_both_and_offers_these_alone(
         np.testing.assert_allclose(channels["wind_x"], [3 - at % 3 / 10 for at in range(ROWS)], atol=1e-4)
 
 
+def test_a_platform_that_hovers_beside_um_vm_wm_is_one_all_the_same(log_file: Write) -> None:
+    still = {"Lat": lambda at: 32.6911, "Lon": lambda at: -103.0753}
+    path = log_file(_log(*_own(OWN[0]), *_beside(), *still.items()))
+    with pytest.raises(InputError, match="may be how the platform itself moves") as caught:
+        read_log(path)
+    assert "--wind Um" in caught.value.fix
+
+
 def test_headings_with_units_are_components_and_no_speeds(log_file: Write) -> None:
     names = [f"{name} [m/s]" for name in OWN[0]]
     path = log_file(_log(*_own(names), *_beside(" [m/s]")))
