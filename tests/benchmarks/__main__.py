@@ -7,6 +7,7 @@ from tests.evidence import run_all
 BENCHMARKS = {
     "lake": "tests.benchmarks.bench_lake",
     "logs": "tests.benchmarks.bench_logs",
+    "measure": "tests.benchmarks.bench_measure",
     "models": "tests.benchmarks.bench_models",
     "pairs": "tests.benchmarks.bench_pairs",
     "records": "tests.benchmarks.bench_records",
