@@ -3,7 +3,8 @@
 Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, FLAGDATA_REFINE_AT the version ("v1"),
 FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how many evaluations each method has (50),
 FLAGDATA_REFINE_PEERS which optimisers (all, separated by commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped
-one), FLAGDATA_REFINE_CACHE a folder for evaluations, so that an interrupted run goes on. Without a lake it is left out.
+one), FLAGDATA_REFINE_CACHE a folder for evaluations and films, so that an interrupted run goes on. Without a lake it is
+left out.
 With FLAGDATA_REFINE_LAKE=changed the targets are flags of another mesh, integrator and step than any that was learned
 from, with textures that none had; half of them are rendered by Cycles (in the environment that FLAGDATA_BLENDER names).
 With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of the reference simulator (../shared/data/arcsim), filmed by our
@@ -18,7 +19,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     if lake == ARCSIM:
         targets = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
     elif lake == CHANGED:
-        targets = _changed(count, space, frames=estimator.front_end.frames, seed=seed)
+        targets = _changed(count, space, frames=estimator.front_end.frames, seed=seed, folder=cache / "films")
     else:
         targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
     for number, target in enumerate(targets):
@@ -164,8 +165,8 @@ def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> lis
     return found
 
 
-def _changed(count: int, space: Space, *, frames: int, seed: int) -> list[Target]:
-    """Flags of another mesh, integrator, step and texture, the second half rendered by Cycles."""
+def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) -> list[Target]:
+    """Flags of another mesh, integrator, step and texture, the second half rendered by Cycles; films of `frames`."""
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
     found: list[Target] = []
     for renderer, flags in (("raster", count - count // 2), ("cycles", count // 2)):
@@ -173,9 +174,11 @@ def _changed(count: int, space: Space, *, frames: int, seed: int) -> list[Target
             continue
         recipe = other_textures(implicit(finer_mesh(unseen(flags, child_seed(seed, renderer)))))
         recipe = by_cycles(recipe) if renderer == "cycles" else recipe
+        time = replace(recipe.simulation.time, frames=frames)
+        recipe = replace(recipe, simulation=replace(recipe.simulation, time=time))
         found += [
-            as_stated(f"{renderer} {number}", film[:frames], stated, otherwise=otherwise, space=space)
-            for number, (film, stated) in enumerate(filmed(recipe))
+            as_stated(f"{renderer} {number}", film, stated, otherwise=otherwise, space=space)
+            for number, (film, stated) in enumerate(filmed(recipe, folder=folder))
         ]
     return found
 

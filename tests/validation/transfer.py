@@ -149,8 +149,12 @@ CHANGES: dict[str, Callable[[DatasetRecipe], DatasetRecipe]] = {
 }
 
 
-def filmed(recipe: DatasetRecipe) -> Iterator[tuple[NDArray[np.uint8], dict[str, Any]]]:
-    """Frames (n, height, width) of each flag's film, and the parameters that its recording states."""
+def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tuple[NDArray[np.uint8], dict[str, Any]]]:
+    """Frames (n, height, width) of each flag's film, and the parameters that its recording states.
+
+    Args:
+        folder: where films are kept, each as soon as it is made, so that an interrupted run goes on.
+    """
     (cast,) = casts(recipe)
     indices = range(cast.simulation.count)
     sequences: dict[int, MeshSequence] = {}
@@ -162,7 +166,17 @@ def filmed(recipe: DatasetRecipe) -> Iterator[tuple[NDArray[np.uint8], dict[str,
     members = tuple((cast, index, f"{index:032x}") for index in sequences)
     few = replace(recipe, sides=(replace(recipe.sides[0], renders=len(members)),))
     for film in Sequences(recipe=few, side="test", members=members).films():
-        yield _frames(few, film, sequences[film.index])
+        if folder is None:
+            yield _frames(few, film, sequences[film.index])
+            continue
+        path = folder / f"{recipe.hash[:32]}-{film.index}.npz"
+        if not path.exists():
+            frames, stated = _frames(few, film, sequences[film.index])
+            folder.mkdir(parents=True, exist_ok=True)
+            np.savez_compressed(part := path.with_suffix(".part.npz"), frames=frames, stated=json.dumps(stated))
+            part.replace(path)
+        with np.load(path) as kept:
+            yield kept["frames"], json.loads(str(kept["stated"]))
 
 
 def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[NDArray[np.uint8], dict[str, Any]]:
