@@ -29,7 +29,7 @@ from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import long_run_variance
 from flagdata.align.windbins import SHORTEST, lead, wind_bins
 from flagdata.errors import InputError, RefusedError
-from flagdata.ingest.anemometer.averaging import average
+from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.schema import UNUSABLE
 from flagdata.signals import Instants, Series, WindAverage, WindSeries
 from flagdata.timebase import NANOSECONDS

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
 from flagdata.ingest.anemometer import Guess, sniff
-from flagdata.ingest.anemometer.formats import FORMATS
+from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.camera import CameraProbe, probe
 from flagdata.ingest.markers import COLUMNS, is_marker_table
 

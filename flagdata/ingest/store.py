@@ -19,9 +19,9 @@ from flagdata.align.paired import host_clock
 from flagdata.errors import ConflictError, FlagdataError, InputError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.neighbours import hours_off
 from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
+from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.align.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
-from flagdata.ingest.anemometer.averaging import average
+from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.record import messages, wind_messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
 from flagdata.record.mcap_file import MessageBlock

@@ -29,7 +29,7 @@ _HEADER = (
 )
 _WAYS = {
     "columns": "",
-    "rows": "from flagdata.ingest.anemometer.rows import RowReader; RowReader.blocks = RowReader.rows; ",
+    "rows": "from flagdata.ingest.anemometer.text.rows import RowReader; RowReader.blocks = RowReader.rows; ",
 }
 _PEAK = """
 import atexit, sys

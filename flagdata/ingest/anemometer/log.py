@@ -11,25 +11,20 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import (
-    bulletins,
-    platform,
-    possible,
-    quality,
-    spelled_stamps,
-    untimed,
-    zero,
-    zones,
-)
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.formats import FORMATS, Format
+from flagdata.ingest.anemometer.documents.opening import open_text
+from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
+from flagdata.ingest.anemometer.instants import zones
 from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.order import in_order
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
-from flagdata.ingest.anemometer.restated import restate
-from flagdata.ingest.anemometer.sniff import recognise, unknown
+from flagdata.ingest.anemometer.recognition import recognise
+from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
+from flagdata.ingest.anemometer.restating.restate import restate
+from flagdata.ingest.anemometer.samples import platform, possible, quality, zero
+from flagdata.ingest.anemometer.samples.order import in_order
+from flagdata.ingest.anemometer.sniff import unknown
 from flagdata.ingest.anemometer.sniffing import SURE
-from flagdata.ingest.anemometer.source import TextFile, open_text
+from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
 

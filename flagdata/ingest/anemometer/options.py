@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeAlias
 
 from flagdata.errors import UsageError
-from flagdata.ingest.anemometer.clock import ClockChoice
+from flagdata.ingest.anemometer.instants.clock import ClockChoice
 from flagdata.units import unit
 
 _LATER = frozenset({"clock", "unit", "start", "wind", "rate", "columns"})

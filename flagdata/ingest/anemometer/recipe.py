@@ -22,9 +22,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer import counted
+from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants.stamps import EPOCH, pattern
 from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
-from flagdata.ingest.anemometer.stamps import EPOCH, pattern
 from flagdata.recipes import Shelf, parsed
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flagdata.ingest.anemometer import bulletins, site_labels
-from flagdata.ingest.anemometer.delimited import drafted, guess, sites
+from flagdata.ingest.anemometer.documents.opening import open_text
 from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.restated import restate
-from flagdata.ingest.anemometer.sniff import recognise
+from flagdata.ingest.anemometer.recognition import recognise
+from flagdata.ingest.anemometer.restating import bulletins
+from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import Guess
-from flagdata.ingest.anemometer.source import TextFile, open_text
+from flagdata.ingest.anemometer.tables.delimited import drafted, guess, sites
+from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.winds import site_labels
 
 
 def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[str, ...]:

@@ -7,16 +7,16 @@ import re
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.ingest.anemometer import bulletins, excel, spelled_stamps, untimed
-from flagdata.ingest.anemometer.delimited import drafted
-from flagdata.ingest.anemometer.delimited import guess as drafted_guess
-from flagdata.ingest.anemometer.draft import skeleton
-from flagdata.ingest.anemometer.formats import FORMATS, Format
-from flagdata.ingest.anemometer.layout import cell_kind
-from flagdata.ingest.anemometer.options import Limits, WindOptions
-from flagdata.ingest.anemometer.restated import restate
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
-from flagdata.ingest.anemometer.source import TextFile, first_bytes, open_text, signature
+from flagdata.ingest.anemometer.documents import excel
+from flagdata.ingest.anemometer.documents.opening import first_bytes, open_text, signature
+from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer.recognition import recognise
+from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
+from flagdata.ingest.anemometer.restating.restate import restate
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind
+from flagdata.ingest.anemometer.tables.draft import skeleton
+from flagdata.ingest.anemometer.text.layout import cell_kind
+from flagdata.ingest.anemometer.text.source import TextFile
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
@@ -96,31 +96,6 @@ def unknown(source: TextFile) -> Guess:
     text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
     fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
-
-
-def recognise(source: TextFile) -> tuple[Guess, ...]:
-    """Guesses of all anemometer formats at a text file, the likeliest first.
-
-    Where a format knows the file, a draft with doubts has nothing to ask and is left out.
-    """
-    head = Head(lines=tuple(source.head(HEAD_LINES)))
-    found: list[Guess] = []
-    for name in FORMATS:
-        reader: Format = FORMATS[name]()
-        guess = reader.recognise(head)
-        if guess is not None and guess.draft is not None and len(head.lines) == HEAD_LINES:
-            guess = _drafted_of_all(source) or guess
-        if guess is not None:
-            found.append(guess)
-    known = any(guess.score >= SURE and not guess.draft for guess in found)
-    told = [guess for guess in found if not (known and guess.doubts)]
-    return tuple(sorted(told, key=lambda guess: -guess.score))
-
-
-def _drafted_of_all(source: TextFile) -> Guess | None:
-    """The guess at a table by its first lines, and by later rows that show more of its sites and columns."""
-    proposal = drafted(source, WindOptions())
-    return None if proposal is None else drafted_guess(proposal)
 
 
 def _folder(path: Path) -> Guess:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UsageError
-from flagdata.ingest.anemometer.averaging import average, correlation, instrument_sigma
+from flagdata.ingest.anemometer.samples.averaging import average, correlation, instrument_sigma
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries

@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.signals import WindLog
 from flagdata.units import spelled, unit
 

@@ -13,12 +13,13 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.columns import Columns
+from flagdata.ingest.anemometer.documents.opening import open_text
+from flagdata.ingest.anemometer.instants.stamps import PLAIN_FORMS, parse
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.recipe import FileLayout
-from flagdata.ingest.anemometer.rows import RowReader
-from flagdata.ingest.anemometer.source import TextFile, open_text
-from flagdata.ingest.anemometer.stamps import PLAIN_FORMS, parse
+from flagdata.ingest.anemometer.text.columns import Columns
+from flagdata.ingest.anemometer.text.rows import RowReader
+from flagdata.ingest.anemometer.text.source import TextFile
 
 HEADER = b"a,b,c\n"
 LAWS: dict[str, bytes] = {
@@ -184,7 +185,7 @@ def test_a_damaged_toa5_table_is_read_as_row_by_row(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize("form", PLAIN_FORMS)
 def test_stamps_by_arrow_are_those_of_the_pattern(monkeypatch: pytest.MonkeyPatch, form: str, texts: list[str]) -> None:
     quick = parse(texts, form)
-    monkeypatch.setattr("flagdata.ingest.anemometer.stamps.PLAIN_FORMS", ())
+    monkeypatch.setattr("flagdata.ingest.anemometer.instants.stamps.PLAIN_FORMS", ())
     slow = parse(texts, form)
     for name in ("ns", "utc", "valid", "distant"):
         np.testing.assert_array_equal(getattr(quick, name), getattr(slow, name), err_msg=name)

@@ -14,8 +14,8 @@ import pytest
 
 from flagdata.errors import InputError, LimitError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log, sniff
-from flagdata.ingest.anemometer.coverage_json import places
-from flagdata.ingest.anemometer.places import rows
+from flagdata.ingest.anemometer.documents.coverage_json import places
+from flagdata.ingest.anemometer.documents.places import rows
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]

@@ -12,8 +12,8 @@ import pytest
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import WindOptions, anemometers
-from flagdata.ingest.anemometer.clock import ClockChoice
-from flagdata.ingest.anemometer.disorder import longest_rise, sorting
+from flagdata.ingest.anemometer.instants.clock import ClockChoice
+from flagdata.ingest.anemometer.instants.disorder import longest_rise, sorting
 from flagdata.rng import stream
 from flagdata.signals import WindLog
 

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log, sniff
-from flagdata.ingest.anemometer.formats import FORMATS
+from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.anemometer.sniffing import SURE
 
 Write = Callable[..., Path]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
-from flagdata.ingest.anemometer import canboat, gill, metek, trisonica, vaisala, young
-from flagdata.ingest.anemometer.serial_lines import Defect, checksum, split_stamp
+from flagdata.ingest.anemometer.formats import canboat, gill, metek, trisonica, vaisala, young
+from flagdata.ingest.anemometer.formats.serial_lines import Defect, checksum, split_stamp
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso

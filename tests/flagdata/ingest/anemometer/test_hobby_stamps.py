@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
 

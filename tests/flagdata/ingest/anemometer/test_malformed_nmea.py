@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
-from flagdata.ingest.anemometer.sentences import checksum
+from flagdata.ingest.anemometer.formats.sentences import checksum
 from flagdata.schema import SampleFlag
 
 Check = Callable[..., None]

@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.words.headings import understand
 
 Write = Callable[[str], Path]
 HEADING = (

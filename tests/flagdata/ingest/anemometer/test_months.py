@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.ingest.anemometer import WindOptions, read_log, sniff
-from flagdata.ingest.anemometer.extremes import of_extreme
+from flagdata.ingest.anemometer.words.extremes import of_extreme
 
 Write = Callable[..., Path]
 _FIRSTS = np.array(["2012-01-01", "2012-02-01", "2012-03-01", "2012-04-01"], dtype="datetime64[ns]")

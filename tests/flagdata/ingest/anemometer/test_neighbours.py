@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.ingest.anemometer import WindOptions
-from flagdata.ingest.anemometer.neighbours import hours_off
+from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.ingest.store import Labels, WindIngest, ingest_wind
 from flagdata.lake import Lake
 from flagdata.rng import stream

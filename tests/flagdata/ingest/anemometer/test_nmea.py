@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import TimeError, UsageError
-from flagdata.ingest.anemometer.sentences import ChecksumError, checksum, clock, split, tag_time
+from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, clock, split, tag_time
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso

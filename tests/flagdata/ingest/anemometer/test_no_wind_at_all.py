@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer import WindOptions, cumulated, read_log
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.winds import cumulated
+from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.rng import stream
 from flagdata.signals import WindLog
 from flagdata.timebase import NANOSECONDS

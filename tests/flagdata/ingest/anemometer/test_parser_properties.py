@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, average, read_log, sniff
-from flagdata.ingest.anemometer.formats import FORMATS
+from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.signals import WindLog
 from flagdata.units import UNITS

@@ -12,10 +12,10 @@ from scipy.signal import lfilter
 from flagdata.dataset.truth import TruthSeries
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Severity
-from flagdata.ingest.anemometer import quality, zero
-from flagdata.ingest.anemometer.order import in_order
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import QualityRules
+from flagdata.ingest.anemometer.samples import quality, zero
+from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindLog, WindSeries

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.ingest.anemometer.order import in_order
-from flagdata.ingest.anemometer.quality import gaps
 from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.samples.order import in_order
+from flagdata.ingest.anemometer.samples.quality import gaps
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindLog

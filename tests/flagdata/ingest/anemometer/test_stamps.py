@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flagdata.errors import TimeError, UsageError
-from flagdata.ingest.anemometer.dates import decide
-from flagdata.ingest.anemometer.stamps import parse
-from flagdata.ingest.anemometer.wall import to_utc
+from flagdata.ingest.anemometer.instants.dates import decide
+from flagdata.ingest.anemometer.instants.stamps import parse
+from flagdata.ingest.anemometer.instants.wall import to_utc
 from flagdata.timebase import wall_status
 
 S = 1_000_000_000

@@ -11,7 +11,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log, sniff
-from flagdata.ingest.anemometer.stated_columns import Entry, parse
+from flagdata.ingest.anemometer.tables.stated_columns import Entry, parse
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]

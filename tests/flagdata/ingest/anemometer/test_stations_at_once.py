@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
-from flagdata.ingest.anemometer.headings import understand
+from flagdata.ingest.anemometer.words.headings import understand
 
 Write = Callable[[str], Path]
 

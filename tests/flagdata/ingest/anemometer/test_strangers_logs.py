@@ -13,7 +13,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log, sniff
-from flagdata.ingest.anemometer.stamps import parse
+from flagdata.ingest.anemometer.instants.stamps import parse
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer import quality
 from flagdata.ingest.anemometer.reading import Reading, streams
+from flagdata.ingest.anemometer.samples import quality
 from flagdata.ingest.store import ingest_wind
 from flagdata.lake import Lake
 from flagdata.rng import stream

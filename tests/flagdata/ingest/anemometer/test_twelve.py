@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.stamps import parse
+from flagdata.ingest.anemometer.instants.stamps import parse
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import ZoneMissingError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.zones import stated
+from flagdata.ingest.anemometer.instants.zones import stated
 
 ROWS = "Zeit;Wind Speed (m/s)\n01.05.2026 12:00;3,1\n01.05.2026 12:10;3,4\n01.05.2026 12:20;3,3\n"
 

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.zones import stated
+from flagdata.ingest.anemometer.instants.zones import stated
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]

@@ -1,0 +1,1 @@
+"""Files that are opened as text: plain and packed files, workbooks, JSON."""

@@ -1,0 +1,1 @@
+"""Formats of loggers, instruments and services, one a file."""

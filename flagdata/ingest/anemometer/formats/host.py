@@ -1,0 +1,188 @@
+"""Raw lines of a serial port with the stamp of the computer that logged them: `laptop_time,raw_line`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.tables.rowclock import Given
+from flagdata.ingest.anemometer.tables.table import read_table
+from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.winds.sonic import with_horizontal
+
+# Possessive quantifiers: a line of 60,000 blanks or digits must not take quadratic time.
+_FIELD = (
+    r"[ \t]*+(?:[+-]?(?:\d++(?:{mark}\d*+)?|{mark}\d++)(?:[eE][+-]?\d++)?"
+    r"|[+-]?[nN][aA][nN]|[+-]?[iI][nN][fF]|-{{2,}}+|)[ \t]*+"
+)
+_STAMP = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}|^\d{10}(?:\.\d+)?(?=[,;\t])")
+_RAW = re.compile(r"raw|line|message|payload|sentence|serial", re.IGNORECASE)
+LEAST = 0.05
+"""Share of lines that must be data: devices print menus and counters, but a log of nothing else is no log."""
+
+
+class HostStamped:
+    """Format "host-stamped": a recipe whose [file] names the host's stamp."""
+
+    name = "host-stamped"
+    about = "raw serial lines, each after the stamp of the computer that logged it"
+    uses = frozenset({"zone", "azimuth"})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """The recipe whose fields most lines after the stamp have, within its ranges.
+
+        Sure only below a header that speaks of raw lines: any table may have two columns, and its unit is not known.
+        """
+        lines = [line for line in head.lines if _STAMP.match(line)]
+        if len(lines) < max(1, len(head.lines) // 2):
+            return None
+        headed = not _STAMP.match(head.lines[0])
+        if headed and not _RAW.search(head.lines[0].partition(",")[2]):
+            return None
+        best: Guess | None = None
+        most = 0.0
+        for name in recipes.SENSORS.names():
+            recipe = recipes.load(name)
+            if not recipe.file.host:
+                continue
+            share = sum(_in_range(recipe, line) for line in lines) / len(lines)
+            if share > max(LEAST, most):
+                most = share
+                best = Guess(
+                    format="host-stamped",
+                    recipe=name,
+                    score=max(0.55, min(0.9, share)) if headed else 0.4,
+                    reasons=(
+                        f"line 1 names a raw line: {head.lines[0]!r}"
+                        if headed
+                        else "no header says what the lines are",
+                        f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
+                        f"{share:.0%} of them go on with the fields of recipe {name}: {recipe.about}",
+                    ),
+                )
+        return best
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read a file by the recipe in `options`."""
+        if options.recipe is None:
+            raise UsageError(
+                "the format host-stamped needs a recipe", where=str(source.path), fix="name one by --recipe"
+            )
+        recipe = recipes.load(options.recipe)
+        if not recipe.file.host:
+            raise UsageError(
+                f"the recipe {recipe.name} says nothing of a host's stamp", where=str(source.path),
+                fix="add host = \"iso\" to its [file], or use --as delimited",
+            )  # fmt: skip
+        rows = HostRows(source, recipe)
+        where = str(source.path)
+        reading = read_table(
+            rows, recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock)
+        ).reading
+        return with_horizontal(reading, options.azimuth, where=where)
+
+
+def _shape(recipe: Recipe) -> re.Pattern[str]:
+    """What a raw line of data looks like: numbers in the columns of channels and time, anything in others.
+
+    A recipe that uses every column up to its last takes lines of that many fields alone; one that leaves columns out
+    takes longer lines too.
+    """
+    numeric = {int(c.column) for c in recipe.channels.values()} | {int(c) for c in recipe.time.columns}
+    last = max(numeric | {int(c.column) for c in recipe.checks})
+    between, one = re.escape(recipe.file.delimiter), _FIELD.format(mark=re.escape(recipe.file.decimal))
+    fields = [one if column in numeric else f"[^{between}]*+" for column in range(1, last + 1)]
+    rest = "" if len(numeric) == last else f"(?:{between}.*)?"
+    return re.compile(f"^{between.join(fields)}{rest}$")
+
+
+def _payload(line: str, delimiter: str) -> tuple[str, str]:
+    stamp, _, raw = line.partition(delimiter)
+    raw = raw.strip()
+    if len(raw) > 1 and raw[0] == raw[-1] == '"':
+        raw = raw[1:-1].replace('""', '"')
+    return stamp.strip(), raw
+
+
+def _in_range(recipe: Recipe, line: str) -> bool:
+    raw = _payload(line, recipe.file.delimiter)[1]
+    if not _shape(recipe).match(raw):
+        return False
+    cells = raw.split(recipe.file.delimiter)
+    if not all(cells[int(check.column) - 1].strip() in check.values for check in recipe.checks):
+        return False
+    for layout in recipe.channels.values():
+        try:
+            value = float(cells[int(layout.column) - 1].replace(",", "."))
+        except ValueError:
+            continue
+        if layout.range is not None and not layout.range[0] <= value <= layout.range[1]:
+            return False
+    return True
+
+
+class HostRows:
+    """Rows of [host stamp, field, field, …] out of stamped raw lines; other lines are counted, not read."""
+
+    header: list[str] | None = None
+    shift = 1
+
+    def __init__(self, source: TextFile, recipe: Recipe) -> None:
+        self._source = source
+        self._layout = recipe.file
+        self._shape = _shape(recipe)
+        self._other: list[int] = []
+        self._read = 0
+        self.first_line = recipe.file.header + 1
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        """Line numbers and rows of `width` cells."""
+        delimiter = self._layout.delimiter
+        for first, lines in self._source.blocks():
+            numbers: list[int] = []
+            rows: list[list[str]] = []
+            for number, line in enumerate(lines, start=first):
+                if not line.strip(" \t\x00") or (number < self.first_line and not _STAMP.match(line)):
+                    continue
+                stamp, raw = _payload(line, delimiter)
+                if raw and self._shape.match(raw):
+                    row = [stamp, *raw.split(delimiter)]
+                    if len(row) >= width:
+                        numbers.append(number)
+                        rows.append(row)
+                        continue
+                self._other.append(number)
+            self._read += len(rows)
+            if rows:
+                yield np.array(numbers, dtype=np.int64), rows
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Lines that are no data; complete when `blocks` has been read.
+
+        Raises:
+            InputError: hardly any line is data.
+        """
+        other = len(self._other)
+        if not other:
+            return ()
+        if self._read < LEAST * (self._read + other):
+            raise InputError(
+                f"{other} of {other + self._read} lines do not have the fields of the recipe",
+                where=f"{self._source.path}, line {self._other[0]}", fix="check the recipe, or the device's settings",
+            )  # fmt: skip
+        return (
+            Finding(
+                kind="non-data-lines", severity=Severity.WARNING, count=other, where=f"line {self._other[0]}",
+                what=f"{other} lines without the fields of a reading (counters, menus, fragments); left out",
+            ),
+        )  # fmt: skip

@@ -1,0 +1,240 @@
+"""Time marks of a stream: times of day at some lines, made into instants for all lines between."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.sentences import TimeMark
+from flagdata.ingest.anemometer.instants import clock as clocks
+from flagdata.ingest.anemometer.instants.clock import ClockChoice
+from flagdata.signals import Instants
+from flagdata.timebase import NANOSECONDS
+
+DAY = 86_400 * NANOSECONDS
+# The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
+_TRUST = ("ZDA", "RMC", "GGA", "GLL")
+NO_TIME = "the stream carries no time"
+NO_TIME_FIX = (
+    "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; "
+    "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
+)
+BURST = 4
+"""Lines about a single mark that are of its second: 4800 baud carry five sentences of 82 characters, the mark too."""
+FEW = 10
+"""Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
+DISORDER = 2 * NANOSECONDS
+"""A mark this much behind the one before it is reported; less is the order of sentences within a second."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """Instants of the lines asked for.
+
+    Attributes:
+        time: (n,) UTC nanoseconds.
+        spacing: median distance of the marks [s].
+        marks: number of marks used.
+        kind: sentence they come from, or "TAG".
+        findings: about midnight and marks that run backwards.
+    """
+
+    time: Instants
+    spacing: float
+    marks: int
+    kind: str
+    findings: tuple[Finding, ...]
+
+
+@dataclass
+class TimeLine:
+    """Marks as they come in, by the kind of sentence."""
+
+    line: dict[str, list[int]] = field(default_factory=dict)
+    clock: dict[str, list[int]] = field(default_factory=dict)
+    dated: tuple[int, int, dt.date] | None = None
+    """First date the stream states: its line, time of day [ns] and date."""
+
+    def add(self, kind: str, line: int, mark: TimeMark) -> None:
+        """A time sentence. Dates that no calendar has are left out."""
+        self.line.setdefault(kind, []).append(line)
+        self.clock.setdefault(kind, []).append(mark.clock)
+        if mark.date is not None and self.dated is None:
+            try:
+                self.dated = (line, mark.clock, dt.date(*mark.date))
+            except ValueError:
+                return
+
+    def add_instant(self, line: int, instant: int) -> None:
+        """A whole instant, of a TAG block [UTC ns]."""
+        self.line.setdefault("TAG", []).append(line)
+        self.clock.setdefault("TAG", []).append(instant)
+
+    def place(
+        self,
+        lines: NDArray[np.int64],
+        *,
+        date: dt.date | None,
+        where: str,
+        choice: ClockChoice | None = None,
+        once: bool = False,
+    ) -> Placed:
+        """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
+
+        Args:
+            date: day (UTC) of the first mark, for a stream that states none.
+            choice: whose marks are right where the stream's clock was set back and stays so; `None` where nobody said.
+            once: whether the lines are one reading, which may have one instant.
+
+        Raises:
+            TimeError: fewer than two marks, unless all lines are close to the one, or no date.
+            UsageError: a date given that the stream contradicts, or does not need.
+        """
+        instants = set(self.clock.get("TAG", ()))
+        if once and len(instants) == 1:
+            time = np.full(len(lines), instants.pop(), dtype=np.int64)
+            return Placed(time=time, spacing=1.0, marks=1, kind="TAG", findings=())
+        single = self._single()
+        if single is not None and _reach(lines, self.line[single][0]) <= BURST:
+            return self._of_one(single, lines, date=date, where=where)
+        kind = self._kind(where)
+        at = np.array(self.line[kind], dtype=np.int64)
+        clock = np.array(self.clock[kind], dtype=np.int64)
+        found: list[Finding] = []
+        if kind == "TAG":
+            if date is not None:
+                raise UsageError(
+                    "a date was given, but TAG blocks carry their own", where=where, fix="leave out --date"
+                )
+            day = np.zeros(len(clock), dtype=np.int64)
+            start = 0
+        else:
+            # More than half a day back is midnight; less is disorder.
+            day = np.cumsum(np.concatenate(([0], np.diff(clock) < -DAY // 2)).astype(np.int64))
+            start = self._start(at, clock, day, date, where) * DAY
+            if day[-1]:
+                text = f"{day[-1]} times the clock passes midnight: the day is counted on"
+                found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
+        marks = start + day * DAY + clock
+        marks, told = _one_clock(marks, at, choice)
+        found.extend(told)
+        rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
+        behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
+        if behind.any():
+            found.append(
+                Finding(
+                    kind="time-backwards", severity=Severity.WARNING, count=int(behind.sum()),
+                    where=f"line {at[behind][0]}",
+                    what=f"{int(behind.sum())} times the stream's clock runs backwards; marks behind earlier ones are "
+                    "not used",
+                )
+            )  # fmt: skip
+        at, marks = at[rising], marks[rising]
+        if len(marks) < 2:
+            raise TimeError(
+                "the stream's clock stands still",
+                where=f"{where}, line {at[0]}",
+                fix="check that the receiver has a fix; if the wind came at a steady rate that is known, leave out "
+                "what tells the time and give --start TIME --rate HZ",
+            )
+        spacing = float(np.median(np.diff(marks))) / NANOSECONDS
+        return Placed(
+            time=_interpolate(lines, at, marks), spacing=spacing, marks=len(marks), kind=kind, findings=tuple(found)
+        )
+
+    def _single(self) -> str | None:
+        """The kind of the one mark of the stream; `None` where there are more, or none but a TAG block."""
+        if any(len(lines) > 1 for lines in self.line.values()):
+            return None
+        return next((kind for kind in _TRUST if kind in self.line), None)
+
+    def _of_one(self, kind: str, lines: NDArray[np.int64], *, date: dt.date | None, where: str) -> Placed:
+        """Instants of a few lines about one mark: within the second before or behind it, in their order."""
+        at = np.array(self.line[kind], dtype=np.int64)
+        clock = np.array(self.clock[kind], dtype=np.int64)
+        mark = self._start(at, clock, np.zeros(1, dtype=np.int64), date, where) * DAY + int(clock[0])
+        pace = NANOSECONDS // (_reach(lines, int(at[0])) + 1)
+        what = (
+            f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
+            "about it, in their order"
+        )
+        fix = "if they came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
+        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what, fix=fix),)
+        return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=found)
+
+    def _kind(self, where: str) -> str:
+        counts = {kind: len(lines) for kind, lines in self.line.items()}
+        if max(counts.values(), default=0) < 2:
+            raise TimeError(NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX)
+        if counts.get("TAG", 0) >= 2:
+            return "TAG"
+        enough = max(counts.values()) / 2
+        return next(kind for kind in _TRUST if counts.get(kind, 0) >= enough)
+
+    def _start(
+        self, at: NDArray[np.int64], clock: NDArray[np.int64], day: NDArray[np.int64], date: dt.date | None, where: str
+    ) -> int:
+        """Days since 1970 of the first mark."""
+        epoch = dt.date(1970, 1, 1).toordinal()
+        if self.dated is None:
+            if date is None:
+                raise TimeError(
+                    "the stream carries the time of day, but no date", where=f"{where}, line {at[0]}",
+                    fix="give the date (UTC) of its first sentence: --date 2026-05-01",
+                )  # fmt: skip
+            return date.toordinal() - epoch
+        line, time, stated = self.dated
+        nearest = int(np.argmin(np.abs(at - line)))
+        # The dated sentence may lie across midnight from its nearest mark.
+        across = round((int(clock[nearest]) - time) / DAY)
+        start = stated.toordinal() - epoch - int(day[nearest]) - across
+        if date is not None and date.toordinal() - epoch != start:
+            raise UsageError(
+                f"the date {date} was given, but the stream begins on {dt.date.fromordinal(start + epoch)}",
+                where=where, fix="leave out --date",
+            )  # fmt: skip
+        return start
+
+
+def _reach(lines: NDArray[np.int64], mark: int) -> int:
+    """How many lines the farthest of `lines` is from a mark."""
+    return int(np.abs(lines - mark).max()) if len(lines) else 0
+
+
+def _one_clock(
+    marks: Instants, at: NDArray[np.int64], choice: ClockChoice | None
+) -> tuple[Instants, tuple[Finding, ...]]:
+    """Marks on one clock where it was set back for good; those that leave its time for a moment do not rise."""
+    most = max(FEW, len(marks) // 100)
+    stray = clocks.excursions(marks, most=most) if len(clocks.set_back(marks)) <= most else np.zeros(len(marks), bool)
+    settled = np.flatnonzero(~stray)
+    jumps = clocks.set_back(marks[settled])
+    jumps = jumps if len(jumps) <= clocks.MOST else ()
+    out = marks.copy()
+    out[settled], _ = clocks.continued(marks[settled], jumps, choice)
+    found = clocks.report(marks[settled], jumps, at[settled], choice)
+    if stray.any():
+        out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
+        finding = Finding(
+            kind="time-backwards", severity=Severity.WARNING, count=int(stray.sum()), where=f"line {at[stray][0]}",
+            what=f"{int(stray.sum())} times of the stream leave its course and come back to it; not used",
+        )  # fmt: skip
+        found = (*found, finding)
+    return out, found
+
+
+def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:
+    """Instants of lines between marks, exact to a nanosecond relative to the marks' first."""
+    base = int(marks[0])
+    relative = (marks - base).astype(np.float64)
+    pace = float(np.median(np.diff(relative) / np.diff(at)))
+    place = lines.astype(np.float64)
+    out = np.interp(place, at.astype(np.float64), relative)
+    out = np.where(lines < at[0], (place - at[0]) * pace, out)
+    out = np.where(lines > at[-1], relative[-1] + (place - at[-1]) * pace, out)
+    return base + np.round(out).astype(np.int64)

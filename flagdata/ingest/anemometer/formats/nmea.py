@@ -1,0 +1,409 @@
+"""NMEA 0183 streams: wind from MWV and MWD, else VWR, VWT and MDA, time from the sentences around them.
+
+Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
+GGA, GLL, or the time of a TAG block), and the flag TIME_UNSURE. MWV,R is wind past the platform; MWV,T is
+"theoretical": what the instrument computed as if the platform stood still; both are relative to the bow. They stay in
+channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR, VWT and MDA are
+what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the same wind again.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.marks import NO_TIME, NO_TIME_FIX, Placed, TimeLine
+from flagdata.ingest.anemometer.formats.sentences import (
+    SPEED_UNITS,
+    ChecksumError,
+    Sentence,
+    number,
+    speed_over_ground,
+    split,
+    tag_time,
+    time_mark,
+)
+from flagdata.ingest.anemometer.formats.serial_lines import most_stamped
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.samples import possible
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.schema import SampleFlag
+from flagdata.signals import Instants, Sensor
+from flagdata.timebase import NANOSECONDS
+from flagdata.units import UNITS
+
+MOVING = 0.5
+"""Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
+_OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
+"""Older sentences → the wind they hold."""
+_NEWER = {"apparent_wind": "MWV,R", "theoretical_wind": "MWV,T", "wind": "MWD"}
+"""The sentences of the same winds that are read before them."""
+WINDS = ("MWV", "MWD", *_OTHERS)
+_CHANNELS = (
+    "apparent_wind_speed", "apparent_wind_direction", "theoretical_wind_speed", "theoretical_wind_direction",
+    "wind_speed", "wind_direction", "wind_direction_magnetic",
+)  # fmt: skip
+
+
+@dataclass
+class _Stream:
+    """What one pass over the lines gathers."""
+
+    line: list[int] = field(default_factory=list)
+    values: list[dict[str, float]] = field(default_factory=list)
+    flags: list[int] = field(default_factory=list)
+    times: TimeLine = field(default_factory=TimeLine)
+    kinds: Counter[str] = field(default_factory=Counter)
+    talkers: Counter[str] = field(default_factory=Counter)
+    bad_checksums: list[int] = field(default_factory=list)
+    unchecked: int = 0
+    not_sentences: list[int] = field(default_factory=list)
+    invalid: list[int] = field(default_factory=list)
+    undirected: int = 0
+    unstated: int = 0
+    speeds: list[float] = field(default_factory=list)
+    others: list[tuple[Sentence, int]] = field(default_factory=list)
+    beside: Counter[str] = field(default_factory=Counter)
+
+
+class Nmea:
+    """Format "nmea"."""
+
+    name = "nmea"
+    about = "NMEA 0183 sentences MWV and MWD, or VWR, VWT and MDA"
+    uses = frozenset({"date", "platform", "azimuth", "talker"})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """Lines that are sentences, most of them with a right checksum, some of them of wind."""
+        if most_stamped(head):
+            return None  # they are of the format nmea-stamped
+        right = wrong = wind = 0
+        for line in head.lines:
+            try:
+                sentence = split(line)
+            except ChecksumError:
+                wrong += 1
+                continue
+            if sentence is not None:
+                right += 1
+                wind += sentence.kind in WINDS
+        if right < max(1, len(head.lines) // 2):
+            return None
+        reasons = (
+            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences with right checksums, {wrong} wrong",
+            f"{wind} of them are wind ({', '.join(WINDS)})",
+        )
+        return Guess(format="nmea", score=0.95 if wind else 0.3, reasons=reasons)
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read all wind sentences."""
+        stream = _Stream()
+        for first, lines in source.blocks():
+            for at, line in enumerate(lines, start=first):
+                if line.strip(" \t\x00"):
+                    _take(stream, line, at, options.talker)
+        _take_others(stream)
+        where = str(source.path)
+        if not stream.line:
+            by = f" of the talker {options.talker}" if options.talker is not None else ""
+            seen = ", ".join(f"{count} {kind}" for kind, count in stream.kinds.most_common(6))
+            raise InputError(
+                f"no valid sentence of wind ({', '.join(WINDS)}){by}{'; there are ' + seen if seen else ''}",
+                where=where, fix="have the instrument send MWV, or check its baud rate if sentences are broken",
+            )  # fmt: skip
+        if len(stream.talkers) > 1:
+            what = f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments"
+            fix = f"choose one, e.g. --talker {min(stream.talkers)}"
+            if not stream.times.line:
+                raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
+            raise InputError(what, where=where, fix=fix)
+        line = np.array(stream.line, dtype=np.int64)
+        if options.clock == "sort":
+            fix = "give --clock first or --clock last, or leave it out"
+            raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
+        once = len({frozenset(row) for row in stream.values}) == len(stream.values)
+        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, once=once)
+        channels = {
+            name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
+        }
+        found: list[Finding] = []
+        for name in channels:
+            if name.endswith(("direction", "magnetic")):
+                angle, impossible = possible.direction(name, channels[name], line)
+                channels[name] = np.mod(angle, 2 * np.pi)
+                found.extend(impossible)
+        channels = {name: values for name, values in channels.items() if np.isfinite(values).any()}
+        if not channels:
+            raise InputError(
+                "every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix="check the sensor"
+            )
+        channels, about = _platform(channels, stream, options, where)
+        flags = np.array(stream.flags, dtype=np.uint16) | np.uint16(SampleFlag.TIME_UNSURE)
+        talkers = ", ".join(sorted(stream.talkers))
+        return Reading(
+            time=placed.time, channels=channels, flags=flags, line=line,
+            sensor=Sensor(name=f"NMEA 0183 talker {talkers}"), step=NANOSECONDS,
+            findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, *about),
+        )  # fmt: skip
+
+
+def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
+    tagged = tag_time(line) if line.startswith("\\") else None
+    try:
+        sentence = split(line)
+    except ChecksumError:
+        stream.bad_checksums.append(at)
+        return
+    if sentence is None:
+        stream.not_sentences.append(at)
+        return
+    stream.kinds[sentence.kind] += 1
+    stream.unchecked += not sentence.checked
+    if tagged is not None:
+        stream.times.add_instant(at, tagged * 1_000_000)
+    mark = time_mark(sentence)
+    if mark is not None:
+        stream.times.add(sentence.kind, at, mark)
+    over_ground = speed_over_ground(sentence)
+    if over_ground is not None:
+        stream.speeds.append(over_ground)
+    if talker is not None and sentence.talker != talker:
+        return
+    if sentence.kind == "MWV":
+        _mwv(stream, sentence, at)
+    elif sentence.kind == "MWD":
+        _mwd(stream, sentence, at)
+    elif sentence.kind in _OTHERS:
+        stream.others.append((sentence, at))
+
+
+def _take_others(stream: _Stream) -> None:
+    """Sentences of older kinds, of each wind that the stream holds in no other."""
+    known = {name for row in stream.values for name in row}
+    added = False
+    for sentence, at in stream.others:
+        kind = _OTHERS[sentence.kind]
+        if f"{kind}_speed" in known:
+            stream.beside[sentence.kind] += 1
+            continue
+        added = True
+        (_mda if kind == "wind" else _vwr)(stream, sentence, at)
+    if added:
+        order = np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist()
+        stream.line = [stream.line[index] for index in order]
+        stream.values = [stream.values[index] for index in order]
+        stream.flags = [stream.flags[index] for index in order]
+
+
+def _vwr(stream: _Stream, sentence: Sentence, at: int) -> None:
+    """VWR and VWT: the angle to the left or right of the bow, then the speed in knots, m/s and km/h."""
+    fields = sentence.fields
+    if len(fields) < 4 or fields[1] not in ("L", "R", ""):
+        stream.invalid.append(at)
+        return
+    kind = _OTHERS[sentence.kind]
+    angle = number(fields[0])
+    row: dict[str, float] = {}
+    if angle is not None and fields[1]:
+        row[f"{kind}_direction"] = float(np.radians(angle if fields[1] == "R" else -angle))
+    speed = _speed(fields[2:])
+    if speed is not None:
+        row[f"{kind}_speed"] = speed
+    _add(stream, sentence, at, row, SampleFlag.OK if speed is not None else SampleFlag.MISSING)
+
+
+def _mda(stream: _Stream, sentence: Sentence, at: int) -> None:
+    """MDA: of the composite of a weather station the direction (true, magnetic) and the speed (knots, m/s)."""
+    fields = sentence.fields
+    if len(fields) < 20:
+        stream.invalid.append(at)
+        return
+    true, magnetic, speed = number(fields[12]), number(fields[14]), _speed(fields[16:20])
+    row: dict[str, float] = {}
+    if true is not None:
+        row["wind_direction"] = float(np.radians(true))
+    if magnetic is not None:
+        row["wind_direction_magnetic"] = float(np.radians(magnetic))
+    if speed is not None:
+        row["wind_speed"] = speed
+    _add(stream, sentence, at, row, SampleFlag.OK if speed is not None else SampleFlag.MISSING)
+
+
+def _speed(fields: Sequence[str]) -> float | None:
+    """The first speed that pairs of a value and a letter hold [m/s]; m/s first, since it has most digits."""
+    pairs = {letter: number(value) for value, letter in zip(fields[0::2], fields[1::2], strict=False)}
+    known = (
+        value * UNITS[SPEED_UNITS[letter]].scale
+        for letter in ("M", "K", "N") if (value := pairs.get(letter)) is not None
+    )  # fmt: skip
+    return next(known, None)
+
+
+def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
+    fields = sentence.fields
+    if len(fields) < 4 or fields[1] not in ("R", "T"):
+        stream.invalid.append(at)
+        return
+    kind = "apparent" if fields[1] == "R" else "theoretical"
+    angle, speed, unit = number(fields[0]), number(fields[2]), SPEED_UNITS.get(fields[3])
+    row: dict[str, float] = {}
+    unstated = len(fields) == 4  # canboat's n2kd leaves the status out
+    stream.unstated += unstated
+    flag = SampleFlag.OK if unstated or fields[4] == "A" else SampleFlag.SENSOR_FAULT
+    if angle is not None:
+        row[f"{kind}_wind_direction"] = float(np.radians(angle))
+    if speed is not None and unit is not None:
+        row[f"{kind}_wind_speed"] = speed * UNITS[unit].scale
+    else:
+        flag |= SampleFlag.MISSING
+    _add(stream, sentence, at, row, flag)
+
+
+def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
+    fields = sentence.fields
+    if len(fields) < 8:
+        stream.invalid.append(at)
+        return
+    true, magnetic, knots, metres = (number(fields[index]) for index in (0, 2, 4, 6))
+    speed = metres if metres is not None else None if knots is None else knots * UNITS["kn"].scale
+    if true is None and magnetic is None:
+        stream.undirected += 1
+        return
+    row: dict[str, float] = {}
+    if true is not None:
+        row["wind_direction"] = float(np.radians(true))
+    if magnetic is not None:
+        row["wind_direction_magnetic"] = float(np.radians(magnetic))
+    flag = SampleFlag.OK
+    if speed is None:
+        flag = SampleFlag.MISSING
+    else:
+        row["wind_speed"] = speed
+    _add(stream, sentence, at, row, flag)
+
+
+def _add(stream: _Stream, sentence: Sentence, at: int, row: dict[str, float], flag: SampleFlag) -> None:
+    stream.talkers[sentence.talker] += 1
+    stream.line.append(at)
+    stream.values.append(row)
+    stream.flags.append(int(flag))
+
+
+def _platform(
+    channels: dict[str, np.ndarray], stream: _Stream, options: WindOptions, where: str
+) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
+    """Which channels are wind over ground, by what is known of the platform."""
+    moving = float(np.median(stream.speeds)) if stream.speeds else None
+    if options.platform == "fixed":
+        if moving is not None and moving > MOVING:
+            raise InputError(
+                f"the platform was said to be fixed, but moves at {moving:.1f} kn over ground in the median",
+                where=where, fix="leave out --platform",
+            )  # fmt: skip
+        return _fixed(channels, options, where)
+    if options.azimuth is not None:
+        raise UsageError(
+            "an azimuth belongs to a fixed platform", where=where, fix="add --platform fixed, or leave it out"
+        )
+    if "wind_speed" in channels:
+        text = "wind over ground (MWD) was computed by the instrument from a moving platform's heading and speed"
+        return channels, (Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),)
+    fix = None
+    if moving and moving > MOVING:
+        known = f"a platform that moves at {moving:.1f} kn"
+    elif options.platform == "moving":
+        known = "a moving platform, as told"
+    else:
+        known = "a platform of unknown motion"
+        fix = "if the sensor stands on a mast, say so: --platform fixed"
+    return channels, (
+        Finding(
+            kind="apparent-wind-only", severity=Severity.WARNING, value=moving,
+            what=f"wind relative to {known}: no ground truth", fix=fix,
+        ),
+    )  # fmt: skip
+
+
+def _fixed(
+    channels: dict[str, np.ndarray], options: WindOptions, where: str
+) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
+    kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
+    speed, angle = f"{kind}_wind_speed", f"{kind}_wind_direction"
+    out = dict(channels)
+    stated = "wind_speed" in out
+    if not stated and speed in out:
+        out["wind_speed"] = out.pop(speed)
+    if options.azimuth is not None:
+        if stated or angle not in out:
+            what = "the stream states wind over ground itself" if stated else "the stream has no directions"
+            raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
+        out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
+    text = f"fixed platform, as told: {kind} wind is wind over ground"
+    return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
+
+
+def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
+    """How many sentences of each kind of wind there are, and how far apart, where a stream holds several kinds."""
+    told = {
+        "apparent_wind": "relative (MWV,R)",
+        "theoretical_wind": "theoretical (MWV,T)",
+        "wind": "over ground (MWD)",
+    }
+    parts: list[str] = []
+    for prefix, name in told.items():
+        at = [index for index, row in enumerate(stream.values) if f"{prefix}_speed" in row]
+        if len(at) > 1:
+            parts.append(f"{len(at)} {name}, one every {np.median(np.diff(time[at])) / NANOSECONDS:.3g} s")
+        elif at:
+            parts.append(f"1 {name}")
+    if len(parts) < 2:
+        return ()
+    text = f"{len(stream.line)} wind sentences of {len(parts)} kinds: {'; '.join(parts)}"
+    return (Finding(kind="wind-kinds", severity=Severity.NOTE, count=len(stream.line), what=text),)
+
+
+def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
+    count = len(stream.line)
+    found = list(placed.findings)
+    if placed.marks > 1:
+        what = f"{count} wind sentences carry no time: interpolated between {placed.marks} {placed.kind} marks "
+        what += f"{placed.spacing:g} s apart"
+        kind = "time-interpolated"
+        found.insert(0, Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=what))
+
+    def note(places: list[int], kind: str, severity: Severity, what: str) -> None:
+        if places:
+            text = f"{len(places)} {what}"
+            found.append(Finding(kind=kind, severity=severity, count=len(places), where=f"line {places[0]}", what=text))
+
+    note(stream.bad_checksums, "checksum-errors", Severity.ERROR, "sentences with a wrong checksum; left out")
+    note(stream.not_sentences, "malformed-lines", Severity.WARNING, "lines that are no sentence; left out")
+    note(stream.invalid, "malformed-sentences", Severity.ERROR, "wind sentences with fields missing; left out")
+    faults = sum(1 for flag in stream.flags if flag & SampleFlag.SENSOR_FAULT)
+    if faults:
+        text = f"{faults} wind sentences that the instrument itself marks invalid; left out of averages"
+        found.append(Finding(kind="sensor-fault", severity=Severity.WARNING, count=faults, what=text))
+    if stream.unchecked:
+        text = f"{stream.unchecked} sentences without a checksum; taken as they are"
+        found.append(Finding(kind="no-checksum", severity=Severity.WARNING, count=stream.unchecked, what=text))
+    if stream.unstated:
+        text = f"{stream.unstated} MWV sentences without a status; taken as valid"
+        found.append(Finding(kind="no-status", severity=Severity.WARNING, count=stream.unstated, what=text))
+    for kind, number_of in stream.beside.items():
+        text = f"{number_of} {kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
+        found.append(Finding(kind="sentences-not-read", severity=Severity.NOTE, count=number_of, what=text))
+    if stream.undirected:
+        text = f"{stream.undirected} MWD sentences without a direction: no wind over ground, not read"
+        found.append(Finding(kind="mwd-without-direction", severity=Severity.NOTE, count=stream.undirected, what=text))
+    missing = sum(1 for flag in stream.flags if flag & SampleFlag.MISSING)
+    if missing:
+        text = f"{missing} wind sentences without a speed"
+        found.append(Finding(kind="missing-values", severity=Severity.WARNING, count=missing, what=text))
+    return tuple(found)

@@ -1,0 +1,67 @@
+"""The table of anemometer formats, and the contract each of them keeps.
+
+A user's own format is a package with an entry point in the group `flagdata.formats`.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.registry import Registry
+
+
+class Format(Protocol):
+    """A format of anemometer logs; a class without arguments.
+
+    Attributes:
+        name: its name in the table.
+        about: one line.
+        uses: names of the `WindOptions` it heeds; others are refused when given, but for those that are settled for
+            every format alike (`WindOptions.given`). A format that names "platform" settles it itself.
+    """
+
+    name: str
+    about: str
+    uses: frozenset[str]
+
+    def recognise(self, head: Head) -> Guess | None:
+        """Whether the first lines look like this format, and why; `None` where nothing does."""
+        ...
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """All rows in the order of the file, in SI, instants in UTC nanoseconds. Raises FlagdataError only."""
+        ...
+
+
+FORMATS = Registry(
+    "anemometer format",
+    {
+        "delimited": "flagdata.ingest.anemometer.tables.delimited:Delimited",
+        "nmea": "flagdata.ingest.anemometer.formats.nmea:Nmea",
+        "kestrel": "flagdata.ingest.anemometer.formats.kestrel:Kestrel",
+        "toa5": "flagdata.ingest.anemometer.formats.toa5:Toa5",
+        "nmea-stamped": "flagdata.ingest.anemometer.formats.stamped_nmea:StampedNmea",
+        "canboat": "flagdata.ingest.anemometer.formats.canboat:Canboat",
+        "davis": "flagdata.ingest.anemometer.formats.davis:Davis",
+        "ecowitt": "flagdata.ingest.anemometer.formats.ecowitt:Ecowitt",
+        "eddypro": "flagdata.ingest.anemometer.formats.eddypro:EddyPro",
+        "fluxnet": "flagdata.ingest.anemometer.formats.fluxnet:Fluxnet",
+        "icos": "flagdata.ingest.anemometer.formats.icos:Icos",
+        "hobo": "flagdata.ingest.anemometer.formats.hobo:Hobo",
+        "surfrad": "flagdata.ingest.anemometer.formats.surfrad:Surfrad",
+        "gill": "flagdata.ingest.anemometer.formats.gill:Gill",
+        "metek": "flagdata.ingest.anemometer.formats.metek:Metek",
+        "trisonica": "flagdata.ingest.anemometer.formats.trisonica:TriSonica",
+        "vaisala": "flagdata.ingest.anemometer.formats.vaisala:Vaisala",
+        "young": "flagdata.ingest.anemometer.formats.young:Young",
+        "nrg": "flagdata.ingest.anemometer.formats.nrg:Nrg",
+        "windographer": "flagdata.ingest.anemometer.formats.windographer:Windographer",
+        "zentra": "flagdata.ingest.anemometer.formats.zentra:Zentra",
+        "host-stamped": "flagdata.ingest.anemometer.formats.host:HostStamped",
+    },
+    group="flagdata.formats",
+)

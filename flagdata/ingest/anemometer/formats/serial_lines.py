@@ -1,0 +1,308 @@
+"""Lines that an instrument sent over a serial port, as a computer or logger wrote them down.
+
+The instruments do not know the time: it is the stamp that the logging computer wrote before each line, ISO 8601 or Unix
+seconds or milliseconds, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the
+connection's name between stamp and sentence, other programs what they have to say about it. Each instrument's file says
+what its lines mean; the rest is here.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
+from functools import reduce
+from operator import xor
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.exports import described
+from flagdata.ingest.anemometer.instants.stamps import Stamps
+from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.samples import possible
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.tables.rowclock import instants
+from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.schema import CHANNELS, SampleFlag
+from flagdata.signals import Sensor
+
+_STAMP = re.compile(
+    r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+)?"
+    r"[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
+    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+"
+    r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
+)
+_AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})\s.*")
+"""What a program wrote behind a sentence."""
+_EPOCH = re.compile(
+    r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?[\s,;>|]+"
+    r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!]))?(?P<raw>\S.*)"
+)
+_MONTH = re.compile(
+    r"\s*[\"\[(]?(?P<day>\d{1,2})[-/ ](?P<month>[A-Za-z]{3})[-/ ](?P<year>\d{4})[T ,;:\t]"
+    r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
+)
+MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+LONGEST = 2000
+"""Characters of the longest line of an instrument; longer ones are something else."""
+_SECONDS = re.compile(r"\d{10}(\.\d+)?")
+
+
+class Defect(Enum):
+    """Why a line gives no sample."""
+
+    OTHER = auto()
+    """It is no reading of the instrument: a menu, another message, noise."""
+    CHECKSUM = auto()
+    """Its checksum is wrong."""
+    CUT = auto()
+    """It begins as a reading, but is not whole."""
+
+
+Sample: TypeAlias = tuple[Sequence[float], int]
+"""Values in the order of the instrument's channels (SI, NaN where missing) and bits of SampleFlag."""
+Parse: TypeAlias = Callable[[str], Sample | Defect]
+Split: TypeAlias = Callable[[str], tuple[str, str]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Instrument:
+    """What an instrument's lines hold.
+
+    Attributes:
+        name: of the instrument, for messages.
+        channels: names of schema.CHANNELS, in the order of a sample's values.
+        parse: a line without its stamp → sample or defect.
+        sensor: the instrument.
+        described_by: the maker's description that `parse` follows, where no file of the instrument was seen.
+        split: a line → stamp ("" where there is none; ISO 8601 or Unix time) and the rest.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    parse: Parse
+    sensor: Sensor
+    described_by: str | None = None
+    split: Split | None = None
+
+
+@dataclass
+class _Gathered:
+    channels: list[array[float]]
+    stamps: list[str] = field(default_factory=list)
+    line: list[int] = field(default_factory=list)
+    flags: list[int] = field(default_factory=list)
+    unstamped: list[int] = field(default_factory=list)
+    defects: dict[Defect, list[int]] = field(default_factory=lambda: {defect: [] for defect in Defect})
+    last: int = 0
+
+
+def split_stamp(line: str) -> tuple[str, str]:
+    """The stamp that a computer wrote before a line ("" where there is none), and the line, out of its quotes."""
+    match = _STAMP.match(line)
+    if match is not None:
+        stamp = f"{match['date']}T{match['time']}{match['zone'] or ''}"
+        raw = _unquoted(match["raw"])
+        return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
+    match = _MONTH.match(line)
+    if match is not None and match["month"].lower() in MONTHS:
+        month = MONTHS.index(match["month"].lower()) + 1
+        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}", _unquoted(match["raw"])
+    match = _EPOCH.match(line)
+    return (match["epoch"], _unquoted(match["raw"])) if match is not None else ("", _unquoted(line))
+
+
+def most_stamped(head: Head) -> bool:
+    """Whether most lines are an NMEA 0183 sentence after a computer's stamp."""
+    split = [split_stamp(line) for line in head.lines]
+    stamped = sum(bool(stamp) and raw.startswith(("$", "!")) for stamp, raw in split)
+    return stamped >= max(1, len(head.lines) // 2)
+
+
+def checksum(text: str) -> int:
+    """Exclusive or of all characters."""
+    return reduce(xor, text.encode("latin-1", "replace"), 0)
+
+
+def guess(head: Head, format_name: str, what: str, parse: Parse, split: Split = split_stamp) -> Guess | None:
+    """The guess that lines are of an instrument: most of them are its readings.
+
+    Args:
+        what: an instrument's line, for the reason.
+    """
+    lines = [line for line in head.lines if line.strip(" \t\x00")]
+    right = sum(len(line) <= LONGEST and not isinstance(parse(split(line)[1]), Defect) for line in lines)
+    if right < max(1, len(lines) // 2):
+        return None
+    stamps = sum(bool(split(line)[0]) for line in lines)
+    reasons = (
+        f"{right} of the first {len(lines)} lines are {what}",
+        f"{stamps} of them carry the stamp of the computer that logged them",
+    )
+    return Guess(format=format_name, score=0.95, reasons=reasons)
+
+
+def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | None) -> Reading:
+    """Read all lines of an instrument.
+
+    Raises:
+        InputError: hardly a line is a reading.
+        TimeError: the lines carry no time, or stamps without a zone and none named.
+    """
+    where = str(source.path)
+    gathered = _gather(source, instrument)
+    count = len(gathered.line)
+    if count == 0 and gathered.unstamped:
+        raise TimeError(
+            f"the lines of {instrument.name} carry no time", where=f"{where}, line {gathered.unstamped[0]}",
+            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE; if the readings came at a "
+            "steady rate that is known: --start TIME --rate HZ, with the instant of the first",
+        )  # fmt: skip
+    if count == 0:
+        bad = sum(len(places) for places in gathered.defects.values())
+        raise InputError(
+            f"none of {bad} lines is a reading of {instrument.name}", where=where,
+            fix="a stamp before each line is known as 2026-05-01T12:00:00 or 2026/05/01 12:00:00: write it so; or "
+            "look at the lines with flagdata ingest --sniff",
+        )  # fmt: skip
+    stamps = stamps_of(gathered.stamps)
+    line = np.array(gathered.line, dtype=np.int64)
+    keep = stamps.valid
+    time, found = instants(stamps.ns[keep], stamps.utc[keep], line=line[keep], zone_name=zone_name, where=where)
+    flags = np.array(gathered.flags, dtype=np.uint16)[keep]
+    channels, about = _channels(instrument, gathered, line, keep)
+    if not channels:
+        raise InputError(
+            f"every reading of {instrument.name} is empty", where=f"{where}, line {line[0]}", fix="check the sensor"
+        )
+    flags |= _missing(channels)
+    return Reading(
+        time=time, channels=channels, flags=flags, line=line[keep], sensor=instrument.sensor, step=stamps.step,
+        findings=(*found, *_findings(gathered, instrument, flags, line[keep], int((~keep).sum())), *about),
+    )  # fmt: skip
+
+
+def stamps_of(texts: Sequence[str]) -> Stamps:
+    """Stamps of `split_stamp` as instants, all in the form of the first."""
+    first = texts[0]
+    form = "epoch-s" if _SECONDS.fullmatch(first) else "epoch-ms" if first.isdigit() else "iso"
+    return parse_stamps(texts, form)
+
+
+def turned(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
+    """Directions relative to the instrument's north mark, by the azimuth of that mark [rad].
+
+    Raises:
+        UsageError: an azimuth, but no direction.
+    """
+    if "wind_direction" not in reading.channels:
+        if azimuth is None:
+            return reading
+        raise UsageError(
+            "an azimuth was given, but the lines hold components in the instrument's own axes", where=where,
+            fix="leave out --azimuth, or have the instrument send speed and direction",
+        )  # fmt: skip
+    text = "directions are relative to the instrument's north mark, which is taken to point north"
+    fix: str | None = "if it does not, give the direction it points to: --azimuth DEG"
+    channels = dict(reading.channels)
+    if azimuth is not None:
+        channels["wind_direction"] = np.mod(channels["wind_direction"] + azimuth, 2 * np.pi)
+        text = f"directions are turned by the azimuth of the north mark, {np.degrees(azimuth):.1f}°, as given"
+        fix = None
+    finding = Finding(kind="north-mark", severity=Severity.NOTE, what=text, fix=fix)
+    return replace(reading, channels=channels).with_findings((finding,))
+
+
+def _unquoted(raw: str) -> str:
+    raw = raw.strip(" \t")
+    return raw[1:-1].replace('""', '"') if len(raw) > 1 and raw[0] == raw[-1] == '"' else raw
+
+
+def _gather(source: TextFile, instrument: Instrument) -> _Gathered:
+    gathered = _Gathered(channels=[array("d") for _ in instrument.channels])
+    split = instrument.split or split_stamp
+    for first, lines in source.blocks():
+        for number, text in enumerate(lines, start=first):
+            if not text.strip(" \t\x00\x1a"):
+                continue
+            gathered.last = number
+            stamp, raw = split(text)
+            sample = instrument.parse(raw) if len(raw) <= LONGEST else Defect.OTHER
+            if isinstance(sample, Defect):
+                gathered.defects[sample].append(number)
+            elif not stamp:
+                gathered.unstamped.append(number)
+            else:
+                gathered.stamps.append(stamp)
+                gathered.line.append(number)
+                gathered.flags.append(sample[1])
+                for column, value in zip(gathered.channels, sample[0], strict=True):
+                    column.append(value)
+    return gathered
+
+
+def _channels(
+    instrument: Instrument, gathered: _Gathered, line: NDArray[np.int64], keep: NDArray[np.bool_]
+) -> tuple[dict[str, NDArray[np.float64]], list[Finding]]:
+    channels: dict[str, NDArray[np.float64]] = {}
+    found: list[Finding] = []
+    for name, column in zip(instrument.channels, gathered.channels, strict=True):
+        values = np.frombuffer(column, dtype=np.float64)[keep].copy()
+        if not np.isfinite(values).any():
+            continue
+        if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
+            values, beyond = possible.direction(name, values, line[keep])
+            values = np.mod(values, 2 * np.pi)
+            found.extend(beyond)
+        channels[name] = values
+    return channels, found
+
+
+def _missing(channels: dict[str, NDArray[np.float64]]) -> NDArray[np.uint16]:
+    """The flag MISSING where there is neither a speed nor a pair of horizontal components."""
+    speeds = [values for name, values in channels.items() if name.endswith("wind_speed")]
+    pair = [channels[name] for name in ("wind_x", "wind_y") if name in channels]
+    known = [np.isfinite(values) for values in speeds]
+    if len(pair) == 2 and not speeds:
+        known.append(np.isfinite(pair[0]) & np.isfinite(pair[1]))
+    present = np.any(known, axis=0) if known else np.array(False)
+    return np.where(present, np.uint16(0), np.uint16(SampleFlag.MISSING)).astype(np.uint16)
+
+
+def _findings(
+    gathered: _Gathered, instrument: Instrument, flags: NDArray[np.uint16], line: NDArray[np.int64], unreadable: int
+) -> list[Finding]:
+    found: list[Finding] = []
+    places = {defect: [n for n in numbers if n > 1] for defect, numbers in gathered.defects.items()}
+    if places[Defect.CUT] and places[Defect.CUT][-1] == gathered.last:
+        text = "the last line is incomplete, as when the logger lost power; left out"
+        found.append(
+            Finding(kind="cut-off", severity=Severity.WARNING, what=text, where=f"line {places[Defect.CUT].pop()}")
+        )
+
+    def note(numbers: Sequence[int], kind: str, severity: Severity, what: str) -> None:
+        if len(numbers):
+            text = f"{len(numbers)} {what}"
+            found.append(
+                Finding(kind=kind, severity=severity, count=len(numbers), where=f"line {numbers[0]}", what=text)
+            )
+
+    note(places[Defect.CHECKSUM], "checksum-errors", Severity.ERROR, "lines with a wrong checksum; left out")
+    note(places[Defect.CUT], "malformed-lines", Severity.ERROR, f"incomplete lines of {instrument.name}; left out")
+    note(places[Defect.OTHER], "non-data-lines", Severity.WARNING, f"lines without a reading of {instrument.name}")
+    note(gathered.unstamped, "no-stamp", Severity.ERROR, "readings without a stamp; left out")
+    note([0] * unreadable, "unreadable-stamps", Severity.ERROR, "readings whose stamp is no date; left out")
+    faults = line[(flags & SampleFlag.SENSOR_FAULT) != 0].tolist()
+    note(faults, "sensor-fault", Severity.WARNING, "readings that the instrument marks as faulty; left out of averages")
+    missing = line[(flags & SampleFlag.MISSING) != 0].tolist()
+    note(missing, "missing-values", Severity.WARNING, "readings without a wind speed")
+    if instrument.described_by is not None:
+        found.append(described(instrument.described_by))
+    return found

@@ -1,0 +1,266 @@
+"""Campbell Scientific TOA5: four header lines, quoted stamps, a record number a row.
+
+Source: Campbell Scientific, LoggerNet Instruction Manual, appendix "Campbell Scientific File Formats"; diagnostics:
+CSAT3 Instruction Manual, diagnostic word (bits 12 to 15 are warnings, bits 0 to 5 count measurements). A table that a
+spreadsheet has saved again is read too: no quotes, commas that pad the first line, dates in the computer's own order.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.exports import Assigned, column_findings, known_unit, stamp_format
+from flagdata.ingest.anemometer.formats.windographer import NAMES as MAST_NAMES
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
+from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.tables.rowclock import Given
+from flagdata.ingest.anemometer.tables.table import read_table
+from flagdata.ingest.anemometer.text.layout import lay_out
+from flagdata.ingest.anemometer.text.rows import RowReader
+from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.times.timecolumns import find_time
+from flagdata.ingest.anemometer.winds.instruments import find_winds
+from flagdata.ingest.anemometer.winds.sonic import with_horizontal
+from flagdata.ingest.anemometer.words.headings import fits, interest, understand
+from flagdata.schema import CHANNELS, SampleFlag
+from flagdata.signals import Instants, Sensor
+from flagdata.timebase import NANOSECONDS
+from flagdata.units import unit
+
+# Field names of Campbell programs, which users choose, → channel; the first that fits a channel is taken.
+_NAMES: tuple[tuple[str, str], ...] = (
+    (r"u_?x(_.*)?|u_?\d?m?|csat_?u", "wind_x"),
+    (r"u_?y(_.*)?|v_?\d?m?|csat_?v", "wind_y"),
+    (r"u_?z(_.*)?|w_?\d?m?|csat_?w", "wind_z"),
+    (r"ws(_ms)?(_\d+m?)?(_avg|_s_wvt)?|wind_?sp(ee)?d(_ms)?(_avg|_s_wvt)?|w(i)?ndspd.*", "wind_speed"),
+    (r"(wd|wind_?dir(ection)?)(_deg)?(_\d+m?)?(_d1_wvt|_smp)?", "wind_direction"),
+    (r"t_?sonic|t_?s|fw_?ts", "sonic_temperature"),
+    (r"air_?t(c|f)?(_avg)?|air_?temp.*|t_?air.*|t_hmp(_avg)?", "air_temperature"),
+    (r"rh(_avg)?|rh_hmp(_avg)?", "relative_humidity"),
+    (r"press(ure)?(_avg)?|bp(_mbar|_kpa)?(_avg)?|amb_press(_avg)?", "air_pressure"),
+)
+_DIAGNOSTIC = re.compile(r"diag(_csat|_sonic|nostic)?(_\d+)?|csat_?diag|diag_word", re.IGNORECASE)
+_MISSING = ("nan", '"nan"', "-7999", "7999", "-99999", "-2147483648")
+_WARNINGS = 0xF000
+_FORM = "%Y-%m-%d %H:%M:%S%f"
+_OWN = re.compile(r"\s*\d{4}-")
+
+
+class Toa5:
+    """Format "toa5"."""
+
+    name = "toa5"
+    about = "Campbell Scientific TOA5 table"
+    uses = frozenset({"zone", "azimuth", "date_order"})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """A first line that begins with "TOA5"."""
+        first = head.lines[0].lstrip("\ufeff") if head.lines else ""
+        if not first.startswith(('"TOA5"', "TOA5,")):
+            return None
+        return Guess(format="toa5", score=0.98, reasons=('line 1 begins with "TOA5", Campbell Scientific\'s table',))
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read a table whose header names wind speed or wind components."""
+        header = self._header(source)
+        names, units = header[1], header[2]
+        recipe, assigned, found = self._recipe(source, header, options)
+        extra = [name for name in names if name == "RECORD" or _DIAGNOSTIC.fullmatch(name)]
+        rows = RowReader(source, recipe.file)
+        table = read_table(
+            rows, recipe, where=str(source.path), zone_name=options.zone, given=Given(clock=options.clock), extra=extra
+        )
+        flags = table.reading.flags.copy()
+        listed = tuple(f"{name} [{units[names.index(name)]}]" for name in assigned.unread)
+        found.extend(column_findings(replace(assigned, unread=listed)))
+        for name, values in table.extra.items():
+            if name == "RECORD":
+                found.extend(_continuity(values, table.reading.line))
+            else:
+                fault = _faults(values)
+                if fault.any():
+                    flags[fault] |= SampleFlag.SENSOR_FAULT
+                    found.append(
+                        Finding(
+                            kind="sensor-fault", severity=Severity.WARNING, count=int(fault.sum()),
+                            where=f"line {table.reading.line[fault][0]}",
+                            what=f"{int(fault.sum())} rows in which {name} reports a fault; left out of averages",
+                        )
+                    )  # fmt: skip
+        reading = table.reading.with_findings(tuple(found), flags=flags)
+        wind = next(layout.column for name, layout in recipe.channels.items() if name.startswith("wind_"))
+        processing = dict(zip(names, header[3], strict=False)).get(str(wind), "")
+        reading = replace(reading, sensor=replace(reading.sensor, averaging=_averaging(processing, reading.time)))
+        return with_horizontal(reading, options.azimuth, where=str(source.path))
+
+    def _header(self, source: TextFile) -> list[list[str]]:
+        lines = source.head(4)
+        where = str(source.path)
+        if len(lines) < 4:
+            raise InputError(
+                f"the file ends in line {len(lines)}, before the four header lines do", where=where,
+                fix="collect the table from the logger again",
+            )  # fmt: skip
+        rows = [[cell.strip() for cell in row] for row in csv.reader(lines)]
+        if len(rows) < 4 or not rows[0] or rows[0][0].lstrip("\ufeff") != "TOA5":
+            raise InputError(
+                "line 1 does not begin with TOA5", where=f"{where}, line 1", fix="name another format by --as"
+            )
+        if _stamp_name(rows[1]) is None or len(rows[2]) != len(rows[1]):
+            raise InputError(
+                "lines 2 and 3 do not name TIMESTAMP and a unit for each column", where=f"{where}, line 2",
+                fix="collect the table as TOA5 with header",
+            )  # fmt: skip
+        return rows
+
+    def _recipe(
+        self, source: TextFile, header: list[list[str]], options: WindOptions
+    ) -> tuple[Recipe, Assigned, list[Finding]]:
+        about, names, units = header[0], header[1], header[2]
+        stamp = _stamp_name(names) or "TIMESTAMP"
+        channels: dict[str, ChannelLayout] = {}
+        taken: dict[str, str] = {}
+        unread: list[str] = []
+        rivals: list[str] = []
+        for name, spelling in zip(names, units, strict=True):
+            channel = _channel(name)
+            if channel is None or channel in channels:
+                if channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s":
+                    rivals.append(name)
+                elif name not in (stamp, "RECORD") and not _DIAGNOSTIC.fullmatch(name):
+                    unread.append(name)
+                continue
+            spelled = known_unit(spelling or ("%" if channel == "relative_humidity" else ""))
+            if spelled is None or unit(spelled).si != CHANNELS[channel].unit:
+                if channel.startswith("wind_"):
+                    raise InputError(
+                        f"{name} looks like {channel}, but its unit is {spelling!r}", where=f"{source.path}, line 3",
+                        fix="correct the unit in the header, or describe the file by a recipe",
+                    )  # fmt: skip
+                unread.append(name)
+                continue
+            channels[channel] = ChannelLayout(column=name, unit=spelled)
+            taken[channel] = name
+        if not {"wind_speed", "wind_x"} & set(channels):
+            channels.update(_by_heading(names, units, channels))
+            unread = [name for name in unread if name not in {layout.column for layout in channels.values()}]
+        if not {"wind_speed", "wind_x"} & set(channels):
+            raise InputError(
+                "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
+                fix=f"{_offer(source)}describe the file by a recipe; its columns are {', '.join(names)}",
+            )  # fmt: skip
+        rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
+        form, found = _FORM, ()
+        own = sum(_OWN.match(text) is not None for text in rows)
+        if options.date_order is not None or 2 * own < len(rows):  # a few may be damaged
+            form, found = stamp_format(rows, options, f"{source.path}, line 5")
+        model = " ".join(cell for cell in about[2:4] if cell)
+        recipe = Recipe(
+            name="toa5", about="from the file's own header", source="the file",
+            file=FileLayout(header=3, preamble=1, missing=_MISSING),
+            time=TimeLayout(columns=(stamp,), format=form),
+            channels=channels,
+            sensor=Sensor(name=f"{about[1] if len(about) > 1 else ''} on {model or 'Campbell logger'}".strip()),
+        )  # fmt: skip
+        assigned = Assigned(channels=channels, names=taken, unread=tuple(unread), rivals=tuple(rivals))
+        return recipe, assigned, list(found)
+
+
+def _stamp_name(names: list[str]) -> str | None:
+    return next((name for name in names if name.upper() == "TIMESTAMP"), None)
+
+
+def _channel(name: str) -> str | None:
+    for pattern, channel in (*_NAMES, *MAST_NAMES):
+        if re.fullmatch(pattern, name, re.IGNORECASE):
+            return channel
+    return None
+
+
+def _by_heading(names: list[str], units: list[str], known: Mapping[str, ChannelLayout]) -> dict[str, ChannelLayout]:
+    """Channels of fields whose names are of no known program, by what their words say; the first that fits."""
+    found: dict[str, ChannelLayout] = {}
+    for name, spelling in zip(names, units, strict=True):
+        heading = understand(name, spelling)
+        if not heading.channel or not heading.sure or heading.channel in {*known, *found}:
+            continue
+        if heading.unit is not None and fits(heading.channel, heading.unit):
+            found[heading.channel] = ChannelLayout(column=name, unit=heading.unit)
+    if {"wind_x", "wind_y"} <= set(found):
+        return found
+    return {channel: layout for channel, layout in found.items() if channel not in ("wind_x", "wind_y", "wind_z")}
+
+
+def _averaging(processing: str, time: Instants) -> float | None:
+    """Length of the logger's own averaging [s] by the header's fourth line: "Smp" a sample, "Avg" or "WVc" a mean."""
+    kind = processing.strip().lower()
+    if kind == "smp":
+        return 0.0
+    if kind in ("avg", "wvc") and len(time) > 1:
+        return float(np.median(np.diff(time))) / NANOSECONDS
+    return None
+
+
+def _continuity(record: NDArray[np.float64], line: NDArray[np.int64]) -> tuple[Finding, ...]:
+    """Rows lost, repeated or renumbered, by the logger's own count."""
+    steps = np.diff(record)
+    lost = steps > 1
+    back = steps < 0
+    found: list[Finding] = []
+    if lost.any():
+        count = int((steps[lost] - 1).sum())
+        found.append(
+            Finding(
+                kind="records-lost", severity=Severity.WARNING, count=count, where=f"line {line[1:][lost][0]}",
+                what=f"{count} record numbers are skipped in {int(lost.sum())} places: rows that the logger made are "
+                "not in the file",
+            )
+        )  # fmt: skip
+    if back.any():
+        found.append(
+            Finding(
+                kind="records-restarted", severity=Severity.WARNING, count=int(back.sum()),
+                where=f"line {line[1:][back][0]}",
+                what=f"the record number goes back {int(back.sum())} times: the logger's program was restarted, or "
+                "files were joined",
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _faults(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Rows whose diagnostic word reports a fault: a warning bit, or, where it does not count measurements, not 0."""
+    known = np.isfinite(values) & (np.abs(values) < 2**31)
+    word = np.where(known, values, 0).astype(np.int64)
+    counting = len(word) > 2 and float((np.diff(word) % 64 == 1).mean()) > 0.5
+    return ((word & _WARNINGS) != 0) if counting else (word != 0)
+
+
+def _offer(source: TextFile) -> str:
+    """What reads a table whose fields no known program has, with "; or " behind it; "" for no table.
+
+    Where the words of the headings tell winds, they are read by these; else the option says what the columns are.
+    """
+    layout = lay_out(source.head(HEAD_LINES), interest=interest)
+    if layout is None:
+        return ""
+    time = find_time(layout)
+    winds, _, _ = find_winds(layout, time=time.columns if time is not None else ())
+    offered = f"{stated_columns.offer(layout, time, winds)}; or "
+    if not winds:
+        return offered
+    unit_too = " --unit m/s (or km/h, mph, kn, after the program)" if any(wind.without_unit() for wind in winds) else ""
+    names = ", ".join(wind.label for wind in winds)
+    each = f", each of {names} by itself" if len(winds) > 1 else f", {names}"
+    return f"read it by the words of its headings{each}: --as delimited{unit_too}; or {offered}"

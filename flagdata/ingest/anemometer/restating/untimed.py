@@ -1,0 +1,274 @@
+"""Logs whose rows carry no time at all, put on the clock that the user gives: a start and a rate.
+
+A serial print, a tunnel's recording or a boat's stream of wind sentences without a clock can be used where its owner
+knows when it began and how many readings a second the instrument sends. Rows that were lost are not seen: each loss
+moves all that follows.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+
+from flagdata.errors import TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
+from flagdata.ingest.anemometer.formats.serial_lines import MONTHS, split_stamp
+from flagdata.ingest.anemometer.restating import labelled
+from flagdata.ingest.anemometer.restating.restate import restate
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
+from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
+from flagdata.ingest.anemometer.text.source import TableText, TextFile
+from flagdata.ingest.anemometer.times.timecolumns import find_time
+from flagdata.ingest.anemometer.words.headings import interest
+from flagdata.timebase import NANOSECONDS, iso
+
+_NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
+_WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
+_TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
+_CLOCK_BEFORE = re.compile(
+    r"\s*[\[(<\"]?(?:(?P<month>[A-Za-z]{3})\s+(?P<day>\d{1,2})\s+)?"
+    r"(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+"
+    r"(?(month)(?:\S+ [\w./-]+(?:\[\d+\])?: )?)(?P<rest>\S.*)$"
+)
+"""A time of day before a line, with a date without its year or none; and the host and program that syslog writes."""
+_TABLES = frozenset({"delimited", "host-stamped"})
+"""Formats of tables, which have a way of their own."""
+
+ADVICE = "where nothing is a time, and the readings came at a steady rate that is known: "
+ADVICE += "add --start TIME --rate HZ"
+
+
+def timed(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
+    """The file with a time in every row.
+
+    Args:
+        rate: readings a second.
+        start: instant of the first reading [UTC ns].
+        columns: what the columns of a table are, by the user's word; where it names no time, no column is one.
+
+    Raises:
+        UsageError: no start, or rows that say when they were.
+    """
+    where = str(source.path)
+    if start is None:
+        fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
+        raise UsageError("a rate without a start", where=where, fix=fix)
+    lines = source.head(HEAD_LINES)
+    if columns is not None:
+        _refuse_times(stated_columns.names_time(columns), where)
+        source = restate(source)
+        text, short = _table(source, rate, start, where, told=True)
+        return _counted(source, text, rate, start, short=short)
+    if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
+        _refuse_times(sum(bool(_TIMED.search(line)) for line in lines) > 1, where)
+        text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
+    else:
+        _refuse_times(any(split_stamp(line)[0] for line in lines), where)
+        _refuse_times(labelled.matches(lines) and labelled.stamped(lines), where)
+        stamped = list(_stamped(source, rate, start))
+        known = labelled.alike(stamped[:HEAD_LINES]) or of_an_instrument(stamped[:HEAD_LINES])
+        if not known:
+            source = restate(source)
+            text, short = _table(source, rate, start, where)
+            return _counted(source, text, rate, start, short=short)
+        text = stamped
+    return _counted(source, text, rate, start)
+
+
+def of_an_instrument(lines: Sequence[str]) -> bool:
+    """Whether stamped lines are those of an instrument whose format is known."""
+    head = Head(lines=tuple(lines))
+    for name in FORMATS:
+        reader: Format = FORMATS[name]()
+        found = None if name in _TABLES else reader.recognise(head)
+        if found is not None and found.score >= SURE:
+            return True
+    return False
+
+
+def clocked(source: TextFile) -> bool:
+    """Whether the lines are those of an instrument, each after a time of day without a date, and say no other time."""
+    lines = [line for line in source.head(HEAD_LINES) if line.strip()]
+    timed = [match for line in lines if (match := _CLOCK_BEFORE.match(line)) is not None]
+    if not timed or 2 * len(timed) < len(lines) or any(_TIMED.search(match["rest"]) for match in timed):
+        return False
+    return of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
+
+
+def year_alone(source: TextFile) -> str | None:
+    """The month and day of the first line, as 12-31, where the lines stand after dates without a year."""
+    match = next((found for line in source.head(HEAD_LINES) if (found := _CLOCK_BEFORE.match(line))), None)
+    if match is None or not match["month"] or match["month"].lower() not in MONTHS:
+        return None
+    return f"{MONTHS.index(match['month'].lower()) + 1:02d}-{int(match['day']):02d}"
+
+
+def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) -> dt.date:
+    """The date of a line that names its month and day.
+
+    Args:
+        before: of the line before, or of the first line as the user gives it.
+
+    Raises:
+        TimeError: no such month or day, or another one than the user gives.
+    """
+    name = match["month"].lower()
+    month = MONTHS.index(name) + 1 if name in MONTHS else 0
+    year = before.year + (month < before.month - 6)
+    try:
+        found = dt.date(year, month, int(match["day"]))
+    except ValueError:
+        what = f"{match['month']} {match['day']} is no day of {year}"
+        raise TimeError(what, where=where, fix="give --date with the year in which the log began") from None
+    if first and found != before:
+        what = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
+        raise TimeError(what, where=where, fix=f"give its day with its year, such as --date {found.isoformat()}")
+    return found
+
+
+def dated(source: TextFile, date: dt.date) -> TextFile:
+    """The lines of an instrument, each after a time of day, with the date before it.
+
+    Args:
+        date: of the first line; the next day begins where the time of day falls by half a day.
+    """
+    text: list[str] = []
+    day, last = date, ""
+    for line in _all_lines(source):
+        match = _CLOCK_BEFORE.match(line)
+        if match is None:
+            text.append(line)
+            continue
+        clock = match["time"].replace(",", ".").rjust(8, "0")
+        if match["month"]:
+            day = _of_year(match, day, first=not last, where=str(source.path))
+        elif last and int(clock[:2]) + 12 < int(last[:2]):
+            day += dt.timedelta(days=1)
+        last = clock
+        text.append(f"{day.isoformat()}T{clock} {match['rest']}")
+    days = (day - date).days
+    if year_alone(source):
+        what = f"dates without a year before each line; the first is of {date.isoformat()}, as given"
+        return TableText.of(source, text, [Finding(kind="date-given", severity=Severity.NOTE, what=what)])
+    what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
+    found = Finding(kind="date-given", severity=Severity.NOTE, what=what)
+    return TableText.of(source, text, [found])
+
+
+def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, *, short: int = 0) -> TextFile:
+    """The file with these lines, and the finding that says whose clock they are on.
+
+    Args:
+        short: lines that were left out, since they have fewer columns than the table.
+    """
+    what = (
+        f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
+    )
+    found = [Finding(kind="rate-given", severity=Severity.WARNING, what=what)]
+    if short:
+        what = f"{short} lines have fewer columns than the table; left out, each counted as a reading"
+        found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=short, what=what))
+    return TableText.of(source, text, found)
+
+
+def _refuse_times(said: bool, where: str) -> None:
+    if said:
+        raise UsageError("the rows say when they were: --rate is not used", where=where, fix="leave it out")
+
+
+def _all_lines(source: TextFile) -> Iterator[str]:
+    for _, lines in source.blocks():
+        yield from lines
+
+
+def _sentences(source: TextFile, rate: float, start: int) -> Iterator[str]:
+    """Sentences with a stamp that moves on with each wind sentence of the most frequent kind."""
+    keys = Counter(_key(match["key"]) for line in _all_lines(source) if (match := _WIND.search(line)) is not None)
+    main = keys.most_common(1)[0][0]
+    count = -1
+    for line in _all_lines(source):
+        match = _WIND.search(line)
+        count += match is not None and _key(match["key"]) == main
+        if line.strip():
+            yield f"{_stamp(start, max(count, 0), rate)} {line.strip()}"
+
+
+def _key(text: str) -> str:
+    """Talker, sentence and reference of a wind sentence, without its angle."""
+    return re.sub(r",[^,]*,", ",", text)
+
+
+def _stamped(source: TextFile, rate: float, start: int) -> Iterator[str]:
+    filled = (line for line in _all_lines(source) if line.strip())
+    for count, line in enumerate(filled):
+        yield f"{_stamp(start, count, rate)} {line.strip()}"
+
+
+def _stamp(start: int, count: int, rate: float) -> str:
+    return iso(start + round(count * NANOSECONDS / rate))
+
+
+def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool = False) -> tuple[list[str], int]:
+    """A table with a column of instants behind its own, whose numbers stay what they are; and lines too short for it.
+
+    Args:
+        told: whether the user says that no column is a time.
+    """
+    lines = source.head(HEAD_LINES)
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
+        return _single(source, rate, start, where), 0
+    _refuse_times(not told and find_time(layout) is not None, where)
+    first = layout.lines[0]
+    width = layout.number_of_columns()
+    kept: list[list[str]] = []
+    short = 0
+    for at, line in enumerate(_lines_from(source, first)):
+        row = cut(line, layout.delimiter)
+        if len(row) >= width:
+            kept.append([*_points(row[:width], layout), _stamp(start, at, rate)])
+        else:
+            short += 1
+    return _written(_names(layout.names, layout.units), kept), short
+
+
+def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
+    """A column of numbers and nothing else, below its heading if it has one."""
+    filled = [line.strip() for line in _all_lines(source) if line.strip()]
+    heading = filled[0] if filled and not _NUMBER.fullmatch(filled[0]) else ""
+    rows = filled[1:] if heading else filled
+    if not rows or sum(bool(_NUMBER.fullmatch(row)) for row in rows) < 0.9 * len(rows):
+        raise UsageError("neither a table nor sentences of wind: --rate is not used", where=where, fix="leave it out")
+    cells = ([row.replace(",", "."), _stamp(start, at, rate)] for at, row in enumerate(rows))
+    return _written(_names([heading], [""]), cells)
+
+
+def _lines_from(source: TextFile, first: int) -> Iterator[str]:
+    for number, lines in source.blocks():
+        yield from (line for at, line in enumerate(lines, start=number) if at >= first and line.strip())
+
+
+def _points(row: Sequence[str], layout: Layout) -> list[str]:
+    """Cells with decimal points."""
+    if layout.decimal == ".":
+        return list(row)
+    return [re.sub(r"^([-+]?\d+),(\d+)", r"\1.\2", cell) for cell in row]
+
+
+def _names(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    named = [name or f"column {at}" for at, name in enumerate(names, start=1)]
+    return [*(f"{name} [{unit}]" if unit else name for name, unit in zip(named, units, strict=True)), "time"]
+
+
+def _written(names: Sequence[str], rows: Iterable[list[str]]) -> list[str]:
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(rows)
+    return out.getvalue().splitlines()

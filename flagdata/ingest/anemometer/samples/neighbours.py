@@ -1,0 +1,85 @@
+"""Two logs of one wind that are whole half-hours apart: the mark of a zone that is wrong for one of them.
+
+Both are averaged over bins, and each bin is taken relative to the one before it: weather that changes over hours, which
+any two logs share at any lag, is gone. At every half-hour of lag the correlation r over the n bins that both cover has
+the score z = atanh(r) √(n - 3) (Fisher 1921), standard normal where the logs have nothing to do with each other. A lag
+is told where its score is beyond what chance explains and well beyond that of the stamps as they are.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.instants.clock import span
+from flagdata.ingest.anemometer.samples.averaging import average
+from flagdata.signals import WindSeries
+from flagdata.timebase import NANOSECONDS
+
+STEP = 1800
+"""Zones differ by whole multiples of it, but for a few of 15 min [s]."""
+FARTHEST = 14 * 3600
+"""Greatest lag that two zones explain [s]."""
+BINS = (60, 300, 600, 1800)
+"""Lengths of a bin [s]; the shortest that holds two rows of both logs is taken."""
+FEWEST = 30
+"""Bins that both logs must cover."""
+SCORE = 6.0
+"""Score of a lag that is told: chance reaches it in one of 10⁹ lags."""
+LEAD = 4.0
+"""By which it must exceed the score at no lag."""
+
+
+def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | None:
+    """The finding that `series` fits `other`, called `name`, at another half-hour than its stamps say; `None` if not.
+
+    Logs without wind over ground, or that share less than `FEWEST` bins, are not compared.
+    """
+    if "wind_speed" not in series.channels or "wind_speed" not in other.channels:
+        return None
+    if min(len(series), len(other)) < FEWEST:
+        return None
+    spacing = max(float(np.median(np.diff(one.time))) for one in (series, other)) / NANOSECONDS
+    length = next((bins for bins in BINS if bins >= 2 * spacing), BINS[-1] if spacing <= BINS[-1] else None)
+    if length is None:
+        return None
+    mine, theirs = _changes(series, length), _changes(other, length)
+    scores = {lag: _score(mine, theirs, lag // length) for lag in range(-FARTHEST, FARTHEST + 1, STEP)}
+    best = max(scores, key=lambda lag: scores[lag][0])
+    score, correlation, n = scores[best]
+    if best == 0 or score < SCORE or score < scores[0][0] + LEAD:
+        return None
+    when = f"{span(abs(best) * NANOSECONDS)} {'later' if best > 0 else 'earlier'}"
+    return Finding(
+        kind="hours-off", severity=Severity.WARNING, value=float(best), count=n,
+        what=f"its wind is that of {name} if its stamps were {when} (correlation {correlation:.2f} over {n} means of "
+        f"{length} s; as stamped {scores[0][1]:.2f}): off by hours, as by a wrong zone",
+        fix="check --zone of both logs: a logger may stay on winter time, or keep UTC; then ingest the wrong one again",
+    )  # fmt: skip
+
+
+def _changes(series: WindSeries, length: int) -> dict[int, float]:
+    """Change of the mean speed from the bin before, by the bin's number since 1970."""
+    means = average(series, float(length))
+    number = (means.time // (length * NANOSECONDS)).astype(np.int64)
+    speed = np.log(np.maximum(means.speed, 0.1))
+    follows = np.flatnonzero(np.diff(number) == 1) + 1
+    return dict(zip(number[follows].tolist(), (speed[follows] - speed[follows - 1]).tolist(), strict=True))
+
+
+def _score(mine: dict[int, float], theirs: dict[int, float], lag: int) -> tuple[float, float, int]:
+    """Score and correlation with `mine` moved later by `lag` bins, and the number of bins; 0 where they are few."""
+    common = [number for number in mine if number + lag in theirs]
+    if len(common) < FEWEST:
+        return 0.0, 0.0, len(common)
+    one: NDArray[np.float64] = np.array([mine[number] for number in common])
+    two: NDArray[np.float64] = np.array([theirs[number + lag] for number in common])
+    one, two = one - one.mean(), two - two.mean()
+    power = float(np.sqrt((one @ one) * (two @ two)))
+    if power == 0:
+        return 0.0, 0.0, len(common)
+    r = min(max(float(one @ two) / power, -0.999999), 0.999999)
+    return math.atanh(r) * math.sqrt(len(common) - 3), r, len(common)

@@ -1,0 +1,228 @@
+"""Rows into strictly increasing time; what is out of order, repeated or too coarse is reported, flagged or left out.
+
+Rules, in order:
+1. Rows that the file lists out of order are sorted (`disorder`), by evidence or by the user's word.
+2. A stretch that comes again with the same stamps and values, as when downloads overlap, is left out.
+3. Few rows whose stamps leave the log's time and come back to it are left out.
+4. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
+   those before, or those before are made to fit the ones after, as the user says; without a word of the user it is
+   reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. So it is where the clock was set on,
+   except that without a word of the user nothing is changed. Refused: time that runs back again and again, or by no
+   whole hour to where the log never was, as in files that were joined.
+5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.
+6. Rows equal in stamp and values are the same row written twice: one is kept.
+7. Rows that share a stamp are given instants of their own (`spread`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import TimeError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.instants import clock, disorder
+from flagdata.ingest.anemometer.instants.clock import DAY, JITTER, ClockChoice, Jump
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.samples.spread import FAST, distinct
+from flagdata.schema import SampleFlag
+from flagdata.timebase import NANOSECONDS, iso
+
+FEW = 10
+"""Rows, or a thousandth of all if that is more, that may be left out for wild stamps."""
+SMALL = 60 * NANOSECONDS
+"""A clock may be set back by any constant up to this where nothing else speaks for it."""
+AGAIN = 0.9
+"""Share of a stretch's rows that must come with the stamps and values of earlier ones to be taken for a repetition."""
+
+
+def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None) -> Reading:
+    """Apply the rules above.
+
+    Args:
+        choice: whose stamps are right where the clock was set anew, or that the rows are out of order; `None` where
+            nobody said.
+
+    Raises:
+        TimeError: time runs back in a way that no rule explains.
+    """
+    reading = _put_in_order(reading, choice)
+    reading = _without_repeated_stretches(reading)
+    reading = _sorted(reading, where, None if choice == "sort" else choice)
+    reading = _without_repeats(reading)
+    return distinct(reading)
+
+
+def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:
+    found = disorder.sorting(reading.time, choice)
+    if found is not None:
+        return reading.with_findings((found.finding(reading.line),)).take(found.order)
+    if choice == "sort" and disorder.KIND not in {finding.kind for finding in reading.findings}:
+        text = "the rows are in the order of their stamps: --clock sort is not used"
+        return reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=text),))
+    return reading
+
+
+def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
+    lag = np.maximum.accumulate(reading.time) - reading.time
+    if len(lag) == 0 or int(lag.max()) <= JITTER:
+        return _late_rows_sorted(_one_clock(reading, clock.stepped_back(reading.time), choice))
+    few = max(FEW, len(reading.time) // 1000)
+    jumps = clock.set_back(reading.time)
+    wild = clock.excursions(reading.time, most=few) if len(jumps) <= few else np.zeros(len(lag), dtype=bool)
+    settled = reading.take(~wild)
+    jumps = clock.set_back(settled.time)
+    if len(jumps) > clock.MOST or not all(_believable(settled, jump, choice) for jump in jumps):
+        return _late_rows_sorted(_one_clock(_risen(reading, lag, few, where), (), choice))
+    if wild.any():
+        settled = settled.with_findings((_left_out(reading, wild, lag),))
+    return _late_rows_sorted(_one_clock(settled, jumps, choice))
+
+
+def _believable(reading: Reading, jump: Jump, choice: ClockChoice | None) -> bool:
+    """Whether a step back is a clock that was set; else it may be files joined in another order."""
+    if choice is not None:
+        return True
+    if jump.size < -DAY:
+        return False
+    passed_again = int(reading.time[jump.row :].max()) > int(reading.time[jump.row - 1])
+    return jump.whole or jump.size >= -SMALL or passed_again
+
+
+def _one_clock(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
+    """The rows on one clock: set back by `jumps`, or set on as `clock.set_on` finds."""
+    on = clock.set_on(reading.time, returns=jumps)
+    if choice is None:
+        undone = {-jump.size for jump in jumps}
+        doubtful = tuple(jump for jump in on if jump.size not in undone)
+        reading = reading.with_findings(clock.doubt(reading.time, doubtful, reading.line))
+        on = tuple(jump for jump in on if jump.size in undone)
+    every = tuple(sorted((*jumps, *on), key=lambda jump: jump.row))
+    if not every:
+        if choice is None:
+            return reading
+        text = f"no place is left where the clock was set back or on: --clock {choice} is not used"
+        return reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=text),))
+    time, shifted = clock.continued(reading.time, every, choice)
+    flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
+    found = clock.report(reading.time, every, reading.line, choice)
+    return replace(reading, time=time).with_findings(found, flags=flags)
+
+
+def _late_rows_sorted(reading: Reading) -> Reading:
+    time = reading.time
+    backwards = np.flatnonzero(np.diff(time) < 0) + 1
+    if len(backwards) == 0:
+        return reading
+    lag = np.maximum.accumulate(time) - time
+    late = lag > 0
+    worst = float(lag.max()) / NANOSECONDS
+    flags = np.where(late, reading.flags | SampleFlag.TIME_UNSURE, reading.flags).astype(np.uint16)
+    finding = Finding(
+        kind="time-backwards", severity=Severity.WARNING, count=int(late.sum()), value=worst,
+        where=f"line {reading.line[backwards[0]]}",
+        what=f"{int(late.sum())} rows come up to {worst:.3f} s after later ones; sorted and flagged",
+    )  # fmt: skip
+    return reading.with_findings((finding,), flags=flags).take(np.argsort(time, kind="stable"))
+
+
+def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str) -> Reading:
+    """The rows without the fewest whose removal leaves time in order.
+
+    Raises:
+        TimeError: they are many.
+    """
+    time = reading.time
+    keep = disorder.longest_rise(time)
+    wild = np.ones(len(time), dtype=bool)
+    wild[keep] = False
+    count = int(wild.sum())
+    if count > few:
+        backwards = np.flatnonzero(np.diff(time) < 0) + 1
+        at = int(backwards[np.argmax(lag[backwards])])
+        raise TimeError(
+            f"time runs backwards by {lag[at] / NANOSECONDS:.1f} s, from {iso(int(time[at - 1]))} to "
+            f"{iso(int(time[at]))}, and {count} rows would have to go: the logger's clock was set back, or files were "
+            "joined",
+            where=f"{where}, line {reading.line[at]}",
+            fix="split the file there and ingest the parts by themselves; or, if one log's clock was set anew, say "
+            "whose stamps are right: --clock first (before it) or --clock last (after it); or, if all stamps are right "
+            "and only the rows are out of order: --clock sort",
+        )  # fmt: skip
+    return reading.take(keep).with_findings((_left_out(reading, wild, lag),))
+
+
+def _left_out(reading: Reading, wild: NDArray[np.bool_], lag: NDArray[np.int64]) -> Finding:
+    first = int(np.flatnonzero(wild)[0])
+    return Finding(
+        kind="time-backwards", severity=Severity.ERROR, count=int(wild.sum()), where=f"line {reading.line[first]}",
+        value=float(lag.max()) / NANOSECONDS,
+        what=f"{int(wild.sum())} rows with stamps far from their neighbours' ({iso(int(reading.time[first]))}); "
+        "left out",
+    )  # fmt: skip
+
+
+def _without_repeated_stretches(reading: Reading) -> Reading:
+    """The rows without stretches that go back to earlier stamps and bring the earlier values again."""
+    time = reading.time
+    backwards = np.flatnonzero(np.diff(time) < -JITTER) + 1
+    if not 0 < len(backwards) <= 1000:
+        return reading
+    drop = np.zeros(len(time), dtype=bool)
+    for at in backwards.tolist():
+        reached = int(time[:at].max())
+        beyond = np.flatnonzero(time[at:] > reached)
+        stop = at + int(beyond[0]) if len(beyond) else len(time)
+        earlier = np.argsort(time[:at], kind="stable")
+        place = np.minimum(np.searchsorted(time[:at], time[at:stop], sorter=earlier), at - 1)
+        source = earlier[place]
+        again = time[source] == time[at:stop]
+        varies = False
+        for values in reading.channels.values():
+            new, old = values[at:stop], values[source]
+            again &= (new == old) | (np.isnan(new) & np.isnan(old))
+            varies |= len(np.unique(new[np.isfinite(new)])) > 1
+        if varies and float(again.mean()) >= AGAIN:
+            drop[at:stop] |= again
+    if not drop.any():
+        return reading
+    count, first = int(drop.sum()), int(np.flatnonzero(drop)[0])
+    finding = Finding(
+        kind="repeated-stretch", severity=Severity.WARNING, count=count, where=f"line {reading.line[first]}",
+        what=f"{count} rows bring earlier stamps and values again, as when downloads of a logger overlap; left out",
+    )  # fmt: skip
+    return reading.take(~drop).with_findings((finding,))
+
+
+def _without_repeats(reading: Reading) -> Reading:
+    if len(reading.time) < 2:
+        return reading
+    same = np.diff(reading.time) == 0
+    for values in reading.channels.values():
+        equal = (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+        same &= equal
+    if reading.host_time is not None:
+        same &= np.diff(reading.host_time) == 0
+    # Coarse stamps make equal rows too: only isolated pairs are the same row written twice.
+    shared = float((np.diff(reading.time) == 0).mean())
+    same &= ~_with_room(reading)
+    if not same.any() or shared > 0.2:
+        return reading
+    twice = np.concatenate(([False], same))
+    finding = Finding(
+        kind="duplicate-rows", severity=Severity.WARNING, count=int(twice.sum()),
+        where=f"line {reading.line[twice][0]}", what=f"{int(twice.sum())} rows repeat the one before them; left out",
+    )  # fmt: skip
+    return reading.take(~twice).with_findings((finding,))
+
+
+def _with_room(reading: Reading) -> NDArray[np.bool_]:
+    """Pairs of neighbours, (n - 1,), beside which a fast logger left out a step: the second is a sample, come late."""
+    steps = np.diff(reading.time)
+    period = clock.usual(reading.time)
+    if period >= FAST:
+        return np.zeros(len(steps), dtype=bool)
+    wide = steps > 1.5 * period
+    return np.concatenate(([False], wide[:-1])) | np.concatenate((wide[1:], [False]))

@@ -1,0 +1,1 @@
+"""Tables: read by a recipe, by their headings, or by a draft that says what is missing."""

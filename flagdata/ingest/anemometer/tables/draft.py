@@ -1,0 +1,469 @@
+"""A recipe for a table nobody has described yet, from its first lines: what was understood, and what was not.
+
+What the file states without doubt (a heading with units, dates that can be meant in one way only) makes a recipe that
+is taken without asking. What is in doubt is named with the one thing to say, and the recipe has a "?" there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from flagdata.ingest.anemometer.instants import counted, yearless, zones
+from flagdata.ingest.anemometer.options import WindOptions, in_shell
+from flagdata.ingest.anemometer.recipe import DELIMITERS
+from flagdata.ingest.anemometer.tables import quality_columns, stated_columns, stated_rate, unread, unread_winds
+from flagdata.ingest.anemometer.tables.rows_above import rows_above
+from flagdata.ingest.anemometer.tables.stated_unit import stated_unit
+from flagdata.ingest.anemometer.text.cells import numbers
+from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, lay_out
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.times.timecolumns import find_time
+from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
+from flagdata.ingest.anemometer.winds.codes import below_zero
+from flagdata.ingest.anemometer.winds.instruments import (
+    Column,
+    Wind,
+    find_winds,
+    mixed_units,
+    named_wind,
+)
+from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts
+from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
+from flagdata.ingest.anemometer.words.headings import interest, understand
+
+_COMMENT = ("#", ";", "%", "!")
+"""How lines begin that are no rows."""
+_BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
+"""Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
+_ORDER = Literal["dmy", "mdy", "ymd"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """Something that the file does not tell: what, and what the user can say."""
+
+    what: str
+    fix: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Need:
+    """What a table's stamps do not tell and no recipe can: what, how to say it, and the option that says it."""
+
+    what: str
+    fix: str
+    option: Literal["zone", "date", "start"]
+
+    def without(self, options: WindOptions) -> bool:
+        """Whether the user has not said it yet."""
+        return getattr(options, self.option) is None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draft:
+    """What a table is, as far as its first lines tell.
+
+    Attributes:
+        toml: the recipe; "?" stands where it is to be completed. "" where there is no time and no wind to describe.
+        understood: what in the file speaks for it.
+        remarks: what was left out, and why.
+        warnings: what is odd, but does not keep the table from being read.
+        doubts: what must be said before it can be read.
+        needs: what must be said beside, since its stamps do not tell it.
+        unsure: labels of the anemometers that may be something else, such as the speed of a vehicle.
+        winds: labels of the anemometers of the table; the recipe is of the one that was named, or of the first.
+        site: index of the column that tells sites apart, `None` where there is one site.
+        parts: labels of the anemometers of one row, "" for one alone (see `site_labels.columns`).
+        delimiter: of the cells.
+        of_earth: whether the components of the wind are towards east (x) and north (y).
+    """
+
+    toml: str
+    understood: tuple[str, ...]
+    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
+    needs: tuple[Need, ...] = ()
+    unsure: tuple[str, ...] = ()
+    winds: tuple[str, ...] = ()
+    site: int | None = None
+    parts: tuple[str, ...] = ("",)
+    delimiter: str = ","
+    of_earth: bool = False
+
+
+@lru_cache(maxsize=4)
+def draft(
+    lines: tuple[str, ...],
+    *,
+    unit: str | None = None,
+    order: _ORDER | None = None,
+    wind: str | None = None,
+    columns: str | None = None,
+    where: str = "",
+) -> Draft | None:
+    """What the table is that `lines` seem to begin; `None` where they hold no table, or neither time nor wind.
+
+    Args:
+        unit: of the wind, by the user's word.
+        order: of dates written with numbers only, by the user's word.
+        wind: label of the anemometer to describe, of those that `Draft.winds` lists.
+        columns: what the columns are, by the user's word (see `stated_columns`).
+        where: the file, for messages.
+
+    Raises:
+        UsageError, UnknownNameError, InputError: `columns` do not fit the table.
+    """
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
+        return None
+    named = False
+    if columns is not None:
+        known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
+        time, winds, remarks, warnings = known.time, (known.wind,), (), ()
+        of_time = time.columns if time is not None else ()
+        mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
+    else:
+        time = find_time(layout, order=order)
+        of_time = time.columns if time is not None else ()
+        mixed = None
+        if time is not None:
+            mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
+        winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
+        for part in () if wind is None else site_labels.parts(wind, mixed[1] if mixed is not None else ()):
+            if part in {one.label for one in winds}:
+                break
+            said, odd = named_wind(layout, part, time=of_time, told=unit)
+            winds, warnings, named = (*winds, *said), (*warnings, *odd), bool(said)
+            if said:
+                break
+        if time is None and not winds:
+            return None
+    parts: tuple[str, ...] = ("",)
+    if mixed is not None:
+        layout = replace(layout, site=mixed[0])
+        parts = site_labels.columns(winds, named=named)
+        winds = site_labels.of_sites(winds, *mixed, named=named)
+    labels = tuple(one.label for one in winds)
+    of_all = mixed is not None and wind in parts
+    chosen = next((one for one in winds if one.label == wind or (of_all and one.label.endswith(f":{wind}"))), None)
+    doubts = list(_doubts(lines, layout, time, winds, chosen))
+    doubts += _below_zero(layout, time, winds) if columns is None and wind is None else []
+    if wind is not None and chosen is None and mixed is not None and winds:
+        # A site that the first rows do not hold.
+        site, part = site_labels.site_of(wind, parts)
+        like = next((one for one in winds if not part or one.label.endswith(f":{part}")), winds[0])
+        chosen = replace(like, label=wind, site=(mixed[0], site))
+    elif wind is not None and chosen is None:
+        known = ", ".join(labels) or "none"
+        doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
+    chosen = chosen or (winds[0] if winds else None)
+    if layout.short:
+        shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
+        warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
+    above = rows_above(lines, layout)
+    warnings = (*warnings, above) if above else warnings
+    if time is not None and time.unnamed:
+        shown = f"{time.columns[0] + 1} to {time.columns[-1] + 1}"
+        warnings = (*warnings, f"no line names the columns: numbers {shown} are taken as the time ({time.form})")
+    if time is not None and time.remark is not None:
+        warnings = (*warnings, time.remark)
+    if columns is None and chosen is not None:
+        taken = {*of_time, *(column.index for one in winds for column in one.columns.values())}
+        warnings = (*warnings, *quality_columns.warnings(layout, taken=taken))
+        remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
+        remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
+        remarks = (*remarks, *unread.otherwise(layout, time, chosen))
+        remarks = (*remarks, *own_motion.remarks(layout))
+        remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
+    toml = _toml(layout, time, chosen)
+    return Draft(
+        toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
+        warnings=warnings,
+        doubts=tuple(doubts), needs=_needs(lines, layout, time),
+        unsure=tuple(one.label for one in winds if not one.sure),
+        winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
+        of_earth=chosen is not None and chosen.of_earth,
+    )  # fmt: skip
+
+
+def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
+    return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
+
+
+def _needs(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tuple[Need, ...]:
+    """What the stamps of a time leave open: its start, its day, its zone."""
+    if time is None or time.counts:
+        return ()
+    if time.form is not None and counted.is_elapsed(time.form):
+        fix = "give the instant of the first: --start TIME"
+        above = stated_rate.advice(lines[: layout.preamble + max(1, layout.header)] if layout.header else ())
+        fix += f" ({above})" if above else ""
+        return (Need(what="its rows count from a start", fix=fix, option="start"),)
+    found: list[Need] = []
+    if time.form is not None and counted.is_time_of_day(time.form):
+        fix = "give the day of the first row: --date DATE"
+        found.append(Need(what="its stamps have no date", fix=fix, option="date"))
+    if time.form is not None and yearless.is_yearless(time.form):
+        texts = _stamps(layout, time.columns)
+        read = counted.parse([text for text in texts if text.strip()], time.form)
+        what, fix = yearless.missing(time.form, int(read.ns[read.valid].flat[0]))
+        found.append(Need(what=what, fix=fix, option="date"))
+    if not time.zoned and time.zone is None:
+        statement = zones.stated(lines)
+        fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
+        fix = f"{fix}; {statement.advice()}" if statement is not None else fix
+        fix = f"{fix}; {time.zone_advice}" if time.zone_advice else fix
+        found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
+    return tuple(found)
+
+
+def _doubts(
+    lines: Sequence[str], layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None
+) -> list[Doubt]:
+    found: list[Doubt] = []
+    names = ", ".join(repr(name) for name in layout.names if name) or "no names"
+    if time is None:
+        offered = stated_columns.offer(layout, time, winds)
+        fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
+        above = stated_rate.advice(lines[: layout.preamble])
+        fix += f" ({above})" if above else ""
+        found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
+    elif time.doubt is not None and time.fix is not None:
+        offered = f"; {stated_columns.offer(layout, time, winds)}" if time.counts else ""
+        found.append(Doubt(what=time.doubt, fix=f"{time.fix}{offered}"))
+    classes = beaufort(layout)
+    if not winds and classes:
+        what = f"column {classes[0]!r} holds Beaufort numbers, which are classes of wind, not speeds"
+        found.append(Doubt(what=what, fix="set the instrument to m/s, km/h, mph or kn and log again"))
+    elif not winds and (counted_by := counts(layout)):
+        what = f"column {layout.names[counted_by[0]]!r} is what an anemometer counts or gives, not yet a speed"
+        fix = "say what one of it is in m/s, from the anemometer's data sheet: "
+        found.append(Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, counted_by[0])))
+    elif not winds and (directions := _directions(layout)):
+        what = f"column {directions[0]!r} is a direction of the wind, but no column is its speed"
+        fix = "log the speed beside it; if a column is the speed all the same, or the direction alone is wanted, "
+        fix += stated_columns.offer(layout, time, winds)
+        found.append(Doubt(what=what, fix=fix))
+    elif not winds:
+        fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
+        if time is not None and (only := _only_numbers(layout, time)) is not None:
+            name = in_shell(layout.names[only] if layout.by_name else str(only + 1))
+            fix = f"if column {only + 1}, the only one of numbers, is the wind's speed: --wind {name} --unit m/s"
+            fix += " (or its unit)"
+        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
+        own = own_motion.doubt(layout)
+        what = f"no column is surely a wind; {f'{own}; ' if own else ''}the columns are {names}"
+        found.append(Doubt(what=what, fix=fix))
+    for wind in winds if chosen is None else (chosen,):
+        changing = mixed_units(layout, next(iter(wind.columns.values())).index)
+        if changing:
+            what = f"the rows of {wind.label!r} are in different units: {', '.join(changing)}"
+            found.append(Doubt(what=what, fix="make a file of the rows in each unit, and ingest them apart"))
+    for wind in (chosen,) if chosen is not None else winds:
+        missing = wind.without_unit()
+        if missing:
+            found.append(_unit_doubt(lines, layout, time, wind, missing))
+            break
+    unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
+    if unsure:
+        fix = f"if it is the wind, name it: --wind {in_shell(unsure[0])}"
+        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
+        what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
+        own = own_motion.doubt(layout)
+        what += f"; {own}" if own else ""
+        found.append(Doubt(what=what, fix=fix))
+    return found
+
+
+def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[Doubt]:
+    """A doubt for each speed that is below zero too often and too far to be one: it is a component."""
+    found: list[Doubt] = []
+    for wind in winds:
+        column = wind.columns.get("wind_speed")
+        if column is None:
+            continue
+        value = numbers(layout.column(column.index), decimal=layout.decimal).value
+        known = value[np.isfinite(value) & ~np.isin(value, missing_codes.CODES)]
+        known = known[~below_zero(known)]
+        if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
+            continue
+        what = f"column {wind.label!r} goes below zero, to {known.min():g}: a component of the wind, not its speed"
+        line = stated_columns.offer(layout, time, ())
+        fix = (
+            f"if two columns are its components, say so with wind_x and wind_y (x to the east, y to the north): {line}"
+        )
+        found.append(Doubt(what=what, fix=fix))
+    return found
+
+
+def _only_numbers(layout: Layout, time: TimeChoice) -> int | None:
+    """The one column beside the time whose cells are numbers; `None` where there are none or several."""
+    columns = [index for index in range(layout.number_of_columns()) if index not in time.columns]
+    found = [index for index in columns if {*map(cell_kind, layout.column(index))} <= {"number", "missing"}]
+    return found[0] if len(found) == 1 else None
+
+
+def _directions(layout: Layout) -> list[str]:
+    return [name for name in layout.names if understand(name).channel.endswith("wind_direction")]
+
+
+def _unit_doubt(
+    lines: Sequence[str], layout: Layout, time: TimeChoice | None, wind: Wind, missing: Sequence[str]
+) -> Doubt:
+    above = stated_unit(
+        [line if at < layout.preamble or line.lstrip()[:1] in _COMMENT else "" for at, line in enumerate(lines)]
+    )
+    if above is not None:
+        name, number, words = above
+        heading = layout.names[wind.columns[missing[0]].index]
+        what = f"the unit of column {heading!r} is not stated in its heading; line {number} says {words!r}"
+        return Doubt(what=what, fix=f"if that is the unit of the wind, give it: --unit {name}")
+    column = wind.columns[missing[0]].index
+    if column in counts(layout):
+        what = f"column {layout.names[column]!r} is what an anemometer counts or gives, not yet a speed"
+        fix = "say what one of it is in m/s, from the anemometer's data sheet: "
+        return Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, column))
+    value = numbers(layout.column(column), decimal=layout.decimal).value
+    if missing[0] == "wind_speed" and cumulated.grows(value):
+        what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {cumulated.WHAT}"
+        fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"
+        return Doubt(what=what, fix=fix)
+    evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
+    known = value[np.isfinite(value)]
+    if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
+        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), --unit km/h or another"
+        return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
+    likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
+    name = layout.names[column] or f"number {column + 1}"
+    fix = (
+        f"give it: --unit {evidence.unit if evidence else 'm/s'}{'' if evidence else ' (or km/h, mph, kn, ft/s)'}"
+        ", after the instrument's setting or manual"
+    )
+    return Doubt(what=f"the unit of column {name!r} is not stated{likely}", fix=fix)
+
+
+def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[str]:
+    named = (
+        f"line {layout.preamble + 1} names the {layout.number_of_columns()} columns"
+        if layout.header
+        else f"no line names the {layout.number_of_columns()} columns"
+    )
+    units = f", line {_units_line(layout)} their units" if any(layout.units) else ""
+    decimal = ", numbers have decimal commas" if layout.decimal == "," else ""
+    found = [f"cells are divided by {delimiter_name(layout.delimiter)!r}{decimal}; {named}{units}"]
+    if time is not None:
+        stamps = " and ".join(_shown(layout, index) for index in time.columns)
+        zone = "which state their zone" if time.zoned else f"in {time.zone}" if time.zone else "without a zone"
+        if time.form is not None and (counted.is_elapsed(time.form) or counted.needs_date(time.form)):
+            zone = "without a year" if yearless.is_yearless(time.form) else "without a date"
+        unknown = "a count in a unit that is not told" if time.counts else "a date in an order that is not told"
+        zone = "from a start" if time.counts else zone
+        found.append(f"column {stamps} is the time, as {time.form or unknown}, {zone}")
+    for wind in winds:
+        height = f" at {wind.height:g} m" if wind.height is not None else ""
+        site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""
+        parts = [
+            f"{channel} from column {_shown(layout, column.index)}, {column.told or 'unit not stated'}"
+            for channel, column in wind.columns.items()
+        ]
+        found.append(f"anemometer {wind.label!r}{height}{site}: {'; '.join(parts)}")
+    return found
+
+
+def _units_line(layout: Layout) -> str:
+    return f"{layout.preamble + 2}" if layout.header == 2 else "below"
+
+
+def _shown(layout: Layout, index: int) -> str:
+    return repr(layout.names[index]) if layout.names[index] else f"number {index + 1}"
+
+
+def delimiter_name(delimiter: str) -> str:
+    """What a recipe calls a delimiter."""
+    return next(name for name, character in DELIMITERS.items() if character == delimiter)
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
+
+
+def _reference(layout: Layout, index: int) -> str:
+    """A column as a recipe names it: by its heading where that is its own, else by its number."""
+    name = layout.names[index]
+    return _quoted(name) if layout.by_name and name and layout.names.count(name) == 1 else str(index + 1)
+
+
+def skeleton(lines: Sequence[str]) -> tuple[str, str, str] | None:
+    """What a table is of which nothing is known but its columns, what its user can say, and a recipe to complete.
+
+    `None` for no table.
+    """
+    layout = lay_out(lines, interest=interest)
+    if layout is None:
+        return None
+    names = ", ".join(repr(name) for name in layout.names if name)
+    first = ", ".join(layout.rows[0])[:200]
+    what = (
+        f"a table of {layout.number_of_columns()} columns divided by {delimiter_name(layout.delimiter)!r}, "
+        f"{f'called {names}' if names else 'which no line names'}, the first row {first}"
+    )
+    return what, stated_columns.offer(layout, None, ()), _toml(layout, None, None)
+
+
+def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
+    preamble = layout.preamble if layout.by_name else layout.preamble + layout.header
+    label = wind.label if wind is not None else "anemometer"
+    lines = [
+        'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
+        "[file]", f"delimiter = {_quoted(delimiter_name(layout.delimiter))}", f"decimal = {_quoted(layout.decimal)}",
+        f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
+        f"missing = [{', '.join(map(_quoted, missing_codes.of(layout, wind)))}]", "",
+        "[time]",
+    ]  # fmt: skip
+    if time is None:
+        lines += ['columns = ["?"]  # names, or numbers from 1', 'format = "?"  # such as "%Y %j %H%M" or "epoch-s"']
+    else:
+        lines.append(f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]")
+        doubt = f"  # {time.doubt}" if time.form is None else ""
+        lines.append(f"format = {_quoted(time.form or '?')}{doubt}")
+    if time is not None and time.zone is not None:
+        lines.append(f"zone = {_quoted(time.zone)}")
+    if wind is not None and wind.site is not None:
+        lines += ["", "[rows]", f"column = {_reference(layout, wind.site[0])}", f"value = {_quoted(wind.site[1])}"]
+    if wind is None:
+        names = ", ".join(name for name in layout.names if name)
+        lines += ["", "[channels.wind_speed]", 'column = "?"  # ' + (f"one of: {names}" if names else "its number")]
+        lines += ['unit = "?"  # m/s, km/h, mph, kn']
+    for channel, column in (wind.columns if wind is not None else {}).items():
+        lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
+        lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
+        lines += ['convention = "to"'] if column.towards else []
+        suffix = layout.suffixes[column.index]
+        lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
+    own = wind.columns.values() if wind is not None else ()
+    units = list(dict.fromkeys(other for one in own for other in _beside(layout, one)))
+    for column in units:
+        text = next(row[column].strip() for row in layout.rows if row[column].strip())
+        lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
+        lines += ['about = "unit"']
+    site = site_of_all(layout, apart={*time.columns, *units}) if time is not None else None
+    if site is not None and own:
+        lines += ["", "[[check]]", f"column = {_reference(layout, site[0])}", f"values = [{_quoted(site[1])}]"]
+        lines += ['about = "site"']
+    lines += ["", "[sensor]", f"name = {_quoted(label)}"]
+    if wind is not None and wind.height is not None:
+        lines.append(f"height = {wind.height:g}")
+    return "\n".join([*lines, ""])
+
+
+def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
+    """The column that spells a column's unit in every row, where that is how the unit is known."""
+    other = layout.unit_columns[column.index]
+    alone = understand(layout.names[column.index]).unit is None
+    return (other,) if other is not None and alone else ()

@@ -1,0 +1,118 @@
+"""Columns that may be the direction of a wind which was read without one: told, with the line that reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.text.cells import numbers
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.winds.angles import compass_unit, may_be_direction, may_be_two
+from flagdata.ingest.anemometer.winds.directions import judge
+from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, Wind
+from flagdata.ingest.anemometer.words.headings import COURSES, understand, words_of
+
+_RELATIVE = frozenset({"rel", "relative", "apparent", "bow", "awa"})
+"""Words of a direction from its platform's bow or mark."""
+_FROM_NORTH = frozenset({"twd", "gwd"})
+"""Directions that instruments of boats compute, from whichever north their compass is set to."""
+
+
+def from_either_north(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> tuple[str, ...]:
+    """A remark for each direction that may be from true or from magnetic north."""
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        if not set(words_of(name)) & _FROM_NORTH:
+            continue
+        what = f"column {name!r} may be from true or magnetic north: left out"
+        if time is not None and winds:
+            line = stated_columns.read_also(layout, time, winds[0], index)
+            what += f'; if from true north: --columns "{line}", else with wind_direction_magnetic for wind_direction'
+        found.append(what)
+    return tuple(found)
+
+
+def directions(
+    layout: Layout, time: TimeChoice | None, wind: Wind, winds: Sequence[Wind], remarks: Sequence[str]
+) -> tuple[str, ...]:
+    """A remark for each column that may be the direction of a wind which has none.
+
+    Args:
+        wind: the one that is read.
+        winds: all of the table.
+        remarks: what was said of columns already.
+    """
+    if time is None or not wind.sure:
+        return ()
+    told = [name for name in wind.columns if not name.startswith("apparent")]
+    if any(name.endswith(("direction", "magnetic")) or name in COMPONENTS for name in told):
+        return ()
+    taken = {*time.columns, *(column.index for one in (wind, *winds) for column in one.columns.values())}
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        if index in taken:
+            continue
+        called = repr(name) if name else f"number {index + 1}"
+        units = _may_be(layout, index)
+        if units:
+            line = stated_columns.read_also(layout, time, wind, index, unit_name=units[0])
+            others = f", or with {' or '.join(f'[{unit}]' for unit in units[1:])}" if units[1:] else ""
+            found.append(f'to read column {called} as the wind\'s direction: --columns "{line}"{others}')
+            continue
+        if any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
+            continue
+        if set(words_of(name)) & _RELATIVE:
+            line = stated_columns.read_also(layout, time, wind, index, channel="apparent_wind_direction")
+            what = "is a direction from its platform's bow or mark, not from north"
+            found.append(f'column {called} {what}: left out; to keep it as such: --columns "{line}"')
+            continue
+        line = stated_columns.read_also(layout, time, wind, index)
+        found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
+    return tuple(found)
+
+
+def otherwise(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str, ...]:
+    """A remark with the line that reads the direction of a wind in the other way that its heading or values leave open.
+
+    It may be in another unit, or where the wind blows to.
+    """
+    column = wind.columns.get("wind_direction")
+    if time is None or column is None or column.towards:
+        return ()
+    name = layout.names[column.index]
+    heading = understand(name, layout.units[column.index])
+    value = numbers(layout.column(column.index), decimal=layout.decimal).value
+    judged = judge(heading, value, "wind_direction")
+    if not judged.doubt:
+        return ()
+    if judged.may_be and judged.may_be[0] != column.unit:
+        line = stated_columns.read_also(layout, time, wind, column.index, unit_name=judged.may_be[0])
+        return (f'to read column {name!r} in {judged.may_be[0]}: --columns "{line}"',)
+    if set(words_of(name)) & COURSES:
+        to = stated_columns.TOWARDS
+        line = stated_columns.read_also(layout, time, wind, column.index, unit_name=column.unit, channel=to)
+        return (f'to read column {name!r} as where the wind blows to: --columns "{line}"',)
+    return ()
+
+
+def relative(layout: Layout, winds: Sequence[Wind]) -> tuple[str, ...]:
+    """A remark for each direction from a platform's bow that is left out beside one from north."""
+    taken = {column.index for wind in winds for column in wind.columns.values()}
+    north = [column.index for wind in winds for name, column in wind.columns.items() if name == "wind_direction"]
+    return tuple(
+        f"column {name!r} is relative to its platform: left out beside {layout.names[north[0]]!r}, which is from north"
+        for index, name in enumerate(layout.names)
+        if north and index not in taken and set(words_of(name)) & _RELATIVE and may_be_direction(layout, index)
+    )
+
+
+def _may_be(layout: Layout, index: int) -> tuple[str, ...]:
+    """The units that a direction which is left out for its numbers may be in; none where it is no such column."""
+    heading = understand(layout.names[index], layout.units[index])
+    if heading.channel != "wind_direction":
+        return ()
+    if compass_unit(layout, index) is None and may_be_two(layout, index):
+        return "points-de", "points-es"
+    judged = judge(heading, numbers(layout.column(index), decimal=layout.decimal).value, heading.channel)
+    return judged.may_be if judged.left_out else ()

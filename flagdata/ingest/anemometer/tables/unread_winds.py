@@ -1,0 +1,98 @@
+"""Columns that speak of the wind and are not read, such as gusts, extremes and deviations: told in one remark."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+
+from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds.instruments import Wind
+from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
+from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
+
+_SPEAKS = re.compile(
+    r"wind|wnd|gust|rafale|racha|rajada|raffica|beaufort|(?:^|_)(?:wg|ws|wd|wspd|wdir)(?:_|$)|b(?:ö|oe)en?(?:_|$)"
+)
+"""What stands in headings of the wind and its gusts; words are joined with "_"."""
+_NO_WIND = frozenset({"chill", "windchill", "window", "windows", "rewind", "winding", "windings", "windup"})
+_SPEEDS = GUSTS | MAXIMA | MINIMA | frozenset({"peak", "lull", "hi", "high", "low", "lo", "samples"})
+"""Words of extremes, whose numbers are speeds of the wind."""
+_NO_SPEEDS = frozenset(
+    {
+        "dir", "direction", "time", "date", "qc", "flag", "quality", "std", "sd", "count", "force", "beaufort", "bft",
+        "scale", "class", "run", "chill", "power", "angle", "bearing", "vane",
+    }
+)  # fmt: skip
+"""Words of headings whose numbers are no speeds of the wind."""
+_HIGHEST = GUSTS | MAXIMA | {"peak", "hi", "high"}
+_INTERVAL = re.compile(r"(?<![^\W_])\d+[\s_-]?(?:min|mins|minutes?|m|s|sec|h|hr|hours?)(?![^\W_])", re.IGNORECASE)
+"""A length of time in a heading, whose "min" is no minimum."""
+_MOST = 60
+"""Columns that are named; of more, the number."""
+
+
+def remark(
+    layout: Layout, time: TimeChoice | None, wind: Wind | None, winds: Sequence[Wind], remarks: Collection[str]
+) -> tuple[str, ...]:
+    """One remark that names the columns of the wind which are not read; none where there is no such column.
+
+    Args:
+        wind: the one that is read.
+        winds: all of the table.
+        remarks: what was said of columns already; those are not named again.
+    """
+    taken = {column.index for one in winds for column in one.columns.values()}
+    taken |= {column.index for column in wind.columns.values()} if wind is not None else set()
+    taken |= set(own_motion.columns(layout))
+    taken |= set(time.columns) if time is not None else set()
+    taken |= {index for index in layout.unit_columns if index is not None}
+    taken |= {one.site[0] for one in winds if one.site is not None}
+    found = [
+        index
+        for index, name in enumerate(layout.names)
+        if index not in taken
+        and _speaks_of_wind(layout, index)
+        and not any(repr(name) in said for said in remarks)
+        and any(cell_kind(cell) != "missing" for cell in layout.column(index))
+    ]
+    if not found:
+        return ()
+    names = ", ".join(repr(layout.names[index]) for index in found[:_MOST])
+    names += f" and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    many = len(found) > 1
+    what = f"columns {names} speak of the wind and are not read" if many else f"column {names} speaks of the wind"
+    what += "" if many else " and is not read"
+    speeds = [index for index in found if _is_speed(layout, index)]
+    speed = next((index for index in speeds if _words(layout, index) & _HIGHEST), next(iter(speeds), None))
+    if speed is None or time is None or wind is None:
+        return (what,)
+    line = stated_columns.read_instead(layout, time, wind, speed)
+    read = f"to read {layout.names[speed]!r} as a wind of its own, ingest the file once more with"
+    return (f'{what}; {read} --columns "{line}"',)
+
+
+def _speaks_of_wind(layout: Layout, index: int) -> bool:
+    """Whether a heading names the wind, its gusts or a statistic of its speed or direction."""
+    words = words_of(layout.names[index])
+    if set(words) & _NO_WIND:
+        return False
+    if set(words) & GUSTS - {"spitze", "spitzen"} or _SPEAKS.search("_".join(words)):
+        return True
+    return "wind" in understand(layout.names[index], layout.units[index]).quantity
+
+
+def _is_speed(layout: Layout, index: int) -> bool:
+    """Whether a column holds a gust, maximum or minimum of the wind's speed."""
+    heading = understand(layout.names[index], layout.units[index])
+    if heading.quantity not in ("", "wind_speed") or not (heading.unit is None or fits("wind_speed", heading.unit)):
+        return False
+    kinds = {cell_kind(cell) for cell in layout.column(index)}
+    words = _words(layout, index)
+    return bool(words & _SPEEDS) and not words & _NO_SPEEDS and kinds <= {"number", "missing"}
+
+
+def _words(layout: Layout, index: int) -> set[str]:
+    return set(words_of(_INTERVAL.sub(" ", layout.names[index])))

@@ -1,0 +1,1 @@
+"""A text file as lines, rows and cells, and how an unknown table in it is laid out."""

@@ -1,0 +1,208 @@
+"""Lines cut into cells, with the number of each row's line and a count of the lines that do not fit."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.recipe import FileLayout
+from flagdata.ingest.anemometer.text.columns import Columns, Lines, Shape, lines_of, shape_of
+from flagdata.ingest.anemometer.text.source import TextFile
+
+_PLAIN = ("utf-8", "utf-8-sig", "latin-1")
+"""Encodings in which a byte of ASCII is that character wherever it stands."""
+_BLANK_CELL = re.compile(r'"([^"]*)"|([^\s"]+)')
+
+
+class RowReader:
+    """Reads header and rows of a delimited text once, in blocks.
+
+    Args:
+        source: the file.
+        layout: how it is cut.
+
+    Raises:
+        InputError: the file ends before its header does.
+    """
+
+    def __init__(self, source: TextFile, layout: FileLayout) -> None:
+        self._source = source
+        self._layout = layout
+        self._malformed: list[int] = []
+        self._read = 0
+        self._last_malformed = False
+        head = source.head(layout.preamble + layout.header + 1)
+        if len(head) < layout.preamble + layout.header:
+            raise InputError(
+                f"the file ends in line {len(head)}, before its header does", where=str(source.path),
+                fix="check the recipe's preamble and header, or copy the file from the logger again",
+            )  # fmt: skip
+        self.first_line = layout.preamble + layout.header + 1
+        self.shift = 0
+        self.header: list[str] | None = None
+        if layout.header:
+            names = head[layout.preamble].lstrip("\ufeff")
+            self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
+            row = _cut(head[layout.preamble + layout.header :], layout.delimiter)
+            used = max((at for at, cell in enumerate(row[0], start=1) if cell.strip()), default=0) if row else 0
+            while len(self.header) > max(1, used) and not self.header[-1]:
+                self.header.pop()
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
+        """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
+
+        Empty cells beyond (delimiters at the line's end) are allowed. Where the encoding lets bytes be cut, regular
+        lines come as columns: see `columns`.
+        """
+        delimiter = self._layout.delimiter
+        plain = self._source.encoding in _PLAIN and len(delimiter) == 1 and delimiter.isascii() and delimiter != " "
+        return self._columns(width) if plain and delimiter != '"' else self.rows(width)
+
+    def rows(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        """What `blocks` gives, row by row: its definition."""
+        for first, lines in self._source.blocks():
+            where, good = self._sorted(list(range(first, first + len(lines))), lines, width)
+            if good:
+                yield where, good
+
+    def _sorted(
+        self, numbers: Sequence[int], lines: Sequence[str], width: int
+    ) -> tuple[NDArray[np.int64], list[list[str]]]:
+        """The rows of these lines that fit, with their numbers; the others are counted."""
+        named = len(self.header) if self.header is not None else None
+        comment = self._layout.comment
+        looked: list[int] = []
+        kept: list[str] = []
+        for number, line in zip(numbers, lines, strict=True):
+            if number < self.first_line or not line.strip(" \t\x00\x1a"):
+                continue
+            if comment and line.startswith(comment):
+                continue
+            looked.append(number)
+            kept.append(line)
+        good: list[list[str]] = []
+        where: list[int] = []
+        for number, row in zip(looked, _cut(kept, self._layout.delimiter), strict=True):
+            size = len(row)
+            fits = size >= width if named is None else size == named or _only_empty_beyond(row, named)
+            if fits and size >= width:
+                good.append(row)
+                where.append(number)
+            else:
+                self._malformed.append(number)
+        self._read += len(good)
+        if looked:
+            self._last_malformed = bool(self._malformed) and self._malformed[-1] == looked[-1]
+        return np.array(where, dtype=np.int64), good
+
+    def _columns(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
+        encoding = "utf-8" if self._source.encoding == "utf-8-sig" else self._source.encoding
+        first, shape = 1, None
+        for data in self._source.raw_blocks():
+            shape = shape or self._shape(data, width)
+            lines = lines_of(data, shape) if shape is not None and shape.cells >= width else None
+            if lines is None:
+                with io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline=None) as stream:
+                    texts = [line.rstrip("\n") for line in stream]
+                where, good = self._sorted(range(first, first + len(texts)), texts, width)
+                if good:
+                    yield where, good
+                first += len(texts)
+                continue
+            where, found = self._of_lines(lines, first, width, encoding)
+            if len(where):
+                yield where, found
+            first += len(lines.start)
+
+    def _shape(self, data: bytes, width: int) -> Shape | None:
+        """The shape of the file's regular lines by its first row; `None` where the block has no row."""
+        at = -1
+        for _ in range(self.first_line - 1):
+            at = data.find(b"\n", at + 1)
+            if at < 0:
+                return None
+        line = data[at + 1 :].partition(b"\n")[0].rstrip(b"\r")
+        named = len(self.header) if self.header is not None else None
+        return shape_of(
+            line, delimiter=self._layout.delimiter, named=named, comment=self._layout.comment,
+            ascii_only=self._source.encoding == "latin-1",
+        )  # fmt: skip
+
+    def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[NDArray[np.int64], Columns]:
+        """Rows of a block whose first line has the number `first`."""
+        number = first + np.arange(len(lines.start), dtype=np.int64)
+        lines = replace(lines, regular=lines.regular & (number >= self.first_line))
+        regular, others = number[lines.regular], number[~lines.regular]
+        found = lines.columns(width)
+        before = self._last_malformed
+        texts = [lines.text(at, encoding) for at in (others - first).tolist()]
+        where, good = self._sorted(others.tolist(), texts, width)
+        self._read += len(regular)
+        if len(regular) and (not self._malformed or self._malformed[-1] < regular[-1]):
+            self._last_malformed = False
+        elif not len(others):
+            self._last_malformed = before
+        if not good:
+            return regular, found
+        order = np.argsort(np.concatenate((regular, where)), kind="stable")
+        return np.sort(np.concatenate((regular, where))), found.with_rows(good, order)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What did not fit; complete when `blocks` has been read.
+
+        Raises:
+            InputError: most lines do not fit.
+        """
+        found: list[Finding] = []
+        malformed = list(self._malformed)
+        if len(malformed) > self._read and len(malformed) > 1:
+            raise InputError(
+                f"{len(malformed)} of {len(malformed) + self._read} lines have another number of columns than expected",
+                where=f"{self._source.path}, line {malformed[0]}", fix="check delimiter and header of the recipe",
+            )  # fmt: skip
+        if self._last_malformed and malformed:
+            last = malformed.pop()
+            found.append(
+                Finding(
+                    kind="cut-off", severity=Severity.WARNING, where=f"line {last}",
+                    what="the last line is incomplete, as when the logger lost power; left out",
+                )
+            )  # fmt: skip
+        if malformed:
+            found.append(
+                Finding(
+                    kind="malformed-lines", severity=Severity.ERROR, count=len(malformed), where=f"line {malformed[0]}",
+                    what=f"{len(malformed)} lines with another number of columns than the header; left out",
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+
+def blank_cells(line: str) -> list[str]:
+    """Cells divided by runs of blanks; quotes bind where they are closed."""
+    if '"' not in line or line.count('"') % 2:
+        return line.split()
+    return [quoted or plain for quoted, plain in _BLANK_CELL.findall(line)]
+
+
+def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
+    return len(row) > named and not any(cell.strip() for cell in row[named:])
+
+
+def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:
+    """Cells of each line. Quotes bind within a line; a line with an unclosed quote becomes one cell."""
+    if delimiter == " ":
+        return [blank_cells(line) for line in lines]
+    if not any('"' in line for line in lines):
+        return [line.split(delimiter) for line in lines]
+    closed = [line if line.count('"') % 2 == 0 else "" for line in lines]
+    rows = list(csv.reader(closed, delimiter=delimiter))
+    return [row if kept else [line] for row, kept, line in zip(rows, closed, lines, strict=True)]

@@ -1,0 +1,128 @@
+"""Codes that stand for "no value" among the numbers of a log, told by being far from all others, and one value alone.
+
+A wind changes from reading to reading; a code is written the same each time. What no log can mean as a wind is a code
+wherever it stands; what a wind might be, such as 99 m/s, only where it is at least twice everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.text.cells import Cell, Numbers
+
+NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
+"""Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
+_NINES = (99_999.0, 9999.9, 9999.0, 999.99, 999.9, 999.0, 99.99, 99.9, 99.0)
+_OFTEN = (
+    8888.0, 7999.0, 6999.0, 888.8, 888.0, 88.8, 65_535.0, 6553.5, 655.35, 65_534.0, 32_767.0, 3276.7, 327.67, 255.0,
+)  # fmt: skip
+"""Eights, codes of Campbell's loggers, and the largest numbers of 16 and 8 bits, also scaled: codes where they come
+again and again, since a slow unit may reach them once."""
+_AGAIN = 3
+_ENDLESS = 1e5
+"""No speed in any unit is as large; codes such as 1e20 are."""
+_OTHERS = 10
+"""Other values that show how fast the wind is."""
+_LOW, _HIGH = -181.0, 401.0
+"""Angles as written lie between, in degrees or in gon."""
+_FEW = 2
+"""Different codes of one column."""
+_WORDS, _SHARE = 3, 0.6
+"""Different words for no value in a column, and the largest share of its rows that they fill."""
+
+
+def words(cells: Sequence[str], parsed: Numbers) -> tuple[str, ...]:
+    """The few words that stand for no value in a column of numbers ("Calm", "VRB"); none where it holds other text.
+
+    Args:
+        cells: (n,) of the column.
+        parsed: what was read of them.
+    """
+    spoken = [cell for cell, state in zip(cells, parsed.state, strict=True) if state == Cell.UNREADABLE]
+    listed = sorted(set(spoken))
+    filled = int((parsed.state == Cell.NUMBER).sum()) + len(spoken)
+    plain = all(any(letter.isalpha() for letter in word) and not any(map(str.isdigit, word)) for word in listed)
+    few = len(listed) <= _WORDS and 2 * len(listed) <= len(spoken) <= _SHARE * filled
+    return tuple(listed) if few and plain else ()
+
+
+def speeds(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which speeds are a code for no value that nobody named.
+
+    Args:
+        values: (n,) as written, NaN where missing.
+    """
+    found = below_zero(values)
+    endless = np.isfinite(values) & (values >= _ENDLESS)
+    if len(np.unique(values[endless])) == 1 < endless.sum() < np.isfinite(values).sum() / 2:
+        found |= endless
+    for code in (*_NINES, *_OFTEN):
+        here = values == code
+        if code in _OFTEN and here.sum() < _AGAIN:
+            continue
+        others = values[np.isfinite(values) & ~here & ~found]
+        if here.any() and len(others) >= _OTHERS and 2 * float(others.max()) < code:
+            found |= here
+    return found
+
+
+def below_zero(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which values are a code below zero: the only one there, again and again, from -1 down, among ten others.
+
+    Components, and speeds about a zero that is off, have different values below zero.
+    """
+    below = np.isfinite(values) & (values < 0)
+    others = values[np.isfinite(values) & ~below]
+    codes = np.unique(values[below])
+    few = 0 < len(codes) <= (_FEW if len(codes) and codes.max() <= -88 else 1)
+    told = few and codes.max() <= -1 and below.sum() > len(codes) and len(others) >= _OTHERS
+    return below if told else np.zeros(len(values), dtype=bool)
+
+
+def angles(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which directions are a code for none or a variable one.
+
+    Args:
+        values: (n,) as written [deg, or tens of degrees], NaN where missing.
+    """
+    known = np.isfinite(values)
+    found = known & (np.isin(values, NO_ANGLE) | (values <= -999))
+    beyond = known & ~found & ((values < _LOW) | (values > _HIGH))
+    if len(np.unique(values[beyond])) <= _FEW and beyond.sum() < (known & ~found).sum() / 2:
+        found |= beyond
+    return found | within_a_turn(np.where(found, np.nan, values))
+
+
+def within_a_turn(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which directions are a code that might be an angle: -1 among angles to 360°, 99 among tens of degrees.
+
+    Args:
+        values: (n,) as written, NaN where missing.
+    """
+    found = np.zeros(len(values), dtype=bool)
+    known = np.isfinite(values)
+    if known.any() and float(values[known].max()) > 180:
+        found = below_zero(values)
+    rest = values[known & (values != 99)]
+    if len(rest) >= _OTHERS and float(rest.min()) >= 0 and float(rest.max()) <= 36 and bool(np.all(rest % 1 == 0)):
+        found |= values == 99
+    return found
+
+
+def report(
+    channel: str, values: NDArray[np.float64], found: NDArray[np.bool_], line: NDArray[np.int64]
+) -> tuple[Finding, ...]:
+    """The finding about values that were taken for a code; none where there are none."""
+    if not found.any():
+        return ()
+    listed = ", ".join(f"{value:g}" for value in np.unique(values[found]))
+    why = "no angle" if channel.endswith(("direction", "magnetic")) else "at least twice all others, or below zero"
+    what = f"{int(found.sum())} values of {channel} are {listed}, {why}: taken as a code for no value"
+    return (Finding(
+        kind="code-for-missing", severity=Severity.WARNING, count=int(found.sum()), where=f"line {line[found][0]}",
+        what=what, fix="name the code in a recipe's [file] missing",
+    ),)  # fmt: skip

@@ -1,0 +1,495 @@
+"""The anemometers of a table: which columns belong to which, in which unit, and what was left out and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata import compass
+from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds import codes, own_motion, unitcheck
+from flagdata.ingest.anemometer.winds.angles import compass_unit, degrees, may_be_points, may_be_two
+from flagdata.ingest.anemometer.winds.axes import along_axes
+from flagdata.ingest.anemometer.winds.directions import judge
+from flagdata.ingest.anemometer.winds.no_speeds import beaufort
+from flagdata.ingest.anemometer.winds.vanes import number, vanes
+from flagdata.ingest.anemometer.words.headings import WIND, Heading, fits, understand, words_of
+from flagdata.units import spelled, unit
+
+SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
+COMPONENTS = ("wind_x", "wind_y", "wind_z")
+_DIRECTION_OF = {name: name.replace("speed", "direction") for name in SPEEDS}
+_WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
+_PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
+"""Ranges of the air pressure by unit [in it]; they do not overlap."""
+_POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
+_VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
+_UNREADABLE = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column for a channel.
+
+    Attributes:
+        index: of the column.
+        unit: as `flagdata.units` spells it; `None` where nothing tells it.
+        told: how the unit is known.
+        towards: of a direction, whether the wind blows to it.
+    """
+
+    index: int
+    unit: str | None
+    told: str
+    towards: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wind:
+    """One anemometer of a table.
+
+    Attributes:
+        label: what the user calls it by: the heading of its speed, or of its first component.
+        height: above ground [m], where the heading tells.
+        columns: by channel.
+        sure: whether the heading names the wind; false where only the unit or a lone "speed" speaks for it.
+        site: column and text of the rows that are its own, where a table mixes sites.
+        of_earth: whether its components are said to be towards east (x) and north (y).
+    """
+
+    label: str
+    height: float | None
+    columns: Mapping[str, Column]
+    sure: bool
+    site: tuple[int, str] | None = None
+    of_earth: bool = False
+
+    def without_unit(self) -> tuple[str, ...]:
+        """Channels of the wind's speed whose unit nothing tells."""
+        return tuple(name for name in (*SPEEDS, *COMPONENTS) if name in self.columns and not self.columns[name].unit)
+
+
+@dataclass
+class _Found:
+    """Columns by what their heading says, with numbers in them."""
+
+    layout: Layout
+    headings: list[Heading]
+    values: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    of_earth: bool = False
+
+    def of(self, *channels: str) -> list[int]:
+        return [index for index in self.values if self.headings[index].channel in channels]
+
+    def key(self, index: int) -> tuple[object, ...]:
+        heading = self.headings[index]
+        return (*heading.label, heading.height)
+
+    def name(self, index: int) -> str:
+        name = self.layout.names[index]
+        return f"{name}#{index + 1}" if self.layout.names.count(name) > 1 else name
+
+
+def find_winds(
+    layout: Layout, *, time: Sequence[int], told: str | None = None
+) -> tuple[tuple[Wind, ...], tuple[str, ...], tuple[str, ...]]:
+    """The anemometers of a table, remarks on what was not taken, and warnings of what is odd.
+
+    Args:
+        time: columns that are the time.
+        told: unit of the wind by the user's word; it goes before the heading's.
+    """
+    found = _gathered(layout, time)
+    winds = [*_speeds(found, told), *_components(found, told)]
+    winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
+    _doubt_headings(found, winds)
+    _check_gusts(found, winds)
+    return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
+
+
+def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
+    """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
+    headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
+    headings, of_earth = along_axes(layout, headings)
+    found = _Found(layout=layout, headings=headings, of_earth=of_earth)
+    for index, heading in enumerate(headings):
+        if index in time or not heading.quantity or _day_of_month(layout, index):
+            continue
+        calm = compass.STILL if heading.quantity.endswith("wind_speed") else ()
+        parsed = numbers(layout.column(index), decimal=layout.decimal, zeros=calm, below=bool(calm))
+        points = compass_unit(layout, index) if may_be_points(heading) else None
+        if points is not None:
+            found.values[index] = degrees(layout, index, points)
+            quantity = heading.quantity.replace("speed", "direction")
+            found.headings[index] = replace(
+                heading, unit=points, quantity=quantity, channel="" if heading.spread else quantity
+            )
+        elif float((parsed.state == Cell.UNREADABLE).mean()) > _UNREADABLE and not _few_words(found, index, parsed):
+            if heading.quantity.endswith("direction") and may_be_two(layout, index):
+                found.remarks.append(f"column {heading.name!r} holds points whose O may be east or west: left out")
+                continue
+            found.remarks.append(f"column {heading.name!r} holds words, not numbers: left out")
+        elif bool(np.isfinite(parsed.value).any()):
+            found.values[index] = parsed.value
+        elif not heading.spread:
+            found.remarks.append(f"column {heading.name!r} is empty in the first rows: left out")
+    for index in vanes(found.headings, found.values):
+        found.headings[index] = replace(found.headings[index], channel="wind_direction", quantity="wind_direction")
+    return found
+
+
+def _few_words(found: _Found, index: int, parsed: Numbers) -> bool:
+    """Whether a column holds numbers, and a few words that say why there is none; of a wind, that is said."""
+    cells = found.layout.column(index)
+    listed = codes.words(cells, parsed)
+    told = [word for word in listed if word.lower() not in compass.STILL]
+    if told and "wind" in found.headings[index].quantity:
+        found.warnings.append(
+            f"column {found.headings[index].name!r} holds {', '.join(map(repr, told))} in some of the first "
+            f"{len(cells)} rows, where others hold numbers: taken for no value"
+        )
+    return bool(listed)
+
+
+def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
+    """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
+    words = [set(words_of(name)) for name in found.layout.names]
+    windy = any("wind" in word or word in WIND for name in words for word in name)
+    windy = windy or bool(found.of("wind_direction", *COMPONENTS))
+    for wind in winds:
+        speed = wind.columns.get("wind_speed")
+        if speed is not None and not windy and words[speed.index] & {"speed", "velocity", "vel"}:
+            found.warnings.append(
+                f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind"
+            )
+        afloat = [name for name, said in zip(found.layout.names, words, strict=True) if said & _VESSEL]
+        afloat = afloat or list(filter(None, [own_motion.carried(found.layout)]))
+        relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
+        if speed is not None and afloat and not relative:
+            found.warnings.append(
+                f"{afloat[0]!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over "
+                "ground or apparent wind: taken as over ground"
+            )
+
+
+def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
+    """The units that the column next to a column of numbers spells, where they change from row to row."""
+    if index + 1 >= layout.number_of_columns():
+        return ()
+    cells = sorted({cell for cell in layout.column(index + 1) if cell})
+    names = {spelled(cell) for cell in cells[:50]}
+    return tuple(cells) if len(names) > 1 and None not in names else ()
+
+
+def _day_of_month(layout: Layout, index: int) -> bool:
+    """Whether a column DD stands in a date written in parts, so that it is no direction."""
+    names = [name.strip().upper() for name in layout.names]
+    if names[index] not in ("DD", "D"):
+        return False
+    before, after = names[index - 1] if index else "", names[index + 1] if index + 1 < len(names) else ""
+    return before in ("MM", "MO", "M", "MONTH") or after.startswith("HH")
+
+
+def named_wind(
+    layout: Layout, column: str, *, time: Sequence[int], told: str | None
+) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
+    """The anemometer whose speed is in the column that the user names by heading or number, if any, and what is odd.
+
+    Its direction is the one that the table holds, where no other speed may be that direction's.
+    """
+    indices = [index for index, name in enumerate(layout.names) if name == column]
+    if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
+        indices = [int(column) - 1]
+    if len(indices) != 1 or layout.names[indices[0]] in beaufort(layout):
+        return (), ()
+    name = layout.names[indices[0]]
+    stated = understand(name, layout.units[indices[0]])
+    known = stated.unit if fits("wind_speed", stated.unit) else None
+    odd = (_otherwise(name, known, told),) if told is not None and known is not None and told != known else ()
+    how = f"in {told}, as you said" if told else f"in {known} by its heading" if known else ""
+    speed = Column(index=indices[0], unit=told or known, told=how)
+    found = _gathered(layout, time)
+    columns = {"wind_speed": speed}
+    if len(found.of("wind_direction")) == 1 and not [at for at in found.of(*SPEEDS) if at != indices[0]]:
+        beside = _direction(found, indices[0], "wind_direction")
+        columns |= {} if beside is None else {beside[0]: beside[1]}
+    return (Wind(label=column, height=stated.height, columns=columns, sure=True),), odd
+
+
+def _otherwise(name: str, stated: str, told: str) -> str:
+    return f"the heading of {name!r} states {stated}; taken as {told}, as you said"
+
+
+def _column(found: _Found, index: int, channel: str, told: str | None) -> Column:
+    """A column of a speed with its unit."""
+    stated = found.headings[index].unit
+    stated = stated if fits(channel, stated) else None
+    if told is None or told == stated:
+        return Column(index=index, unit=stated, told="" if stated is None else f"in {stated} by its heading")
+    if stated is not None:
+        name = found.layout.names[index]
+        found.warnings.append(_otherwise(name, stated, told))
+    return Column(index=index, unit=told, told=f"in {told}, as you said")
+
+
+def _speeds(found: _Found, told: str | None) -> list[Wind]:
+    groups: dict[tuple[object, ...], dict[str, list[int]]] = {}
+    for index in found.of(*SPEEDS):
+        groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, []).append(index)
+    named = [i for i in found.of(*SPEEDS) if found.headings[i].sure]
+    moving = {word for name in found.layout.names for word in words_of(name)} & _POSITIONS
+    winds: list[Wind] = []
+    for by_channel in groups.values():
+        if named and not any(found.headings[i].sure for indices in by_channel.values() for i in indices):
+            found.remarks.extend(
+                f"column {found.layout.names[i]!r} is in {found.headings[i].unit}, but nothing says that it is a wind"
+                for indices in by_channel.values() for i in indices
+            )  # fmt: skip
+            continue
+        kept = {channel: _distinct(found, indices) for channel, indices in by_channel.items()}
+        for at in range(max(map(len, kept.values()))):
+            speeds = {channel: indices[at] for channel, indices in kept.items() if at < len(indices)}
+            # The user's unit is that of the speeds without one, where others of the table state theirs.
+            open_ones = [index for index in speeds.values() if not fits("wind_speed", found.headings[index].unit)]
+            columns = {
+                channel: _column(found, index, channel, told if not open_ones or index in open_ones else None)
+                for channel, index in speeds.items()
+            }
+            first = next(iter(speeds.values()))
+            for channel, index in speeds.items():
+                towards = _direction(found, index, _DIRECTION_OF[channel])
+                if towards is not None:
+                    columns[towards[0]] = towards[1]
+            said = set(words_of(found.layout.names[first]))
+            lone = bool(said & {"speed", "spd", "velocity", "vel"}) and not any("wind" in word for word in said)
+            winds.append(Wind(
+                label=found.name(first), height=found.headings[first].height, columns=columns,
+                sure=found.headings[first].sure and not (lone and moving),
+            ))  # fmt: skip
+    if any(wind.sure for wind in winds):
+        found.remarks.extend(
+            f"column {wind.label!r} is a speed, but beside positions nothing says that it is the wind's: left out"
+            for wind in winds if not wind.sure
+        )  # fmt: skip
+        winds = [wind for wind in winds if wind.sure]
+    return winds
+
+
+def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
+    """Those of columns with the same words that are readings of their own: not another unit, not the mean of one."""
+    order = sorted(
+        indices, key=lambda i: (found.headings[i].unit is None, found.headings[i].mean, found.headings[i].unit != "m/s")
+    )
+    kept: list[int] = []
+    for index in order:
+        heading = found.headings[index]
+        same = next((other for other in kept if _same(found, index, other)), None)
+        if same is None and _marks_quality(found, index, indices):
+            found.remarks.append(f"column {found.name(index)!r} holds marks of another column of its name: left out")
+        elif same is None:
+            kept.append(index)
+        else:
+            found.remarks.append(
+                f"column {heading.name!r} is {found.layout.names[same]!r} again, averaged or in another unit"
+            )
+    return sorted(kept)
+
+
+def _marks_quality(found: _Found, index: int, indices: Sequence[int]) -> bool:
+    """Whether a column holds one or two whole numbers, where another of the same name holds more."""
+    name = found.layout.names[index]
+    kinds = {
+        i: np.unique(found.values[i][np.isfinite(found.values[i])]) for i in indices if found.layout.names[i] == name
+    }
+    own = kinds[index]
+    return len(own) <= 2 and bool(np.all(own % 1 == 0)) and any(len(other) > 2 for other in kinds.values())
+
+
+def _same(found: _Found, index: int, other: int) -> bool:
+    one, two = found.headings[index], found.headings[other]
+    if one.mean != two.mean:
+        return True
+    if one.unit is None or two.unit is None or one.unit == two.unit:
+        return False
+    ratio = found.values[index] * unit(one.unit).scale, found.values[other] * unit(two.unit).scale
+    return bool(np.nanmedian(np.abs(ratio[0] - ratio[1])) <= 0.1 * np.nanmedian(np.abs(ratio[0])) + 0.3)
+
+
+def _components(found: _Found, told: str | None) -> list[Wind]:
+    groups: dict[tuple[object, ...], dict[str, int]] = {}
+    for index in found.of(*COMPONENTS):
+        groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, index)
+    winds: list[Wind] = []
+    speeds = found.of("wind_speed")
+    for key, indices in groups.items():
+        if not {"wind_x", "wind_y"} <= set(indices):
+            continue
+        if any(found.key(index) == key for index in speeds):
+            names = ", ".join(found.layout.names[index] for index in indices.values())
+            found.remarks.append(f"components {names} are left out beside the speed")
+            continue
+        columns = {
+            channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices
+        }
+        first = indices["wind_x"]
+        own = [
+            at for at in found.of("wind_direction") if found.headings[at].height in (None, found.headings[first].height)
+        ]
+        if own and not speeds:
+            names = ", ".join(repr(found.name(at)) for at in own)
+            fix = "to read it and the speed of its own column, say what the columns are (--columns)"
+            found.remarks.append(f"the direction {names} is left out beside the components; {fix}")
+        if found.of_earth:
+            found.warnings.append(
+                "the headings name components of north and east: taken as towards which the wind blows"
+            )
+        winds.append(Wind(
+            label=found.name(first), height=found.headings[first].height, columns=columns,
+            sure=found.headings[first].sure, of_earth=found.of_earth,
+        ))  # fmt: skip
+    return winds
+
+
+def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | None:
+    """The direction that belongs to a speed, as a channel and a column."""
+    candidates = found.of(channel)
+    exact = [index for index in candidates if found.key(index) == found.key(speed)]
+    height = found.headings[speed].height
+    near = [i for i in candidates if height is not None and found.headings[i].height is not None
+            and abs(float(found.headings[i].height or 0) - height) <= max(5.0, 0.15 * height)]  # fmt: skip
+    near.sort(
+        key=lambda i: (
+            abs(float(found.headings[i].height or 0) - float(height or 0)),
+            found.headings[i].label != found.headings[speed].label,
+        )
+    )
+    own = found.key(candidates[0]) if len(candidates) == 1 else ()
+    of_another = bool(own[:-1]) and own != found.key(speed) and any(found.key(i) == own for i in found.of(*SPEEDS))
+    of_another = of_another or (len(candidates) == 1 and _numbered_otherwise(found, speed, candidates[0]))
+    lone = candidates if len(candidates) == 1 and not of_another else []
+    exact = exact or _of_its_number(found, speed, candidates)
+    alike = [index for index in found.of(found.headings[speed].channel) if found.key(index) == found.key(speed)]
+    if len(exact) == len(alike) > 1:
+        exact = [exact[alike.index(speed)]]  # blocks of columns with the same headings, one an instrument
+    plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
+    exact.sort(key=lambda i: (_points(found.headings[i]), found.headings[i].unit is None))
+    chosen = exact or near[:1] or lone or plain
+    if not chosen:
+        if candidates:
+            names = ", ".join(repr(found.layout.names[i]) for i in candidates)
+            found.remarks.append(f"none of the directions {names} is surely that of {found.name(speed)!r}: left out")
+        return None
+    index = next((i for i in chosen if not found.headings[i].magnetic), chosen[0])
+    angles = [i for i in candidates if not _points(found.headings[i]) and not found.headings[i].magnetic]
+    if _points(found.headings[index]) and len(angles) == 1:
+        index = angles[0]  # the same in degrees
+    heading, value = found.headings[index], found.values[index]
+    judged = judge(heading, value, channel)
+    if judged.left_out:
+        found.remarks.append(f"column {heading.name!r} {judged.left_out}")
+        return None
+    if judged.unit is None:
+        return None
+    if judged.doubt:
+        found.warnings.append(f"column {heading.name!r} {judged.doubt}")
+    if heading.magnetic and channel == "wind_direction":
+        channel = "wind_direction_magnetic"
+    told = f"{judged.told}, to which the wind blows" if heading.towards else judged.told
+    return channel, Column(index=index, unit=judged.unit, told=told, towards=heading.towards)
+
+
+def _of_its_number(found: _Found, speed: int, candidates: Sequence[int]) -> list[int]:
+    """The direction that has a speed's number and words of no other (WV2 or Vane 2 beside AN2Speed), if one does."""
+    own = number(found.headings[speed])
+    speeds = [at for at in found.of(found.headings[speed].channel) if number(found.headings[at]) == own]
+    numbered = [at for at in candidates if number(found.headings[at]) == own]
+    if not own or len(speeds) != 1 or len(numbered) != 1:
+        return []
+    heading = found.headings[numbered[0]]
+    return numbered if heading.label == (own,) and heading.height == found.headings[speed].height else []
+
+
+def _numbered_otherwise(found: _Found, speed: int, direction: int) -> bool:
+    """Whether a direction has the number of another speed, and this speed has not (WD2 beside AN1Speed, AN2Speed)."""
+    own = number(found.headings[direction])
+    others = {number(found.headings[at]) for at in found.of(*SPEEDS) if at != speed}
+    return bool(own) and own != number(found.headings[speed]) and own in others
+
+
+def _points(heading: Heading) -> bool:
+    return heading.unit in compass.BY_UNIT
+
+
+def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
+    """The anemometer with temperature, humidity and pressure, each where one column is surely it."""
+    columns = dict(wind.columns)
+    first = next(iter(columns.values())).index
+    for channel in _WEATHER:
+        candidates = found.of(channel)
+        if channel == "sonic_temperature" and "wind_x" not in columns:
+            candidates = [i for i in candidates if found.headings[i].sure]
+        if channel == "sonic_temperature" and "wind_x" in columns:
+            candidates += [i for i in found.of("air_temperature") if words_of(found.layout.names[i])[:1] == ["t"]]
+        if channel == "air_temperature" and "wind_x" in columns:
+            candidates = [i for i in candidates if words_of(found.layout.names[i])[:1] != ["t"]]
+        known = [(i, column) for i in candidates if (column := _weather(found, i, channel)) is not None]
+        exact = [item for item in known if found.key(item[0]) == found.key(first)]
+        plain = [item for item in known if not found.headings[item[0]].label and found.headings[item[0]].height is None]
+        chosen = exact if len(exact) == 1 else plain if len(plain) == 1 else known if len(known) == 1 else []
+        if chosen:
+            columns[channel] = chosen[0][1]
+        elif len(known) > 1 and not many:
+            names = ", ".join(repr(found.layout.names[i]) for i, _ in known)
+            found.remarks.append(f"which of {names} is {channel} is not told: left out")
+    return Wind(
+        label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site, of_earth=wind.of_earth
+    )
+
+
+def _weather(found: _Found, index: int, channel: str) -> Column | None:
+    heading, value = found.headings[index], found.values[index]
+    median = float(np.nanmedian(value))
+    if fits(channel, heading.unit):
+        return Column(index=index, unit=heading.unit, told=f"in {heading.unit} by its heading")
+    guess: str | None = None
+    if heading.unit is None and channel == "relative_humidity" and 1.5 < float(np.nanmax(value)) <= 115:
+        guess = "%"
+    if heading.unit is None and channel == "air_pressure":
+        guess = next((name for name, low, high in _PRESSURES if low <= median <= high), None)
+    if heading.unit is None and channel == "sonic_temperature" and 230 <= median <= 330:
+        guess = "K"
+    if guess is None:
+        remark = f"column {heading.name!r} looks like {channel}, but its unit is not stated: left out"
+        if remark not in found.remarks:
+            found.remarks.append(remark)
+        return None
+    return Column(index=index, unit=guess, told=f"in {guess} by its values, about {median:.4g}")
+
+
+def _check_gusts(found: _Found, winds: Sequence[Wind]) -> None:
+    """Remark gusts whose ratio to the mean no wind has: their units differ."""
+    gusts = [
+        i for i in found.values
+        if found.headings[i].spread and found.headings[i].quantity == "wind_speed"
+        and set(words_of(found.layout.names[i])) & {"gust", "gusts", "max", "maximum", "windgust", "peak"}
+    ]  # fmt: skip
+    for wind in winds:
+        speed = wind.columns.get("wind_speed")
+        mine = [i for i in gusts if speed is not None and found.key(i) == found.key(speed.index)]
+        if speed is None or not mine:
+            continue
+        own, other = unit(speed.unit or "m/s").scale, unit(found.headings[mine[0]].unit or speed.unit or "m/s")
+        if other.si != "m/s":
+            continue
+        ratio = unitcheck.gust_factor(found.values[speed.index] * own, found.values[mine[0]] * other.scale)
+        if ratio is not None:
+            found.warnings.append(
+                f"gusts {found.layout.names[mine[0]]!r} are {ratio:.2g} times the wind {wind.label!r}, which no wind "
+                "is: one of the two is in another unit"
+            )

@@ -1,0 +1,41 @@
+"""Columns of a wind whose numbers are no speeds: counts and volts before a calibration, and Beaufort's classes."""
+
+from __future__ import annotations
+
+import re
+
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.words.headings import understand, words_of
+
+_CLASSES = frozenset({"bft", "beaufort", "bf"})
+_MILLIS = re.compile(r"(?<![^\W_])m[VA](?![^\W_])")
+"""Millivolts and milliamperes, whose capital cuts them in two words."""
+_COUNTED = frozenset(
+    {
+        "hz", "count", "counts", "pulse", "pulses", "ticks", "clicks", "rotations", "revolutions", "rpm", "freq",
+        "frequency", "adc", "v", "mv", "volt", "volts", "voltage", "ma",
+    }
+)  # fmt: skip
+"""Words of what an anemometer gives before its calibration."""
+
+
+def beaufort(layout: Layout) -> tuple[str, ...]:
+    """Headings of columns that hold the wind by Beaufort's scale: numbers of classes, not speeds."""
+    return tuple(name for name in layout.names if set(words_of(name)) & _CLASSES)
+
+
+def counts(layout: Layout) -> tuple[int, ...]:
+    """Columns of what an anemometer counts or gives, its frequency, pulses or volts, which are no speeds yet."""
+    found: list[int] = []
+    beside_vane = any(understand(name).channel == "wind_direction" for name in layout.names)
+    for index, name in enumerate(layout.names):
+        words = set(words_of(name))
+        alone = beside_vane and words <= _COUNTED | {"s", "per"} - {"v", "mv", "volt", "volts", "voltage", "ma"}
+        of_wind = alone or words & {"wind", "anemometer", "anem", "cup", "ws", "windspeed"}
+        if of_wind and (
+            words & (_COUNTED - {"v"})
+            or _MILLIS.search(name)
+            or understand(name, layout.units[index]).strange.lower() in _COUNTED
+        ):
+            found.append(index)
+    return tuple(found)

@@ -1,0 +1,1 @@
+"""What the words of a heading say, in the languages of common loggers."""

@@ -1,0 +1,499 @@
+"""What the heading of a column says: the quantity, whether it is a mean, the unit, the height, and whose it is.
+
+A heading is cut into words at blanks, signs, capitals and digits ("Spd80mN" is spd, 80, m, N). Words of the quantity,
+of the statistic and of the unit are known in the languages of common loggers; what is left tells instruments apart.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from flagdata.errors import FlagdataError
+from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
+from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
+from flagdata.ingest.anemometer.words.languages import in_english
+from flagdata.schema import CHANNELS
+from flagdata.timebase import zone
+from flagdata.units import UNITS, spelled
+
+_WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
+_CAMEL = re.compile(r"[A-ZÀ-ÖØ-Þ]+(?![^\W\d_A-ZÀ-ÖØ-Þ])|[A-ZÀ-ÖØ-Þ]?[^\W\d_A-ZÀ-ÖØ-Þ]+|[^\W\d_]+")
+_BRACKET = re.compile(r"[\[(<{]([^\])>}]*)[\])>}]")
+_HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
+_INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
+_ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
+
+_TOWARDS = re.compile(
+    r"\btowards?\b|\bblowing to\b|\bto dir|\bgoing to\b|\bdir(?:ection)? to\s*(?:[\[(]|$)", re.IGNORECASE
+)
+_PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
+WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
+"""Words of the wind."""
+_SPEED = frozenset(
+    {
+        "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
+        "windgeschwindigkeit", "vit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
+        "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
+        "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
+    }
+)  # fmt: skip
+_DIRECTION = frozenset(
+    {
+        "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
+        "dd", "vane", "wvane", "windvane", "angle", "direccion", "dirección", "direção", "direcao", "richting",
+        "windrichting", "direzione", "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire",
+        "deg", "winddeg", "azimuth", "bearing",
+    }
+)  # fmt: skip
+_SURE_DIRECTION = _DIRECTION - {"angle", "deg", "azimuth", "bearing", "dd", "vane"}
+"""Words that mean a direction whatever unit stands behind them."""
+COURSES = frozenset({"heading", "course"})
+"""Words of the wind's direction that leave open whether it blows from or to it."""
+VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", "vertikale", "vertic"})
+"""Words of the component of the wind upwards, which is no speed of wind."""
+_OTHER = frozenset(
+    {
+        "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "sos",
+        "rotor", "radial", "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
+        "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
+        "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
+        "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
+        "load", "density", "elevation", *VERTICAL, "gyro", "acc", "accel", "course", "heading", "track", "duration",
+        "id", "unit", "units",
+    }
+)  # fmt: skip
+_SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
+    {
+        "std", "sd", "sdev", "stdev", "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov",
+        "covariance", "peak", "lull", "hi", "high", "low", "lo", "ti", "turbulence", "flag", "flags", "qc", "quality",
+        "qf", "qa", "err", "error", "diag", "diagnostic", "status", "skew", "skewness", "kurt", "kurtosis",
+        "windgustdir", "windrun", "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples",
+        "percentile", "trend", "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast",
+        "threshold", "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr",
+        "setpoint", "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
+        "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
+    }
+)  # fmt: skip
+_AXES = frozenset(
+    {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down"}
+)
+"""Words of a component of the wind along an axis of the Earth, which is no speed of wind."""
+_MEAN = frozenset(
+    {
+        "avg", "average", "mean", "ave", "av", "moy", "moyen", "moyenne", "promedio", "mittel", "mittelwert", "media",
+        "medio", "smp",
+    }
+)  # fmt: skip
+_PLAIN = frozenset(
+    {
+        "sensor", "value", "instant", "instantaneous", "inst", "current", "latest", "horizontal", "hor", "data",
+        "measured", "raw", "the", "of", "in", "s", "wvt", "d", "u", "at", "ch", "channel", "sonic", "anemometer",
+        "anem", "smp", "true", "mag", "magnetic", "outdoor", "out", "from", "north", "wind", "cup", "vane", "station",
+        "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
+    }
+)  # fmt: skip
+_APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd", "app", "apparente", "bow"})
+_THEORETICAL = frozenset({"tws", "twa", "theoretical"})
+_ABBREVIATED = {
+    "aws": "apparent_wind_speed", "awa": "apparent_wind_direction", "awd": "apparent_wind_direction",
+    "tws": "theoretical_wind_speed", "twa": "theoretical_wind_direction",
+}  # fmt: skip
+_NO_AIR = frozenset(
+    {
+        "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger",
+        "battery", "batt", "panel", "internal", "int", "indoor", "case", "board", "cpu", "virtual", "surface", "water",
+        "sea", "heat",
+        "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
+        "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
+        "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",
+        "gyro", "mpu", "w", "wt",
+        "wtemp", "watertemp", "therm", "thermistor",
+    }
+)  # fmt: skip
+_TEMPERATURE = frozenset(
+    {"temp", "temperature", "temperatur", "température", "temperatura", "tair", "airt", "airtemp", "tmp", "tamb", "ta"}
+)
+_HUMIDITY = frozenset({"rh", "hum", "humidity", "humid", "feuchte", "luftfeuchte", "relhum", "humedad", "humidite"})
+_PRESSURE = frozenset(
+    {"press", "pressure", "baro", "barometer", "druck", "luftdruck", "bp", "barometric", "pression", "presion", "pa"}
+)
+_COMPONENTS = {
+    "u": "wind_x", "v": "wind_y", "w": "wind_z", "ux": "wind_x", "uy": "wind_y", "uz": "wind_z", "vx": "wind_x",
+    "vy": "wind_y", "vz": "wind_z", "x": "wind_x", "y": "wind_y", "z": "wind_z",
+}  # fmt: skip
+_INSIDE = {
+    "ms": "m/s", "mps": "m/s", "kmh": "km/h", "kph": "km/h", "kts": "kn", "kt": "kn", "knots": "kn", "kn": "kn",
+    "sknt": "kn", "mph": "mph", "deg": "deg", "degc": "degC", "degf": "degF", "c": "degC", "f": "degF", "hpa": "hPa",
+    "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
+}  # fmt: skip
+"""Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
+_NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
+"""What stands in brackets behind a direction for the north it is from."""
+_TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
+_RATE = re.compile(r"(?<![\d.])\d+(?:\.\d+)?\s?k?Hz(?![^\W_])", re.IGNORECASE)
+"""The rate of samples in a heading ("u_20Hz"), which is no unit."""
+_OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
+_GLUED = re.compile(r"(?:speed|velocity|wind|gust)(?P<unit>km[/._]h|m[/._]s)$", re.IGNORECASE)
+_U_SONIC = re.compile(r"\bu[- ]?sonic\b", re.IGNORECASE)  # an ultrasonic anemometer, as METOS writes; no component u
+"""How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
+_TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
+"""What a heading says of numbers that are ten or a hundred times the quantity, or a tenth: it is to be asked."""
+_TURNED = re.compile(r"\bccw\b|counter.?clock|anti.?clock|from east|mathemat|\bmath\b", re.IGNORECASE)
+"""What a heading says of an angle that is not clockwise from north."""
+_SENSORS = frozenset(
+    {"csat", "csat3", "sonic", "sat", "metek", "gill", "young", "wind", "comp", "component", "hs", "wm"}
+)
+
+
+_YEARS = frozenset({"yyyy", "aaaa", "jjjj", "yy", "aa", "åååå"})
+_DATE_PARTS = frozenset({"mm", "mmm", "dd", "gg", "jj", "tt", "hh", "ss", "sss", "mi", "nn", "t", "z", "min", "sec"})
+"""Parts of a format of a stamp as headings write it, in several languages."""
+_PARTS_OF_DATE = 3
+"""Parts from which such words are a format: year, month and day."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heading:
+    """What a heading says.
+
+    Attributes:
+        name: as written.
+        channel: of `schema.CHANNELS`; "" where it names none that a log of wind has, and for spreads and extremes.
+        sure: whether it names the channel; false where only the unit speaks for it.
+        spread: whether it is a maximum, gust, deviation, count or mark, of whatever quantity.
+        quantity: the channel that a spread belongs to, else `channel`.
+        mean: whether it says that it is a mean.
+        unit: the table's name of the unit it states, of whatever quantity; `None` where it states none.
+        height: above ground [m].
+        label: words that tell instruments apart, lower-case.
+        magnetic: of a direction, whether it is from magnetic north.
+        towards: of a direction, whether the wind blows to it.
+        misstated: the unit of a speed that the heading of a direction states by mistake; "" where it does not.
+        strange: what stands in brackets where a unit does, but spells none that is known, or how an angle is turned
+            that is not clockwise from north; "" where nothing does.
+    """
+
+    name: str
+    channel: str
+    sure: bool
+    spread: bool
+    quantity: str
+    mean: bool
+    unit: str | None
+    height: float | None
+    label: tuple[str, ...]
+    magnetic: bool = False
+    towards: bool = False
+    misstated: str = ""
+    strange: str = ""
+
+
+@lru_cache(maxsize=4096)
+def understand(name: str, stated: str = "") -> Heading:
+    """What the heading `name` says, with the cell `stated` of a line of units below it."""
+    text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
+    text = _RATE.sub(" ", text)
+    text = _U_SONIC.sub("sonic", _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text)))
+    tenfold = _TENFOLD.search(text)
+    text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"
+    text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
+    north = _NORTH_BEHIND.search(text) if re.search(r"dir|bearing|wd", text, re.IGNORECASE) else None
+    text = text if north is None else text[: north.start()]
+    rest, unit = _unit(text, stated)
+    height = _height(rest)
+    bare = _HEIGHT.sub(" ", rest) if height is not None else rest
+    bare, averaged = _INTERVAL.subn(" ", bare.replace("_", " "))
+    words = _words(bare)
+    if tenfold is not None:
+        unit = None
+    elif unit is None:
+        unit = next((_INSIDE[word] for word in words[1:] or words if word in _INSIDE and word != "deg"), None)
+        unit = "deg" if unit is None and "deg" in words[1:] else unit
+        words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
+    known = set(words)
+    compact = "".join(words)
+    spread = bool(known & _SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
+    misstated = _misstated(known, unit)
+    unit = None if misstated else unit
+    quantity, sure, used = _quantity(words, compact, unit, rest)
+    courses = {"course", "heading"} if known & WIND else {"course"}
+    if quantity and known & _OTHER and not (quantity.endswith("direction") and known & courses):
+        allowed = VERTICAL if quantity == "wind_z" else {"scalar"} if "sonic" in known else frozenset()
+        excluded = known & _OTHER - allowed
+        if "wind" in quantity and excluded:
+            quantity, sure = "", False
+    if quantity == "wind_speed" and len(along := known & {"x", "y", "z"}) == 1:
+        quantity, sure = _COMPONENTS[next(iter(along))], bool(known & WIND)
+    if quantity.endswith("wind_speed") and known & _AXES:
+        quantity, sure = "", False
+    left = list(words)
+    for word in used:
+        left.remove(word)
+    label = tuple(word for word in left if word not in _MEAN | _SPREAD | _PLAIN | WIND)
+    return Heading(
+        name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
+        mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
+        magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
+        towards=bool(_TOWARDS.search(text.replace("_", " "))), misstated=misstated,
+        strange=tenfold[0].strip() if tenfold is not None
+        else turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
+    )  # fmt: skip
+
+
+def interest(name: str) -> int:
+    """How much a cell looks like the heading of a time (2), a wind (2) or another channel (1)."""
+    heading = understand(name)
+    if heading.unit is not None and _known(name.strip("[]()")) is not None:
+        return 0
+    if names_time(name):
+        return 1 if name.strip().upper() == "TS" else 2
+    if not heading.quantity or not heading.sure:
+        return 0
+    return 2 if "wind" in heading.quantity else 1
+
+
+def names_time(name: str) -> bool:
+    """Whether a heading names a time or a date."""
+    words = set(words_of(name))
+    known = {
+        "time", "timestamp", "date", "datetime", "datum", "uhrzeit", "zeit", "zeitstempel", "fecha", "hora", "heure",
+        "horodatage", "stamp", "epoch", "unixtime", "unix", "millis", "milliseconds", "seconds", "elapsed", "ts",
+        "utc", "tijd", "tid", "dato", "data", "dt", "timestamps", "isotime", "when", "year", "month", "day", "hour",
+        "doy", "jday", "tstamp", "ora", "tmstamp", "dateutc", "ms", "observed", "obs",
+    }  # fmt: skip
+    if is_format(name):
+        return True
+    labview = name.strip() == "X_Value"
+    return bool(words & known) or labview or bool(re.search(r"time|date", "".join(words)))
+
+
+def is_format(name: str) -> bool:
+    """Whether a heading is the format of the stamps below it, such as "yyyy-mm-dd hh:mm" or "JJ/MM/AAAA"."""
+    parts = re.findall(r"[^\W\d_]+", name.lower())
+    year = any(part in _YEARS for part in parts)
+    return len(parts) >= _PARTS_OF_DATE and year and all(part in _YEARS | _DATE_PARTS for part in parts)
+
+
+def zone_of(name: str) -> str | None:
+    """The zone that the heading of a time states: "UTC", or an offset."""
+    place = _PLACE.search(name)
+    if place is not None and _is_zone(place[0]):
+        return place[0]
+    found = _ZONE.search(re.sub(r"_", " ", name))
+    if found is None and re.search(r"utc|gmt", name, re.IGNORECASE):
+        return "UTC"
+    if found is None:
+        short = re.search(r"(?<![A-Za-z])([A-Z]{3,4})\W*$", name.replace("_", " "))
+        hours = ABBREVIATED.get(short[1]) if short is not None else None
+        return None if hours is None else f"{hours:+03d}:00"
+    if not found[1]:
+        return "UTC"
+    sign, digits = found[1][0], found[1][1:].strip().replace(":", "")
+    hours, minutes = (digits[:-2], digits[-2:]) if len(digits) > 2 else (digits, "00")
+    return f"{sign}{int(hours):02d}:{minutes}"
+
+
+def _is_zone(name: str) -> bool:
+    try:
+        zone(name)
+    except FlagdataError:
+        return False
+    return True
+
+
+_SPEED_AND_UNIT = re.compile(r"(\w*(?:speed|spd|gust|velocity))(mph|kmh|kph|kts|knots|mps)")
+"""A speed with its unit in one word, as "windspeedmph"."""
+
+
+def words_of(name: str) -> list[str]:
+    """Words of a heading, lower-case."""
+    return _words(in_english(name))
+
+
+def _words(text: str) -> list[str]:
+    found: list[str] = []
+    for word in _WORD.findall(text.replace("µ", "u")):
+        if word[0].isdigit():
+            found.append(word)
+        elif word.isupper() or word.islower():
+            joined = _SPEED_AND_UNIT.fullmatch(word.lower())
+            found.extend(joined.groups() if joined is not None else (word.lower(),))
+        else:
+            parts = [part.lower() for part in _CAMEL.findall(word)]
+            found.extend(parts)
+    return found
+
+
+def _strange(text: str) -> str:
+    """What stands in brackets at the end of a heading as a unit does, such as "gon" or "V"."""
+    found = re.search(r"[\[(<{]\s*([^\W\d_]{1,4})\s*[\])>}]\s*$", text)
+    return found[1] if found is not None and "°" not in text else ""
+
+
+def _height(text: str) -> float | None:
+    found = _HEIGHT.findall(text.replace("_", " "))
+    return float(found[0]) if len(found) == 1 and 0 < float(found[0]) <= 500 else None
+
+
+def _unit(text: str, stated: str) -> tuple[str, str | None]:
+    """The heading without its unit, and the unit."""
+    below = _known(stated.strip().strip("[]()<>"))
+    if len(text) > 1 and below is None and (whole := _known(text)) is not None:
+        return text, whole
+    for found in _BRACKET.finditer(text):
+        inside = _known(re.sub(r"^\s*units?\s*[=:]\s*|[\"']", "", found[1]))
+        if inside is not None:
+            return text[: found.start()] + " " + text[found.end() :], inside
+    # HOBO writes the serial numbers of logger and sensor in brackets: they tell no instruments of one file apart.
+    text = re.sub(r"\([^)]*\b(?:S/N|LGR|SEN)\b[^)]*\)?", "", text).strip()
+    if below is not None:
+        return text, below
+    mangled = re.search(r"\.+((?:X\.)?(?:m\.s|km\.h|mph|kn|kts|knots|m\.s\.1|deg|C|hPa|mbar))\.*$", text)
+    if mangled is not None and (inside := _known(mangled[1].replace(".1", "-1").replace(".", "/"))) is not None:
+        return text[: mangled.start()], inside
+    glued = _GLUED.search(text)
+    if glued is not None and (inside := _known(re.sub(r"[._]", "/", glued["unit"]))) is not None:
+        return text[: glued.start("unit")], inside
+    pieces = re.split(r"(\s*,\s*|\s+|_|;|:|-(?=[a-zA-Z]))", text)
+    for count in (5, 3, 1):
+        # At the end ("wind_speed_km_h", "Wind Speed, m/s") and at the beginning ("m/s Wind Speed").
+        if len(pieces) > count:
+            for part, others in ((pieces[-count:], pieces[:-count]), (pieces[:count], pieces[count:])):
+                joined = "".join(part)
+                if count > 1 and not re.search(r"[\d/]|per|m_s|km_h|deg|kilo|m[ _]s", joined, re.IGNORECASE):
+                    continue
+                for way in (joined, re.sub(r"[_ ]", "/", joined), re.sub(r"[_ ]", "", joined)):
+                    inside = _known(way)
+                    if inside is not None and inside not in ("m", "s", "Hz", "px", "1", "ft", "cm", "mm", "K", "rad"):
+                        return "".join(others), inside
+    return text, None
+
+
+def _known(words: str) -> str | None:
+    """The table's name of a unit, where a text spells one; "ms" is metres a second in a log of wind."""
+    text = words.strip().strip(".").strip()
+    if not text or len(text) > 40:
+        return None
+    if text.lower() in ("ms", "m/s/1", "m_s"):
+        return "m/s"
+    if text.lower() == "km/h/1":
+        return "km/h"
+    return spelled(text)
+
+
+def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tuple[str, bool, set[str]]:
+    """The channel, whether the words name it (or only the unit does), and the words that do."""
+    known = set(words)
+    si = UNITS[unit].si if unit is not None else None
+    windy = bool(known & WIND) or compact.startswith(("wind", "wnd"))
+    if words[:1] == ["w"] and words[1:2] and words[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
+        windy = True
+    component = _component(words, si)
+    if component is not None:
+        return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
+    if known & WIND and si in (None, "rad") and known & COURSES and not known - WIND - _MEAN - COURSES - {"deg"}:
+        return "wind_direction", True, known & COURSES
+    if si in (None, "rad", "1") or windy:
+        away = known & _DIRECTION
+        if (away or re.search(r"wind?.?dir|windricht|wind_?ri\b|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
+            sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane", "wvane"}) or "dir" in compact
+            if away and away <= {"deg", "azimuth", "bearing", "angle"} and not windy and not known & {"awa", "twa"}:
+                return "", False, set()
+            return _by_platform(known, "direction"), sure, known & (_DIRECTION | _APPARENT | _THEORETICAL)
+        if si == "rad" and windy and not known - WIND - _MEAN - _PLAIN:
+            return _by_platform(known, "direction"), True, known & WIND
+    if si in (None, "m/s"):
+        for word, channel in _ABBREVIATED.items():
+            if word in known and (si == "m/s") <= channel.endswith("speed"):
+                return channel, True, {word}
+        named = known & _SPEED or (known & {"strength"} if windy else set())
+        if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
+            return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
+        if windy and len(known - WIND - _MEAN - _PLAIN) == 0:
+            return "wind_speed", True, known & WIND
+        if _of_a_cup(words):
+            return "wind_speed", True, {"cup"}
+        if known >= {"sonic", "scalar"} and not known & (_TEMPERATURE | _HUMIDITY | _PRESSURE):
+            return "wind_speed", True, {"scalar"}  # the mean of a sonic's speeds, beside that of its vectors
+    if si in (None, "rad") and known & {"awa", "twa", "awd"}:
+        word = next(iter(sorted(known & {"awa", "twa", "awd"})))
+        return _ABBREVIATED[word], True, {word}
+    if si == "m/s" and not known & _OTHER:
+        return "wind_speed", False, set()
+    return _weather(words, compact, si, windy)
+
+
+def _of_a_cup(words: list[str]) -> bool:
+    """Whether a heading names a cup anemometer, and beside it its height, side or statistic alone ("Cup116m_Mean")."""
+    known = {word for word in words if len(word) > 2 and not word.isdigit()}
+    return "cup" in known and known <= {"cup", *_MEAN, *_SPREAD, *_PLAIN, "north", "east", "south", "west"}
+
+
+def _misstated(known: set[str], unit: str | None) -> str:
+    """The unit of a speed behind words that are of a direction alone; "" where there is none."""
+    if unit is None or UNITS[unit].si != "m/s" or known & (_SPEED | _OTHER | _COMPONENTS.keys()):
+        return ""
+    return unit if known & _SURE_DIRECTION else ""
+
+
+def _component(words: list[str], si: str | None) -> str | None:
+    if si not in (None, "m/s"):
+        return None
+    core = [word for word in words if word not in _MEAN and not word.isdigit()]
+    head = [word for word in core if word not in _SENSORS]
+    if head and head[0] in ("u", "v", "w") and head[1:2] and head[1] in ("x", "y", "z"):
+        return _COMPONENTS[head[1]]
+    if head and head[-1] in _COMPONENTS and "wind" in words and set(head[:-1]) <= {"speed", "vel", "velocity"}:
+        return _COMPONENTS[head[-1]]
+    if not head or head[0] not in _COMPONENTS:
+        return None
+    if head[0] == "w" and head[1:2] and head[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
+        return None
+    if head[0] in ("x", "y", "z", "vx", "vy", "vz") and not set(core) & {"wind", "sonic", "csat"}:
+        return None
+    if "star" in head or (len(head) > 1 and head[1] in _COMPONENTS):
+        return None
+    return _COMPONENTS[head[0]]
+
+
+def _by_platform(known: set[str], quantity: str) -> str:
+    if quantity == "direction" and "angle" in known and known & {"true", "réel", "reel", "real"}:
+        return "theoretical_wind_direction"  # an angle of the true wind is from the bow
+    if known & _APPARENT:
+        return f"apparent_wind_{quantity}"
+    if known & _THEORETICAL:
+        return f"theoretical_wind_{quantity}"
+    return f"wind_{quantity}"
+
+
+def _weather(words: list[str], compact: str, si: str | None, windy: bool) -> tuple[str, bool, set[str]]:
+    known = set(words)
+    if windy:
+        return "", False, set()
+    sonic = bool(known & {"sonic", "son", "acoustic", "tsonic", "ts", "tson", "csat", "tv"})
+    warm = (
+        known & _TEMPERATURE or re.search(r"temp|^t$|^t\d+$|^tair", compact) or (words[:1] == ["t"] and len(words) > 1)
+    )
+    if si in (None, "K") and sonic and (warm or known & {"ts", "tsonic", "tson"}):
+        # TS is a sonic's among u, v and w, the soil's in ICOS's and AmeriFlux's tables.
+        said = bool(known & {"sonic", "son", "acoustic", "tsonic", "tson", "csat"})
+        return "sonic_temperature", said, known & {"sonic", "ts", "temp", "temperature", "t", "tsonic"}
+    if si in (None, "K") and (warm or (si == "K" and not known)) and not known & _NO_AIR and "dew" not in compact:
+        return "air_temperature", True, (known & _TEMPERATURE) or (known & {"t"})
+    if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not known & _NO_AIR:
+        return "relative_humidity", True, known & _HUMIDITY
+    pressed = known & _PRESSURE or re.search(r"press|baro|^p$|^p\d+$", compact)
+    if (
+        si in (None, "Pa")
+        and pressed
+        and not known & {"sea", "msl", "slp", "qnh", "vapor", "vapour", "box", "cell", "mslp"}
+    ):
+        return "air_pressure", True, known & (_PRESSURE | {"p"})
+    return "", False, set()
+
+
+def fits(channel: str, unit: str | None) -> bool:
+    """Whether a unit is one of a channel's quantity."""
+    return unit is not None and UNITS[unit].si == CHANNELS[channel].unit
