@@ -11,6 +11,7 @@ from importlib.metadata import version
 from itertools import islice
 from typing import Any, cast
 
+import dask.config
 from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
 from distributed.utils import silence_logging_cmgr
@@ -23,6 +24,9 @@ _POLL = 0.05  # s
 _LOOK = 1.0  # s, from one look at who works to the next
 PATIENCE = 120.0
 """How long jobs wait where nobody works, before that is an error [s]."""
+_LARGEST = {"distributed.admin.large-graph-warning-threshold": "1 TiB"}
+"""A job carries the mesh sequence that it films, 70 MiB for ten minutes: it is sent once, to the one worker that films
+it, so that Dask's advice to share it among jobs is of no use to anybody."""
 _AGAIN = "then give the command again: it goes on from the last commit"
 
 _OF_WORKERS = {
@@ -180,7 +184,8 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
     def fill() -> None:
         """Workers may come and go meanwhile."""
         for function, arguments in islice(waiting, max(0, max(1, threads(client)) * _AHEAD - running.count())):
-            running.add(client.submit(function, *arguments, pure=False))
+            with dask.config.set(_LARGEST):
+                running.add(client.submit(function, *arguments, pure=False))
 
     try:
         fill()

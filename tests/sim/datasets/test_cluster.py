@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
 import pytest
 
-from sim.datasets.cluster import connected
+from sim.datasets.cluster import connected, results
 
 
 def test_workers_keep_their_memory_and_take_one_thread_each(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,3 +20,10 @@ def test_workers_keep_their_memory_and_take_one_thread_each(monkeypatch: pytest.
     assert found == ["1", str(2**30), str(2**25)]
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MALLOC_TRIM_THRESHOLD_" not in os.environ
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_job_may_carry_a_long_mesh_sequence_without_a_word_of_dask() -> None:
+    positions = np.zeros(3_000_000)  # 24 MB; Dask warns from 10 MiB on
+    with connected(None, workers=1) as client:
+        assert list(results(client, [(np.sum, [positions])], say=lambda _: None)) == [0.0]
