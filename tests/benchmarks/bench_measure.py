@@ -34,7 +34,6 @@ _RATE = 25
 _WINDOWS = 6
 _RUNS = 5
 _BUDGET = 50
-_FALSE_ALARM = 0.05
 _SIZE = FlagSize(length=1.5, height=1.0)
 
 
@@ -95,7 +94,7 @@ def _stages(film: Film, shipped: Network) -> dict[str, float]:
     """Seconds of the gate's preparation and of all six windows; of one window, of its maps, network and checks."""
     model, options = shipped.estimator, Options(size=_SIZE)
     begun = time.perf_counter()
-    gate = gate_beside(shipped, false_alarm=_FALSE_ALARM)
+    gate = gate_beside(shipped, false_alarm=options.false_alarm)
     prepared = time.perf_counter()
     clip = np.stack([frame for _, frame in film.frames(0.0, film.duration)])[: model.front_end.frames]
     read = time.perf_counter()

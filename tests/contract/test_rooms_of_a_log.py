@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.contract.imports import imported_names
+
 HOUSE = Path(__file__).resolve().parents[2] / "flagdata" / "ingest" / "anemometer"
 PACKAGE = "flagdata.ingest.anemometer"
 ROOMS = (
@@ -23,14 +25,11 @@ def room_of(path: Path) -> str:
 
 def imported_rooms(source: str) -> set[str]:
     """Rooms that a module imports anything of, wherever in it the import stands."""
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            assert node.level == 0, "imports are absolute, so that rooms can be told"
-            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name.removeprefix(f"{PACKAGE}.").partition(".")[0] for name in names if name.startswith(f"{PACKAGE}.")}
+    return {
+        name.removeprefix(f"{PACKAGE}.").partition(".")[0]
+        for name in imported_names(source)
+        if name.startswith(f"{PACKAGE}.")
+    }
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(HOUSE)))

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.contract.imports import imported_names
+
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = (
     "observe", "verdict", "forecasting", "probes", "inference", "nulls", "loop", "report", "closing", "propose",
@@ -20,14 +22,7 @@ MODULES = [(room, path) for room in ROOMS for path in sorted((ROOT / "measure" /
 
 def imported_rooms(source: str) -> set[str]:
     """Rooms that a module imports anything of, wherever in it the import stands."""
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            assert node.level == 0, "imports are absolute, so that rooms can be told"
-            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    parts = [name.split(".") for name in names]
+    parts = [name.split(".") for name in imported_names(source)]
     return {part[1] for part in parts if part[0] == "measure" and len(part) > 1} & set(ROOMS)
 
 

@@ -166,17 +166,17 @@ def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tup
     members = tuple((cast, index, f"{index:032x}") for index in sequences)
     few = replace(recipe, sides=(replace(recipe.sides[0], renders=len(members)),))
     for film in Sequences(recipe=few, side="test", members=members).films():
-        if folder is None:
-            yield _frames(few, film, sequences[film.index])
+        path = None if folder is None else folder / f"{recipe.hash[:32]}-{film.index}.npz"
+        if path is not None and path.exists():
+            with np.load(path) as kept:
+                yield kept["frames"], json.loads(str(kept["stated"]))
             continue
-        path = folder / f"{recipe.hash[:32]}-{film.index}.npz"
-        if not path.exists():
-            frames, stated = _frames(few, film, sequences[film.index])
-            folder.mkdir(parents=True, exist_ok=True)
+        frames, stated = _frames(few, film, sequences[film.index])
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
             np.savez_compressed(part := path.with_suffix(".part.npz"), frames=frames, stated=json.dumps(stated))
             part.replace(path)
-        with np.load(path) as kept:
-            yield kept["frames"], json.loads(str(kept["stated"]))
+        yield frames, stated
 
 
 def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[NDArray[np.uint8], dict[str, Any]]:
