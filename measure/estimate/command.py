@@ -44,8 +44,8 @@ if TYPE_CHECKING:
               help="Level of the intervals.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
 @click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default flow, of flags.")
-@click.option("--refine", type=click.IntRange(min=28), metavar="N",
-              help="Refine the first window by N simulated clips, 28 or more; 50 take minutes.")  # fmt: skip
+@click.option("--refine", type=click.IntRange(min=20), metavar="N",
+              help="Refine the first window by N simulated clips, 20 or more; 50 take minutes.")  # fmt: skip
 @click.option("--cache", type=click.Path(path_type=Path), metavar="FOLDER",
               help="Where simulated clips are kept, so that an interrupted refinement goes on.")  # fmt: skip
 @click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,

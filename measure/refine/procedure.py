@@ -3,8 +3,8 @@
 1. The first θ are draws of the amortised posterior, widened, completed to 17 parameters by the prior.
 2. Each is simulated in replicates and filmed by the target's view; the covariance of the replicates makes the distance,
    and their distance to each other the noise floor.
-3. A linear model of the network's mean logits over the parameters is the likelihood (`measure.refine.metamodel`); it
-   weighs draws of the prior (`measure.refine.posterior`).
+3. A linear model of the network's estimates of wind and area weight over the parameters is the likelihood
+   (`measure.refine.metamodel`); it weighs draws of the prior (`measure.refine.posterior`).
 4. Further θ are draws of that posterior, widened, until the budget is spent, or the nearest θ has reached the floor and
    the wind's interval has settled.
 
@@ -29,7 +29,7 @@ from measure.refine import start
 from measure.refine.distance import ReplicateMetric
 from measure.refine.evaluator import STAGES, Evaluated, Evaluator, fingerprint
 from measure.refine.metamodel import Metamodel, least
-from measure.refine.posterior import Posterior, bending_table, posterior, regressors
+from measure.refine.posterior import REGRESSORS, Posterior, bending_table, posterior, regressors
 from measure.refine.refinement import Interval, Refinement, Round, intervals_of
 from measure.refine.simulator import Simulator
 from measure.refine.space import DIMENSION, WIND, Space
@@ -39,7 +39,6 @@ from models.estimator import Estimator
 from sim.run.recipe import Recipe
 
 OWN = "refine"
-_REGRESSORS = 7  # with the constant, see `measure.refine.posterior.regressors`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +83,7 @@ class Settings:
             )  # fmt: skip
         if self.budget < self.fewest:
             raise InputError(
-                f"{self.budget} evaluations tell no interval of {_REGRESSORS} regressors",
+                f"{self.budget} evaluations tell no interval of {REGRESSORS + 1} regressors",
                 where="budget",
                 fix=f"give at least {self.fewest}",
             )
@@ -92,7 +91,7 @@ class Settings:
     @property
     def fewest(self) -> int:
         """Evaluations of the first round: enough for an interval even if replicates were all alike."""
-        return (least(_REGRESSORS, len(start.TOLD)) + 2) * self.replicates
+        return (least(REGRESSORS + 1, len(start.SUMMARISED)) + 2) * self.replicates
 
 
 def refine(

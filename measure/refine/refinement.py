@@ -17,9 +17,9 @@ from measure.refine.trace import Trace
 
 METHOD = (
     "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in replicates, and "
-    "filmed as the target was. The network's mean logits are regressed on the parameters; the regression's predictive "
-    "Student-t density is the likelihood of the target's (synthetic likelihood, Wood 2010), and weighs draws of the "
-    "prior."
+    "filmed as the target was. What the network tells of wind and area weight is regressed on the parameters; the "
+    "regression's predictive Student-t density is the likelihood of what it tells of the target (synthetic likelihood, "
+    "Wood 2010), and weighs draws of the prior."
 )
 
 

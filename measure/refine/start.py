@@ -21,6 +21,8 @@ from models.restriction import Known
 
 TOLD = ("wind_speed", "density", "bending_scale", "anisotropy")
 """Targets that a network must tell for a refinement to start from it."""
+SUMMARISED = ("wind_speed", "density")
+"""Targets whose estimates summarise a clip: networks tell next to nothing of bending (decision 025)."""
 _POOL = 20_000
 _MARGIN = 1e-3  # of a logit's range: parameters at the very end of theirs have none
 
@@ -41,15 +43,17 @@ def require(estimator: Estimator) -> None:
 
 @torch.no_grad()
 def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the network tells of embeddings (n, d), all learners' side by side: mean logits of `TOLD`, (n, 4).
+    """The network's own estimates of `SUMMARISED` from embeddings (n, d), all learners' side by side: (n, 2).
 
-    The posterior's mean is the summary that loses least for estimating it (Fearnhead and Prangle, Journal of the Royal
-    Statistical Society B 74, 2012); rows that are not finite stay so.
+    Each is a share of its target's range: the logistic function of the posterior's mean logit, which stays finite and
+    nearly linear where the logit itself runs off, at winds near the ends of the range. A posterior's mean is the
+    summary that loses least for estimating it (Fearnhead and Prangle, Journal of the Royal Statistical Society B 74,
+    2012). Rows that are not finite stay so.
     """
     finite = np.isfinite(embedding).all(axis=1)
     names = [target.name for target in estimator.targets]
-    columns = [names.index(name) for name in TOLD]
-    out = np.full((len(embedding), len(TOLD)), np.nan)
+    columns = [names.index(name) for name in SUMMARISED]
+    out = np.full((len(embedding), len(SUMMARISED)), np.nan)
     if not finite.any():
         return out
     rows = torch.from_numpy(embedding[finite]).to(estimator.device).float()
@@ -57,7 +61,7 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
     told: list[Tensor] = []
     for learner, part in zip(estimator.learners, rows.split(widths, dim=1), strict=True):
         told.append(learner.mixture(part).mean() * learner.spread + learner.centre)
-    out[finite] = torch.stack(told).mean(dim=0)[:, columns].double().cpu().numpy()
+    out[finite] = torch.stack(told).mean(dim=0)[:, columns].double().sigmoid().cpu().numpy()
     return out
 
 
@@ -76,7 +80,7 @@ def amortised(
     return found.draws[0][:, [names.index(name) for name in TOLD]].astype(np.float64)
 
 
-def logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
+def _logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
     """Logits of the places of values (…, 4) of `TOLD` in the ranges of the space, much as networks learn them."""
     low, high = _ends(space)
     share = np.clip((values - low) / (high - low), _MARGIN, 1 - _MARGIN)
@@ -91,7 +95,7 @@ def _ends(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def widened(values: NDArray[np.float64], factor: float, space: Space) -> NDArray[np.float64]:
     """Draws (n, 4) of `TOLD` with their logits' deviations from the mean enlarged."""
     low, high = _ends(space)
-    z = logits(values, space)
+    z = _logits(values, space)
     z = z.mean(axis=0) + factor * (z - z.mean(axis=0))
     return low + (high - low) / (1 + np.exp(-z))
 

@@ -100,7 +100,7 @@ def test_the_section_shows_the_answer_the_steps_and_both_in_motion(
 
 def test_a_budget_too_small_for_an_interval_is_refused() -> None:
     with pytest.raises(InputError, match="no interval"):
-        Settings(budget=27)
+        Settings(budget=19)
     with pytest.raises(InputError, match="noise floor"):
         Settings(replicates=1)
 

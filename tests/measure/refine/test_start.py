@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from flagdata.rng import stream
 from flagdata.tables import Range
@@ -30,6 +31,19 @@ def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimat
     assert 0.12 <= draws[:, 1].min() <= draws[:, 1].max() <= 0.125 + 1e-6
     free = start.amortised(estimator, clip, Space.of(recipe), seed=1, draws=200)
     assert np.ptp(free[:, 1]) > 0.01
+
+
+def test_summaries_are_the_networks_own_estimates_as_shares_of_their_ranges(estimator: Estimator) -> None:
+    """The logistic function of the posterior's mean logit, here from 20,000 of its draws."""
+    clips = stream(0, "clips").integers(0, 255, (5, 8, 48, 48), dtype=np.uint8)
+    embedded = estimator.embeddings(estimator.inputs(clips))
+    rows = np.concatenate([torch.cat(embedded, dim=1).double().numpy(), np.full((1, 6), np.nan)])
+    told = start.summaries(estimator, rows)
+    assert told.shape == (6, 2)
+    assert np.isnan(told[-1]).all()
+    drawn = estimator.logits(embedded, seed=1, draws=20_000).mean(dim=1).sigmoid().double().numpy()
+    assert [target.name for target in estimator.targets][:2] == list(start.SUMMARISED)
+    np.testing.assert_allclose(told[:-1], drawn[:, :2], atol=0.01)
 
 
 def test_widening_by_one_changes_nothing(recipe: Recipe) -> None:
