@@ -25,7 +25,13 @@ from sim.run import load
 from sim.run.recipe import Recipe
 
 SCENES = {"density": ("flag-wide",), "fabric_density": ("flag-fabrics", "flag-fabrics-damped")}
-"""Recipes whose ranges are the prior, by the area weight that a model tells: those of the data it was trained on."""
+"""Recipes that are simulated, and whose ranges are searched, by the area weight that a model tells."""
+LEARNED = {
+    "density": {"flag-wide": 3600},
+    "fabric_density": {"flag-wide": 3600, "flag-fabrics": 800, "flag-fabrics-damped": 800},
+}
+"""How many films of which scene such a model learned from (`catalogs/datasets`): the prior of its answer, and so of the
+refined one (decision 020)."""
 RENDERS = "flags"
 """Prior of ζ, where a target's own is not known."""
 
@@ -47,19 +53,34 @@ class Clip:
 
 
 def scenes_of(estimator: Estimator) -> tuple[Recipe, ...]:
-    """Recipes whose ranges are the prior of what a model tells.
+    """Recipes that are simulated to refine what a model tells.
 
     Raises:
         InputError: a model of another kind of cloth.
     """
+    return tuple(load(name) for name in SCENES[_weighed(estimator)])
+
+
+def space_of(estimator: Estimator) -> Space:
+    """The box that is searched for a model, with the prior that it learned.
+
+    Raises:
+        InputError: a model of another kind of cloth.
+    """
+    parts = [(Space.of(load(name)), float(films)) for name, films in LEARNED[_weighed(estimator)].items()]
+    return Space.of(scenes_of(estimator)[0]).learned(parts)
+
+
+def _weighed(estimator: Estimator) -> str:
+    """The area weight that a model of flags tells, a key of `SCENES`."""
     names = estimator.learners[0].scaling.names
-    found = [scene for target, scene in SCENES.items() if target in names]
+    found = [target for target in SCENES if target in names]
     if not found:
         raise InputError(
             f"the model tells {', '.join(names) or 'nothing'}, and no area weight of a flag",
             where=f"model {estimator.name!r}", fix="take the model of flags that comes with the package",
         )  # fmt: skip
-    return tuple(load(name) for name in found[0])
+    return found[0]
 
 
 def run(
@@ -73,16 +94,17 @@ def run(
         cache: folder for evaluations, so that an interrupted run goes on.
         view: how all were filmed, where that is known; None takes what their recordings state, and otherwise draws ζ
             anew for each simulated clip.
-        area_weight: range in which it is known to lie, of a flag of 1.5 m [kg/m²]; None for the scene's.
+        area_weight: range in which it is known to lie, of a flag of 1.5 m [kg/m²], any value of it alike; None for the
+            prior that the model learned.
 
     Raises:
         InputError: see `measure.refine.procedure.refine`.
     """
-    recipes = scenes_of(estimator)
+    recipes, space = scenes_of(estimator), space_of(estimator)
     if area_weight is not None:
         density = Range(low=area_weight[0], high=area_weight[1])
         recipes = tuple(replace(one, material=replace(one.material, density=density)) for one in recipes)
-    space = Space.of(recipes[0])
+        space = Space.of(recipes[0])
     otherwise = view or DrawnView(prior=named(RENDERS), assets=Assets())
     targets = [
         Target(name=clip.name, clip=clip.frames, view=otherwise)
@@ -92,4 +114,4 @@ def run(
     ]
     settings = Settings(budget=budget, seed=seed, level=level)
     with progress(budget * len(targets), label="refining", unit="clip") as advance:
-        return refine(targets, estimator, recipes, settings=settings, cache=cache, advance=advance)
+        return refine(targets, estimator, recipes, space=space, settings=settings, cache=cache, advance=advance)

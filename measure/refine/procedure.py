@@ -96,21 +96,23 @@ class Settings:
 
 def refine(
     targets: Target | Sequence[Target], estimator: Estimator, recipes: Recipe | Sequence[Recipe], *,
-    settings: Settings | None = None, cache: Path | None = None, advance: Callable[[int], object] | None = None,
+    space: Space | None = None, settings: Settings | None = None, cache: Path | None = None,
+    advance: Callable[[int], object] | None = None,
 ) -> Refinement:  # fmt: skip
     """Measure the cloth and the wind of a clip, or of several clips of one cloth, each in a wind of its own.
 
     Args:
         targets: one clip, or several of one flag.
         estimator: a model of the posterior loss.
-        recipes: of the scene, such as `sim.run.load("flag-wide")`; its ranges are the prior, and should be those of the
-            model's training data. Replicates take turns at several, see `measure.refine.simulator`.
+        recipes: of the scene, such as `sim.run.load("flag-wide")`; its ranges are searched. Replicates take turns at
+            several, see `measure.refine.simulator`.
+        space: that box with a prior, which should be that of the model's training data; None takes the first recipe's.
         cache: folder in which evaluations are kept: an interrupted refinement goes on from them.
         advance: called with the number of clips that were simulated.
 
     Raises:
         InputError: a model that tells no posterior of wind, density, scale and anisotropy, a clip that does not fit it,
-            a recipe without ranges, or too many simulations that failed.
+            a recipe without ranges, a space of another box, or too many simulations that failed.
     """
     chosen, several = settings or Settings(), tuple([targets] if isinstance(targets, Target) else targets)
     start.require(estimator)
@@ -127,7 +129,10 @@ def refine(
         )
         for target in several
     )  # fmt: skip
-    return _Run(several, estimator, chosen, evaluators, advance or (lambda _: None)).whole()
+    own = evaluators[0].simulator.space
+    if space is not None and space.identity != own.identity:
+        raise InputError("the space has other ranges than the recipes", fix="take the space of the first recipe")
+    return _Run(several, estimator, chosen, evaluators, space or own, advance or (lambda _: None)).whole()
 
 
 @dataclass(frozen=True)
@@ -136,11 +141,8 @@ class _Run:
     estimator: Estimator
     settings: Settings
     evaluators: tuple[Evaluator, ...]
+    space: Space
     advance: Callable[[int], object]
-
-    @property
-    def space(self) -> Space:
-        return self.evaluators[0].simulator.space
 
     def whole(self) -> Refinement:
         begun = time.perf_counter()

@@ -2,13 +2,14 @@
 
 Runia et al. 2020, table 1: 15 bending coefficients, each a tenth to ten times its material's, area weight and wind
 speed. Bending is searched in logarithms, so that the centre is the material itself; its prior is what the scene's
-recipe draws, which may be uniform in the factor. Single bending coefficients can hardly be told apart, so that three
-combinations of their logarithms are reported: scale, anisotropy and nonlinearity.
+recipe draws, which may be uniform in the factor, or a mixture of what several draw. Single bending coefficients can
+hardly be told apart, so that three combinations of their logarithms are reported: scale, anisotropy and nonlinearity.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,8 @@ class Space:
         common: of all bending coefficients together, likewise; None where there is none.
         density: [kg/m²].
         wind: [m/s].
+        parts: the prior as a mixture of the priors of smaller boxes, each with its weight; without any it is what the
+            ranges say. What is searched is the whole box either way.
     """
 
     material: Material
@@ -78,6 +81,7 @@ class Space:
     density: Range
     wind: Range
     common: Range | None = None
+    parts: tuple[tuple[Space, float], ...] = ()
 
     @classmethod
     def of(cls, recipe: Recipe) -> Space:
@@ -101,6 +105,27 @@ class Space:
                 where=f"recipe {recipe.name!r}", fix='take "flag-wide", or a recipe of the same form',
             )  # fmt: skip
         return cls(material=spec.bases[0], factor=factor, density=density, wind=wind, common=common)
+
+    def learned(self, parts: Sequence[tuple[Space, float]]) -> Space:
+        """The same box under the prior that a model learned from data sets of several scenes.
+
+        Args:
+            parts: of each scene its box, and how much of the data shows it.
+
+        Raises:
+            InputError: a part that reaches out of this box, or weights that are not positive.
+        """
+        for part, weight in parts:
+            inner = all(
+                low.low <= own.low * (1 + 1e-9) and own.high * (1 - 1e-9) <= low.high
+                for own, low in zip(part.ranges, self.ranges, strict=True)
+            )
+            if weight <= 0 or not inner:
+                raise InputError(
+                    f"a part of the prior with the weight {weight:g}" + ("" if inner else " reaches out of the box"),
+                    fix="give positive weights, and as the box a scene whose ranges hold those of all others",
+                )
+        return replace(self, parts=tuple(parts))
 
     @property
     def ranges(self) -> tuple[Range, ...]:
@@ -159,7 +184,15 @@ class Space:
         return np.clip(out, -1.0, 1.0)
 
     def prior(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Points (count, 17) of the prior: what the scene's recipe draws."""
+        """Points (count, 17) of the prior: what the scenes' recipes draw."""
+        if self.parts:
+            weight = np.array([weight for _, weight in self.parts])
+            chosen = rng.choice(len(self.parts), size=count, p=weight / weight.sum())
+            out = np.empty((count, DIMENSION))
+            for number, (part, _) in enumerate(self.parts):
+                rows = np.flatnonzero(chosen == number)
+                out[rows] = self.unit(part.values(part.prior(rng, len(rows))))
+            return out
         shares = rng.random((count, DIMENSION))
         drawn = np.log(_drawn(self.factor, shares[:, :BENDING]))
         if self.common is not None:
@@ -185,7 +218,7 @@ class Space:
 
     @property
     def identity(self) -> str:
-        """A hash of all of it."""
+        """A hash of the box; the prior within it changes no evaluation."""
         ranges = [plain(entry) for entry in (self.factor, self.density, self.wind)]
         ranges += [] if self.common is None else [plain(self.common)]
         return digest(canonical({"material": self.material.fingerprint, "ranges": ranges}))

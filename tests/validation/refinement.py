@@ -31,7 +31,7 @@ from flagdata.console import progress
 from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
 from measure.refine import start
-from measure.refine.command import RENDERS, scenes_of
+from measure.refine.command import RENDERS, scenes_of, space_of
 from measure.refine.distance import squared
 from measure.refine.evaluator import STAGES, Evaluator
 from measure.refine.peers.registry import PEERS, minimise
@@ -105,7 +105,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     own_model = os.environ.get("FLAGDATA_REFINE_MODEL")
     estimator = models.shipped() if own_model is None else models.load(Path(own_model))
     scenes = scenes_of(estimator)
-    space = Space.of(scenes[0])
+    space = space_of(estimator)
     at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
     handmade = _handmade(at, seed)
     scores: list[Score] = []
@@ -119,7 +119,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
     for number, target in enumerate(targets):
         found = refine(
-            target, estimator, scenes, cache=cache,
+            target, estimator, scenes, space=space, cache=cache,
             settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
         )  # fmt: skip
         own.append(found)

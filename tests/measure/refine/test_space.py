@@ -81,3 +81,30 @@ def test_points_outside_of_the_box_are_refused(recipe: Recipe) -> None:
 def test_a_recipe_without_ranges_is_refused() -> None:
     with pytest.raises(InputError, match="ranges"):
         Space.of(load("hanging-cloth"))
+
+
+def test_a_prior_of_several_scenes_is_their_mixture_within_the_box() -> None:
+    """Shares and moments by the law of total probability; bending outside of the smaller box only from the larger."""
+    box, usual = Space.of(load("flag-fabrics")), Space.of(load("flag-wide"))
+    mixed = box.learned([(usual, 3.0), (box, 1.0)])
+    drawn = mixed.values(mixed.prior(np.random.default_rng(4), 40_000))
+    density = drawn[:, 15]
+    inside = np.log(0.17 / 0.10) / np.log(0.40 / 0.05)  # of a log-uniform area weight
+    assert ((density >= 0.10) & (density <= 0.17)).mean() == pytest.approx(0.75 + 0.25 * inside, abs=0.01)
+    means = 0.135, (0.40 - 0.05) / np.log(0.40 / 0.05)
+    assert density.mean() == pytest.approx(0.75 * means[0] + 0.25 * means[1], abs=0.001)
+    assert drawn[:, 16].mean() == pytest.approx(5.0, abs=0.06)
+    factor = drawn[:, :15] / named("camel-ponte-roma").bending.ravel()
+    beyond = (factor.max(axis=1) > 10.001) | (factor.min(axis=1) < 0.0999)
+    own = box.values(box.prior(np.random.default_rng(5), 40_000))[:, :15] / named("camel-ponte-roma").bending.ravel()
+    of_box = ((own.max(axis=1) > 10.001) | (own.min(axis=1) < 0.0999)).mean()
+    assert beyond.mean() == pytest.approx(0.25 * of_box, abs=0.01)
+    assert mixed.identity == box.identity
+
+
+def test_a_part_of_a_prior_that_reaches_out_of_the_box_is_refused() -> None:
+    box, usual = Space.of(load("flag-fabrics")), Space.of(load("flag-wide"))
+    with pytest.raises(InputError, match="reaches out of the box"):
+        usual.learned([(box, 1.0)])
+    with pytest.raises(InputError, match="weight 0"):
+        box.learned([(usual, 0.0)])
