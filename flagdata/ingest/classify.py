@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
 from flagdata.ingest.anemometer import Guess, sniff
 from flagdata.ingest.anemometer.formats.registry import FORMATS
-from flagdata.ingest.camera import CameraProbe, probe
 from flagdata.ingest.markers import COLUMNS, is_marker_table
+
+if TYPE_CHECKING:
+    from flagdata.ingest.camera import CameraProbe
 
 CAMERA = "camera"
 MESHES = "meshes"
@@ -85,6 +88,8 @@ def _check_plain(path: Path) -> None:
 
 
 def _probe(path: Path) -> CameraProbe | None:
+    from flagdata.ingest.camera import probe  # decoders of video, which a wind's log needs none of
+
     try:
         return probe(path)
     except FlagdataError:

@@ -22,7 +22,7 @@ from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest.camera import CameraOptions
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.provenance import digest, recipe_hash
@@ -137,6 +137,8 @@ def ingest_camera(
         FlagdataError: as `open_camera`; the lake is unchanged.
         ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
+    from flagdata.ingest.camera import open_camera  # decoders of video, which a wind's log needs none of
+
     options, labels = options or CameraIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()

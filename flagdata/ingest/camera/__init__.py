@@ -11,12 +11,20 @@ Kinds of findings, by severity:
   start-unsure, start-unknown, interlaced, odd-rotation, hdr-transfer, alpha-ignored, gif-delays, damaged-references,
   index-damaged, stream-appeared, order-by-name, truncated (within a transport packet);
 - errors: truncated, corrupt-packets, corrupt-frames, size-changed, clock-reset.
+
+Names are imported when they are first used: whoever ingests an anemometer's log needs no decoder of video.
 """
 
-from flagdata.ingest.camera.motion import CropProposal
-from flagdata.ingest.camera.options import CameraOptions, Crop, CropBox, Limits, parse_crop
-from flagdata.ingest.camera.probe import CameraProbe, probe
-from flagdata.ingest.camera.stream import CameraStream, open_camera, propose_crop
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flagdata.ingest.camera.motion import CropProposal
+    from flagdata.ingest.camera.options import CameraOptions, Crop, CropBox, Limits, parse_crop
+    from flagdata.ingest.camera.probing import CameraProbe, probe
+    from flagdata.ingest.camera.stream import CameraStream, open_camera, propose_crop
 
 __all__ = [
     "CameraOptions",
@@ -31,3 +39,23 @@ __all__ = [
     "probe",
     "propose_crop",
 ]
+
+_PLACES = {
+    "CameraOptions": "options",
+    "CameraProbe": "probing",
+    "CameraStream": "stream",
+    "Crop": "options",
+    "CropBox": "options",
+    "CropProposal": "motion",
+    "Limits": "options",
+    "open_camera": "stream",
+    "parse_crop": "options",
+    "probe": "probing",
+    "propose_crop": "stream",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
