@@ -124,14 +124,21 @@ class Catalog:
 
     @_one_at_a_time
     def create(self, info: Mapping[str, str]) -> None:
-        """Make the empty table."""
-        DeltaTable.create(
-            self.path.as_uri(),
-            catalog_schema(),
-            mode="error",
-            configuration=_CONFIGURATION,
-            commit_properties=_properties(info),
-        )
+        """Make the empty table.
+
+        Raises:
+            OSError: what the disk refused.
+        """
+        try:
+            DeltaTable.create(
+                self.path.as_uri(),
+                catalog_schema(),
+                mode="error",
+                configuration=_CONFIGURATION,
+                commit_properties=_properties(info),
+            )
+        except DeltaError as error:
+            raise OSError(str(error)) from error
         self._flush_log(0)
 
     @_one_at_a_time

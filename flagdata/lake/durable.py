@@ -85,7 +85,7 @@ def disk_errors(doing: str, where: Path) -> Iterator[None]:
         yield
     except OSError as error:
         text = " ".join(_COLOUR.sub("", error.strerror or str(error)).split())
-        number = error.errno or (int(found[1]) if (found := _NUMBER.search(text)) else 0)
+        number = error.errno or (int(found[1] or found[2]) if (found := _NUMBER.search(text)) else 0)
         raise FlagdataError(
             f"{doing} failed: {text}",
             where=str(error.filename or where),
@@ -94,7 +94,7 @@ def disk_errors(doing: str, where: Path) -> Iterator[None]:
 
 
 _COLOUR = re.compile(r"\x1b\[\d+m")
-_NUMBER = re.compile(r"\(os error (\d+)\)")  # as the Delta library writes it
+_NUMBER = re.compile(r"\(os error (\d+)\)|\bOs \{ code: (\d+)")  # as the Delta library writes it
 _FIXES = {
     errno.ENOSPC: "free some space, or move the lake to a larger disk",
     errno.EDQUOT: "free some space, or ask for a larger quota",

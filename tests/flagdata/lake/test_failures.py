@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deltalake import DeltaTable
+from deltalake.exceptions import TableNotFoundError
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
 from flagdata.findings import Severity
@@ -58,6 +59,26 @@ def test_a_write_that_the_kernel_refuses_is_a_clear_error_and_publishes_nothing(
     assert lake.rows()["name"].to_pylist() == ["before"]
     collect(lake, grace=NOW)
     assert doctor(lake, grace=NOW) == ()
+
+
+def test_a_disk_that_refuses_the_folder_of_the_catalog_is_a_clear_error_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the Delta library says where the folder of a new table cannot be made; it does so in another class of error
+    than for files."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise TableNotFoundError(
+            "Could not create local directory: file:///x Error: "
+            'Os { code: 28, kind: StorageFull, message: "No space left on device" }'
+        )
+
+    monkeypatch.setattr(DeltaTable, "create", refused)
+    with pytest.raises(FlagdataError, match="No space left") as caught:
+        Lake.create(tmp_path / "new")
+    assert caught.value.fix is not None
+    assert "free some space" in caught.value.fix
+    assert list((tmp_path / "new").iterdir()) == []
 
 
 def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_succeeds(
