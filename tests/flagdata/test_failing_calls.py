@@ -24,6 +24,7 @@ from flagdata.lake.health import doctor
 HERE = Path(__file__).parent
 POINTS = 3
 """How many of a command's calls fail in turn, spread evenly, and the last: all of them with FLAGDATA_EVERY_CALL set."""
+EVERY = bool(os.environ.get("FLAGDATA_EVERY_CALL"))
 
 RECIPE = """
 seed = 3
@@ -111,6 +112,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., dict
         tasks.close()
 
 
+@pytest.mark.timeout(7200 if EVERY else 600)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_call_that_fails_before_publication_is_an_error_and_after_it_a_warning(
     name: str, scene: Scene, run: Callable[..., dict[str, Any]], tmp_path: Path
@@ -130,12 +132,11 @@ def test_a_call_that_fails_before_publication_is_an_error_and_after_it_a_warning
     assert (whole["code"], is_published) == (0, True), whole["stderr"]
     total = whole["calls"]
     assert total >= 4  # written, flushed, published, the folder flushed
-    every = bool(os.environ.get("FLAGDATA_EVERY_CALL"))
-    calls = range(total) if every else sorted({*range(0, total, -(-total // POINTS)), total - 2, total - 1})
+    calls = range(total) if EVERY else sorted({*range(0, total, -(-total // POINTS)), total - 2, total - 1})
     refused = 0
     for number, call in enumerate(calls, start=1):
         full = call % 2 == 0
-        for stays in (False, True) if every else (full,):
+        for stays in (False, True) if EVERY else (full,):
             done, is_published, folder = trial(
                 2 * number + stays, call=call, error=errno.ENOSPC if stays else errno.EIO, stays=stays
             )
