@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from flagdata.errors import UsageError
 from measure.cases.held.reading import Floats, Swing
 from sim import handles
 from sim.anchors import AnchorTracks
+from sim.effects import EFFECTS, Effect, Parameter, apply
 from sim.handles import Handles
 from sim.integrate.implicit import BackwardEuler
+from sim.integrate.split import SplitEuler
 from sim.material import Material
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble
@@ -35,20 +38,44 @@ class Parameters:
             ratio of mass to the air's drag, bending for its own to the mass.
         damping: internal [s].
         lag: by which the camera's stamps are later than the tool's [s].
+        strengths: effect of the library → its strength, in its own unit; none is there without.
     """
 
     density: float = 1.0
     bending: float = 1.0
     damping: float = 2.5e-3
     lag: float = 0.0
+    strengths: Mapping[str, float] = field(default_factory=dict)
 
     def moved(self, steps: Sequence[float]) -> Parameters:
-        """By steps in ln density, ln bending, ln damping and seconds of lag."""
-        density, bending, damping, lag = steps
+        """By steps in ln density, ln bending, ln damping, seconds of lag and, in their order, the effects' strengths.
+
+        A strength stays among those that make sense.
+        """
+        density, bending, damping, lag, *effects = steps
         return Parameters(
             density=self.density * math.exp(density), bending=self.bending * math.exp(bending),
             damping=self.damping * math.exp(damping), lag=self.lag + lag,
+            strengths={
+                name: described(name).nearest(value + step)
+                for (name, value), step in zip(self.strengths.items(), effects, strict=True)
+            },
         )  # fmt: skip
+
+
+def described(effect: str) -> Parameter:
+    """The one strength of an effect of the library.
+
+    Raises:
+        UnknownNameError: no such effect.
+        UsageError: it has several strengths.
+    """
+    kind = EFFECTS[effect]
+    if len(kind.strengths()) != 1:
+        raise UsageError(
+            f"{len(kind.strengths())} strengths", where=f"effect {effect!r}", fix="name one with a single one"
+        )
+    return kind.parameters()[kind.strengths()[0]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,8 +154,8 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
     times = np.arange(math.ceil(last / PERIOD) + 1, dtype=np.float64) * PERIOD
     tracks = np.stack([_track(cloth, swing, times) for swing in swings], axis=-1)
     motion = AnchorTracks(start=0.0, period=PERIOD, samples=torch.as_tensor(tracks, dtype=state.position.dtype))
-    system = replace(system, motion=motion)
-    integrator, nodes = BackwardEuler(step=_STEP, tolerance=1e-4), torch.as_tensor(cloth.nodes(mesh))
+    system, state = apply(_effects(parameters, state.position.dtype), replace(system, motion=motion), state)
+    integrator, nodes = SplitEuler(base=BackwardEuler(step=_STEP, tolerance=1e-4)), torch.as_tensor(cloth.nodes(mesh))
     state = replace(integrator.advance(system, replace(state, time=-_SETTLE), _SETTLE), time=0.0)
     frames = [state.position[nodes].double()]
     with torch.no_grad():
@@ -139,17 +166,19 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
     return [CubicSpline(times, found[..., member]) for member in range(len(swings))]
 
 
-def errors(swing: Swing, model: CubicSpline, lag: float) -> Floats:
-    """(frame, node, 3) observed less predicted [m]; NaN where a node was not tracked, or before the first pose."""
-    own = swing.times - lag
-    within = (own >= 0) & (own <= swing.tool_times[-1])
-    return np.where(within[:, None, None], swing.positions - model(np.clip(own, 0.0, swing.tool_times[-1])), np.nan)
-
-
 def rigid(cloth: Cloth, swing: Swing, lag: float) -> Floats:
     """(frame, node, 3) observed less what a board would do that hangs from the tool as the cloth does at rest [m]."""
     own = np.clip(swing.times - lag, 0.0, swing.tool_times[-1])
     return swing.positions - CubicSpline(swing.tool_times, cloth.carried(swing, range(cloth.side**2)))(own)
+
+
+def _effects(parameters: Sequence[Parameters], dtype: torch.dtype) -> list[Effect]:
+    """Each effect that any member has, with every member's strength."""
+    made: list[Effect] = []
+    for name in dict.fromkeys(name for own in parameters for name in own.strengths):
+        values = [own.strengths.get(name, described(name).null) for own in parameters]
+        made.append(EFFECTS[name](**{EFFECTS[name].strengths()[0]: torch.tensor(values, dtype=dtype)}))
+    return made
 
 
 def _track(cloth: Cloth, swing: Swing, times: Floats) -> Floats:

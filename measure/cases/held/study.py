@@ -1,4 +1,5 @@
-"""The study of a held cloth: calibrated on some programmes, held-out errors on others, repeats against each other."""
+"""The study of a held cloth: calibrated on some programmes, what the model lacks added, errors on others before and
+after, repeats against each other."""
 
 from __future__ import annotations
 
@@ -9,11 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.console import progress
 from flagdata.rng import stream
-from measure.cases.held.calibrate import Linear, at_bounds, calibrated, linear
-from measure.cases.held.model import Cloth, Parameters, errors, predicted, rigid
+from measure.cases.held.attribution import Late, Round, late, left_errors, lower, sought
+from measure.cases.held.calibrate import Fit, Linear, at_bounds, calibrated, linear
+from measure.cases.held.model import Cloth, Parameters, rigid
 from measure.cases.held.reading import Floats, Swing, read_all
 from measure.cases.held.repeats import features, shuffled, tail_probability
+from measure.cases.held.tracker import LATENCY
 from measure.shares import Share
 from sim.material import Material
 
@@ -37,6 +41,23 @@ class Error:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Reduction:
+    """Error of the lower halves of the held-out programmes, before and after what was added.
+
+    Attributes:
+        model: what was added up to here, from the first effect on.
+        lower: root mean square distance of the lower half's nodes [m].
+        gain: mean square error taken off since the model before, paired over recordings [m²].
+        error: its standard error.
+    """
+
+    model: str
+    lower: float
+    gain: float
+    error: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Pair:
     """Two repeats of one programme: p of no difference, and p with the second one's stamps moved by `MOVED`."""
 
@@ -53,8 +74,13 @@ class HeldCloth:
     Attributes:
         fitted, held_out: programmes.
         size: width and height of the square of nodes at rest [m].
-        parameters: calibrated.
+        parameters: calibrated, without what was added.
         bounds: those at a bound.
+        rounds: how what the model lacks was chosen, on the fitted programmes alone.
+        completed: calibrated with all that was added.
+        camera: (3, 3) the map A of it, as rows; zero where it was not added.
+        reductions: on the held-out programmes, as one effect after another is added; the first is the calibrated model.
+        late: what tells latencies from another freedom of each frame; None where they were not added.
         of_fitted, of_held_out: model → error, before and after.
         parts: of the held-out errors after: what is the same all the time at a node, what a frame's nodes share
             beside it, and the rest, root mean squares [m].
@@ -69,6 +95,11 @@ class HeldCloth:
     size: tuple[float, float]
     parameters: Parameters
     bounds: tuple[str, ...]
+    rounds: tuple[Round, ...]
+    completed: Parameters
+    camera: tuple[tuple[float, ...], ...]
+    reductions: tuple[Reduction, ...]
+    late: Late | None
     of_fitted: Mapping[str, Error]
     of_held_out: Mapping[str, Error]
     parts: Mapping[str, float]
@@ -101,36 +132,69 @@ def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: 
     known = [swing for programme in fitted for swing in swings[programme]]
     unseen = [swing for programme in held_out for swing in swings[programme]]
     cloth = Cloth.seen(known, material)
-    found = calibrated(cloth, known, Parameters(lag=_START))
+    base = calibrated(cloth, known, Fit.start(known, Parameters(lag=_START)))
+    with progress(None, "what the model lacks", "candidate") as advance:
+        rounds = sought(cloth, {name: swings[name] for name in fitted}, base, advance=advance)
+    fits = _completed(cloth, known, base, [entry.added for entry in rounds if entry.added])
+    found, last = base.parameters, list(fits.values())[-1]
     models = {
         "nominal, stamps at their word": Parameters(), "nominal, with the lag": Parameters(lag=found.lag),
-        "calibrated": found,
     }  # fmt: skip
-    of_known, left = _left(cloth, known, found), _left(cloth, unseen, found)
-    usual = np.nanmean(np.concatenate(of_known), axis=0)
-    corrected = "calibrated, less the nodes' mean errors on the fitted programmes"
-    pairs, chance = _pairs(cloth, swings, found, seed)
+    plain = {name: Fit.start(known, own) for name, own in models.items()} | {"calibrated": base}
+    if last is not base:
+        plain["with all that was added"] = last
+    after = left_errors(cloth, unseen, base)
+    pairs, chance = _pairs(cloth, swings, base, seed)
     return HeldCloth(
         fitted=tuple(fitted), held_out=tuple(held_out), size=(cloth.width, cloth.height), parameters=found,
-        bounds=at_bounds(found), parts=_parts(left), pairs=pairs, p_pairs=chance, extents=_extents(unseen, left),
-        of_fitted=_compared(cloth, known, models, found.lag) | {corrected: _error([e - usual for e in of_known])},
-        of_held_out=_compared(cloth, unseen, models, found.lag) | {corrected: _error([e - usual for e in left])},
-        median=float(np.nanmedian(np.concatenate([np.linalg.norm(e, axis=2).ravel() for e in left]))),
+        bounds=at_bounds(found), rounds=tuple(rounds), completed=last.parameters,
+        camera=tuple(tuple(row) for row in last.tracker.camera.tolist()), reductions=_reductions(cloth, unseen, fits),
+        late=_late(cloth, unseen, known, fits, seed), parts=_parts(left_errors(cloth, unseen, last)), pairs=pairs,
+        p_pairs=chance, extents=_extents(unseen, after), of_fitted=_compared(cloth, known, plain, found.lag),
+        of_held_out=_compared(cloth, unseen, plain, found.lag),
+        median=float(np.nanmedian(np.concatenate([np.linalg.norm(e, axis=2).ravel() for e in after]))),
     )  # fmt: skip
 
 
-def _left(cloth: Cloth, swings: Sequence[Swing], at: Parameters) -> list[Floats]:
-    """(frame, node, 3) errors on each recording [m]."""
-    runs = predicted(cloth, swings, [at] * len(swings))
-    return [errors(swing, run, at.lag) for swing, run in zip(swings, runs, strict=True)]
+def _completed(cloth: Cloth, known: Sequence[Swing], base: Fit, added: Sequence[str]) -> dict[str, Fit]:
+    """The calibrated model, and those with one effect after another, each by all that is known."""
+    fits = {"calibrated": base}
+    for name in added:
+        fits[f"+ {name}"] = calibrated(cloth, known, list(fits.values())[-1].with_effect(name))
+    return fits
 
 
-def _compared(cloth: Cloth, swings: Sequence[Swing], models: Mapping[str, Parameters], lag: float) -> dict[str, Error]:
+def _reductions(cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]) -> tuple[Reduction, ...]:
+    made: list[Reduction] = []
+    before: Floats | None = None
+    for name, fit in fits.items():
+        squares = lower(left_errors(cloth, unseen, fit))
+        gained = squares - squares if before is None else before - squares
+        made.append(Reduction(
+            model=name, lower=float(np.sqrt(squares.mean())), gain=float(gained.mean()),
+            error=float(gained.std(ddof=1) / np.sqrt(len(gained))),
+        ))  # fmt: skip
+        before = squares
+    return tuple(made)
+
+
+def _late(
+    cloth: Cloth, unseen: Sequence[Swing], known: Sequence[Swing], fits: Mapping[str, Fit], seed: int
+) -> Late | None:
+    """Of the model with all that was added, against the same fitted without latencies."""
+    last = list(fits.values())[-1]
+    if LATENCY not in last.sought:
+        return None
+    without = next(iter(fits.values()))
+    for name in (*last.sought, *last.parameters.strengths):
+        without = without if name == LATENCY else without.with_effect(name)
+    return late(cloth, unseen, last, without=calibrated(cloth, known, without), seed=seed)
+
+
+def _compared(cloth: Cloth, swings: Sequence[Swing], models: Mapping[str, Fit], lag: float) -> dict[str, Error]:
     """Error by model; a board that hangs from the tool stands for no model at all."""
     made = {"a rigid board, with the lag": _error([rigid(cloth, swing, lag) for swing in swings])}
-    for name, own in models.items():
-        made[name] = _error(_left(cloth, swings, own))
-    return made
+    return made | {name: _error(left_errors(cloth, swings, fit)) for name, fit in models.items()}
 
 
 def _error(of: Sequence[Floats]) -> Error:
@@ -171,14 +235,13 @@ def _extents(swings: Sequence[Swing], left: Sequence[Floats]) -> dict[str, tuple
     }
 
 
-def _pairs(
-    cloth: Cloth, swings: Mapping[str, Sequence[Swing]], at: Parameters, seed: int
-) -> tuple[tuple[Pair, ...], float]:
+def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], fit: Fit, seed: int) -> tuple[tuple[Pair, ...], float]:
     """All pairs of repeats, and the chance of as many told apart if the repeats' segments may change places."""
     every = [swing for own in swings.values() for swing in own]
-    beside = dict(zip((swing.name for swing in every), linear(cloth, every, at), strict=True))
-    known = {swing.name: features(swing, beside[swing.name], at.lag) for swing in every}
-    moved = {swing.name: features(swing, _later(beside[swing.name]), at.lag) for swing in every}
+    beside = dict(zip((swing.name for swing in every), linear(cloth, every, fit)[0], strict=True))
+    lag = fit.parameters.lag
+    known = {swing.name: features(swing, beside[swing.name], lag) for swing in every}
+    moved = {swing.name: features(swing, _later(beside[swing.name]), lag) for swing in every}
     scale = np.concatenate(list(known.values())).std(axis=0)
     pairs = tuple(
         Pair(
