@@ -92,8 +92,7 @@ def _lacking(found: HeldCloth) -> list[str]:
         f"Each candidate is fitted on one of {' and '.join(found.fitted)} and judged on the other, both ways, by the "
         "mean square error [mm²] that it takes off the lower half of the nodes, with its standard error over "
         f"recordings. The largest beyond {LEAD:g} standard errors is added, and the others are tried again beside it. "
-        "An effect of "
-        "the cloth must also gain more than twice as fine a mesh changes, "
+        "An effect of the cloth must also gain more than twice as fine a mesh changes, "
         f"{', '.join(f'{1e6 * max(gain.floor for gain in own.gains):.0f}' for own in found.rounds)} mm² by rounds."
     )
     lines = [

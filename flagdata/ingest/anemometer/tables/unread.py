@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from flagdata.ingest.anemometer.tables import stated_columns
 from flagdata.ingest.anemometer.text.cells import numbers
@@ -69,7 +69,21 @@ def directions(
             continue
         line = stated_columns.read_also(layout, time, wind, index)
         found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
-    return tuple(found)
+    return tuple(found) or _unnamed_direction(layout, time, wind, taken)
+
+
+def _unnamed_direction(layout: Layout, time: TimeChoice, wind: Wind, taken: Collection[int]) -> tuple[str, ...]:
+    """A remark that no direction is read, where only the user knows which column is the speed, and so which is this."""
+    speed = wind.columns.get("wind_speed")
+    if speed is None or understand(layout.names[speed.index], layout.units[speed.index]).channel:
+        return ()
+    headings = enumerate(zip(layout.names, layout.units, strict=True))
+    others = [at for at, heading in headings if at not in taken and not understand(*heading).quantity]
+    if not others:
+        return ()
+    line = stated_columns.read_also(layout, time, wind, others[0], unit_name="deg")
+    line = line.replace(f"{others[0] + 1}=wind_direction", "?=wind_direction")
+    return (f'no direction is read beside this speed; if one holds it: --columns "{line}" with its number for the ?',)
 
 
 def otherwise(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str, ...]:

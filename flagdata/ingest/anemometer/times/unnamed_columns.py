@@ -36,6 +36,8 @@ from flagdata.timebase import NANOSECONDS
 _UNNAMED = (("%m", 1, 12), ("%d", 1, 31), ("%H", 0, 24), ("%M", 0, 59))
 _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
 _EIGHT = re.compile(r"^\s*(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])\s*$")
+_HOURS = 10
+"""Rows that are an hour apart, by which the number of the hour is told from a count of rows."""
 _QUARTER, _FARTHEST = 900, 14 * 3600
 """Offsets of zones are multiples of this, and at most so large [s]."""
 
@@ -121,6 +123,8 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
         for (directive, low, high), at in zip(_UNNAMED, range(index + 1, len(columns)), strict=False):
             if not share(TWO_DIGITS, columns[at]) or not whole_numbers(columns[at], low, high):
                 break
+            if directive == "%M" and _shorter(columns[at], [columns[before] for before in taken]):
+                break
             taken, form = [*taken, at], f"{form} {directive}"
         beyond = taken[-1] + 1
         if form == "%Y %m %d" and beyond < len(columns) and _clock(columns[beyond]):
@@ -161,16 +165,26 @@ def _hourly(parts: Sequence[Sequence[str]], form: str = "%Y %m %d %H") -> bool:
     """Whether a date and an hour in columns that nothing names are those of a log of a row an hour."""
     found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], form)
     steps = np.diff(found.ns)
-    return len(steps) >= 24 and bool(found.valid.all()) and float((steps == 3600 * NANOSECONDS).mean()) >= SHARE
+    return len(steps) >= _HOURS and bool(found.valid.all()) and float((steps == 3600 * NANOSECONDS).mean()) >= SHARE
+
+
+def _padded(parts: Sequence[Sequence[str]]) -> bool:
+    """Whether parts of a time are written with two digits where one would do."""
+    return any(len(cell) > 1 and cell[0] == "0" for column in parts for cell in column)
+
+
+def _shorter(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
+    """Whether a column is written with one digit where all of the date before it has two: it is no part of the time."""
+    return _padded(before) and any(len(cell.split(".")[0]) < 2 for cell in cells)
 
 
 def _seconds(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
     """Whether a column behind that of the minutes, which nothing names, is of the seconds."""
     if not share(_SECONDS_OF_MINUTE, cells) or not whole_numbers([cell.split(".")[0] for cell in cells], 0, 59):
         return False
-    padded = any(len(cell) > 1 and cell[0] == "0" for column in before for cell in column)
-    if padded and any(len(cell.split(".")[0]) < 2 for cell in cells):
-        return False  # all of the date is written in two digits, this is not
+    padded = _padded(before)
+    if _shorter(cells, before):
+        return False
     if any(re.match(r"0\d", cell) for cell in cells):
         return True
     stamps = list(zip(*before, strict=True))

@@ -223,3 +223,11 @@ def test_a_heading_of_hours_and_minutes_keeps_minutes_after_midnight(log_file: W
     rows = "".join(f"2026-05-13 {minute};{3 + minute % 5}.5\n" for minute in range(20))
     time = _times(log_file(f"date hhmm;wind speed (m/s)\n{rows}"), zone="UTC")
     assert time[-1] == np.datetime64("2026-05-13T00:19")
+
+
+def test_a_clock_headed_by_its_zone_is_read_beside_a_year_and_its_day(log_file: Write) -> None:
+    """As the minutes of solar stations: 59 is 00:59, 100 is 01:00."""
+    rows = "".join(f"2026,121,{clock},{3 + clock % 2}.5\n" for clock in (55, 56, 57, 58, 59, 100, 101, 102))
+    time = _times(log_file(f"Year,DOY,MST,Avg Wind Speed @ 3m [m/s]\n{rows}"), zone="-07:00")
+    assert time[0] == np.datetime64("2026-05-01T07:55")
+    assert np.all(np.diff(time) == np.timedelta64(1, "m"))

@@ -138,3 +138,28 @@ def test_a_date_of_eight_digits_and_the_hour_beside_it_are_offered_in_an_hourly_
     assert iso(int(log.series.time[-1])) == ("2026-05-03T23:00:00Z" if first == 0 else "2026-05-04T00:00:00Z")
     assert set(np.diff(log.series.time)) == {3_600_000_000_000}
     assert ("heading-doubtful" in {finding.kind for finding in log.findings}) == (first == 1)
+
+
+def test_a_column_written_shorter_than_the_date_before_it_is_no_minute(log_file: Write) -> None:
+    """A direction in whole degrees behind an hour, in a table with zeros before all parts of the date."""
+    rows = "".join(f"BRW 2026 05 01 {hour:02d} {(7 * hour) % 50:4d} {4 + hour % 3}.5\n" for hour in range(14))
+    path = log_file(rows)
+    assert _offer(path) == ",year,month,day,hour,?,?"
+    log = read_log(path, WindOptions(columns=",year,month,day,hour,wind_direction[deg],wind_speed[m/s]", zone="UTC"))
+    assert set(np.diff(log.series.time)) == {3_600_000_000_000}
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"][:3]), [0, 7, 14], atol=1e-9)
+
+
+def test_the_hours_of_a_dozen_rows_are_told_and_those_of_a_few_are_not(log_file: Write) -> None:
+    rows = [f"2026  5   1  {hour}   {0.1 * hour:.1f}   273.{hour}   0.{hour}\n" for hour in range(1, 13)]
+    assert _offer(log_file("".join(rows))).startswith("year,month,day,hour,?")
+    assert "hour" not in _offer(log_file("".join(rows[:5])))
+
+
+def test_a_speed_that_the_user_names_by_its_number_tells_that_no_direction_is_read(log_file: Write) -> None:
+    rows = "".join(f"20260501-12{at:02d}00 4.4 87.8 {1 + at / 10:.1f} {20 + at}.5 0.8\n" for at in range(12))
+    log = read_log(log_file(rows), WindOptions(wind="4", unit="m/s", zone="UTC"))
+    told = " ".join(finding.what for finding in log.findings if finding.kind == "columns-not-read")
+    assert '--columns "1=time,?=wind_direction[deg],4=wind_speed[m/s]"' in told
+    read = read_log(log_file(rows), WindOptions(columns="1=time,5=wind_direction[deg],4=wind_speed[m/s]", zone="UTC"))
+    np.testing.assert_allclose(np.rad2deg(read.series.channels["wind_direction"][:2]), [20.5, 21.5], atol=1e-9)
