@@ -70,9 +70,16 @@ def remarks(layout: Layout) -> tuple[str, ...]:
 
 
 def carried(layout: Layout) -> str:
-    """The first column of the platform's own velocity, where a column tells that the platform moves or turns."""
+    """The first column that speaks of a platform which carries the instrument about; "" where none does.
+
+    It is the platform's own velocity, where a column tells that the platform moves or turns; or how it is turned, where
+    there is a column for its position as well, though it may be empty.
+    """
     own = columns(layout)
-    return layout.names[own[0]] if own and (_moving(layout) or _turned(layout)) else ""
+    if own and (_moving(layout) or _turned(layout)):
+        return layout.names[own[0]]
+    places = _LATITUDE | _LONGITUDE
+    return _turned(layout) if any(set(words_of(name)) & places for name in layout.names) else ""
 
 
 def _named(layout: Layout, indices: Collection[int]) -> str:

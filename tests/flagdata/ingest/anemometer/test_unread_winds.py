@@ -96,3 +96,17 @@ def test_the_gust_of_weather_displays_line_is_named(log_file: Write) -> None:
     fields[:7] = ["12345", "5.0", "8.5", "232", "12.3", "77", "1012.4"]
     fields[29:32], fields[35:37], fields[141] = ["22", "00", "00"], ["17", "5"], "2026"
     assert "gust" in _note(log_file(" ".join(fields) + "\n"), zone="UTC")
+
+
+def test_a_table_with_a_place_and_an_attitude_is_of_a_platform_that_may_move(log_file: Write) -> None:
+    """As a sailing robot's, whose position is empty and whose speeds and angles are from its bow."""
+    rows = "".join(
+        f"2026-05-01T12:{at:02d}:00Z,None,None,{at % 3}.5,{100 + at}.0,-1{at}.0\n" for at in range(12)
+    )  # fmt: skip
+    log = read_log(
+        log_file(f"time,gps_lat,gps_lon,Data_Wind_spd,Data_Wind_dir,IMU_roll\n{rows}"), WindOptions(unit="kn")
+    )
+    told = " ".join(finding.what for finding in log.findings if finding.severity == "warning")
+    assert "'IMU_roll' shows that the platform moves" in told
+    still = read_log(log_file(f"time,a,b,wind_spd,wind_dir,roll\n{rows}"), WindOptions(unit="kn"))
+    assert not any("platform moves" in finding.what for finding in still.findings)
