@@ -16,6 +16,7 @@ from typing import Any
 import torch
 
 from measure.cases.held.attribution import LEAD, Round
+from measure.cases.held.calibrate import at_bounds
 from measure.cases.held.model import described
 from measure.cases.held.study import LEVEL, MOVED, SHUFFLES, Error, HeldCloth, study
 from sim.material import named
@@ -59,6 +60,10 @@ def page(found: HeldCloth) -> str:
         f"With the stamps of one of them moved by {1e3 * MOVED:.0f} ms {moved.hits} of {moved.count} are."
     )
     extents = " and ".join(f"{1e3 * w:.0f} × {1e3 * h:.0f} mm {name}" for name, (w, h) in found.extents.items())
+    at_bound = (
+        f"At a bound: {', '.join(found.bounds) or 'none'}; with all that was added: "
+        f"{', '.join(at_bounds(last)) or 'none'}."
+    )
     lines = [
         "# A cloth held by a robot", "", split, "",
         "| model | fitted programmes | held-out programmes |", "|---|---|---|",
@@ -74,7 +79,7 @@ def page(found: HeldCloth) -> str:
         f"| internal damping | {1e3 * own.damping:.1f} ms | {1e3 * last.damping:.1f} ms |",
         f"| camera behind the tool's clock | {1e3 * own.lag:.0f} ms | {1e3 * last.lag:.0f} ms |",
         *(f"| {name} [{described(name).unit}] | – | {value:.3g} |" for name, value in last.strengths.items()), "",
-        f"At a bound: {', '.join(found.bounds) or 'none'}.", "",
+        at_bound, "",
         "| what is left of the held-out error with all that was added | mm |", "|---|---|",
         *(f"| {name} | {1e3 * value:.1f} |" for name, value in found.parts.items()), "",
         f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is {extents}.", "",
@@ -107,7 +112,12 @@ def _lacking(found: HeldCloth) -> list[str]:
     ]  # fmt: skip
     if any(value for row in found.camera for value in row):
         rows = "; ".join(", ".join(f"{value:+.3f}" for value in row) for row in found.camera)
-        lines += [f"The camera's map A, by rows (across, in depth, up): {rows}.", ""]
+        told = (
+            f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of places across the swing, "
+            "where the tool hardly moves: there the map and the nodes' offsets take each other's place, and it tells "
+            "nothing."
+        )
+        lines += [told, ""]
     if (own := found.late) is not None:
         told = (
             f"Latencies have a standard deviation of {1e3 * own.deviation:.0f} ms. Their rank correlation with the "
