@@ -113,9 +113,9 @@ def _lacking(found: HeldCloth) -> list[str]:
     if any(value for row in found.camera for value in row):
         rows = "; ".join(", ".join(f"{value:+.3f}" for value in row) for row in found.camera)
         told = (
-            f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of places across the swing, "
-            "where the tool hardly moves: there the map and the nodes' offsets take each other's place, and it tells "
-            "nothing."
+            f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of places across the "
+            "swing, where the tool hardly moves: there the map and the nodes' offsets take each other's place, and "
+            "it tells nothing."
         )
         lines += [told, ""]
     if (own := found.late) is not None:
