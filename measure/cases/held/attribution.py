@@ -19,7 +19,7 @@ from flagdata.rng import stream
 from measure.cases.held.calibrate import Fit, calibrated
 from measure.cases.held.model import Cloth, predicted
 from measure.cases.held.reading import Floats, Swing
-from measure.cases.held.tracker import TRACKER, errors, latencies, shifts, upper
+from measure.cases.held.tracker import TRACKER, latencies, left, shifts, upper
 
 OF_CLOTH = (
     "tangential-linear-drag", "tangential-quadratic-drag", "power-law-drag", "lift", "added-mass", "reactive-loading",
@@ -124,12 +124,7 @@ def _gain(name: str, gained: Floats, floor: float) -> Gain:
 
 def left_errors(cloth: Cloth, swings: Sequence[Swing], fit: Fit) -> list[Floats]:
     """(frame, node, 3) errors on each recording [m], with its own latencies where the model has any."""
-    at = fit.parameters
-    runs = predicted(cloth, swings, [at] * len(swings))
-    return [
-        errors(swing, run, fit.tracker, at.lag, latencies(swing, run, fit.tracker, at.lag))
-        for swing, run in zip(swings, runs, strict=True)
-    ]
+    return left(swings, predicted(cloth, swings, [fit.parameters] * len(swings)), fit.tracker, fit.parameters.lag)
 
 
 def lower(of: Sequence[Floats]) -> Floats:
@@ -180,12 +175,13 @@ def late(cloth: Cloth, swings: Sequence[Swing], fit: Fit, *, without: Fit, seed:
     plain = predicted(cloth, swings, [without.parameters] * len(swings))
     lag = without.parameters.lag
     shifted: list[Floats] = []
-    for swing, run in zip(swings, plain, strict=True):
-        moved = errors(swing, run, without.tracker, lag)
+    unshifted = left(swings, plain, without.tracker, lag)
+    for swing, run, error in zip(swings, plain, unshifted, strict=True):
+        moved = error.copy()
         moved[..., 2] -= shifts(swing, run, without.tracker, lag)[:, None]
         shifted.append(moved)
     return Late(
         deviation=float(np.concatenate(found).std()), rank_correlation=own, p=(1 + as_large) / (1 + _SHUFFLES),
-        control=float(lower(shifted).mean()), without=float(lower(left_errors(cloth, swings, without)).mean()),
-        with_=float(lower(left_errors(cloth, swings, fit)).mean()),
+        control=float(lower(shifted).mean()), without=float(lower(unshifted).mean()),
+        with_=float(lower(left(swings, runs, fit.tracker, fit.parameters.lag)).mean()),
     )  # fmt: skip

@@ -6,14 +6,25 @@ What the tracker does (`tracker.py`) and effects of the library are fitted besid
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from measure.cases.held.model import NAMES, Cloth, Parameters, described, predicted
 from measure.cases.held.reading import Floats, Swing
-from measure.cases.held.tracker import CAMERA, LATENCY, OFFSETS, TRACKER, Tracker, errors, latencies, upper
+from measure.cases.held.tracker import (
+    CAMERA,
+    LATENCY,
+    OFFSETS,
+    TRACKER,
+    Tracker,
+    errors,
+    instants,
+    latencies,
+    left,
+    upper,
+)
 
 STEPS = (0.3, 0.7, 0.7)
 """Steps of ln density, ln bending and ln damping, for their sensitivities; that of the lag is the model's velocity."""
@@ -37,13 +48,11 @@ class Fit:
         parameters: of the cloth, with the strengths of effects.
         tracker: how its nodes are told.
         sought: names of the tracker's effects that were fitted.
-        error: (4 + effects,) standard errors of the steps of `parameters`, where errors of frames are independent.
     """
 
     parameters: Parameters
     tracker: Tracker
     sought: tuple[str, ...] = ()
-    error: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def start(cls, swings: Sequence[Swing], parameters: Parameters) -> Fit:
@@ -97,9 +106,8 @@ def _linear(swing: Swing, models: Sequence[CubicSpline], fit: Fit, sizes: Sequen
     lag, tracker = fit.parameters.lag, fit.tracker
     late = latencies(swing, models[0], tracker, lag)
     base = errors(swing, models[0], tracker, lag, late)
-    own = np.clip(swing.times - lag - late, 0.0, swing.tool_times[-1])
     moved = [(base - errors(swing, m, tracker, lag, late)) / size for m, size in zip(models[1:], sizes, strict=True)]
-    slower = -models[0](own, 1) @ (np.eye(3) + tracker.camera).T
+    slower = -models[0](instants(swing, lag, late), 1) @ (np.eye(3) + tracker.camera).T
     moved.insert(NAMES.index("lag"), np.where(np.isnan(base), np.nan, slower))
     return Linear(error=base, change=np.stack(moved))
 
@@ -122,13 +130,10 @@ def calibrated(cloth: Cloth, swings: Sequence[Swing], start: Fit, *, iterations:
     for _ in range(iterations):
         parts, runs = linear(cloth, swings, found)
         found = _stepped(_observed(found, swings, runs, parts), swings, runs, parts)
-    if not found.sought:
+    if OFFSETS not in found.sought:
         return found
     runs = predicted(cloth, swings, [found.parameters] * len(swings))
-    lag = found.parameters.lag
-    left = [errors(swing, run, found.tracker, lag, latencies(swing, run, found.tracker, lag))
-            for swing, run in zip(swings, runs, strict=True)]  # fmt: skip
-    return _with_offsets(found, np.concatenate(left))
+    return _with_offsets(found, np.concatenate(left(swings, runs, found.tracker, found.parameters.lag)))
 
 
 def _observed(fit: Fit, swings: Sequence[Swing], runs: Sequence[CubicSpline], parts: Sequence[Linear]) -> Fit:
@@ -149,11 +154,8 @@ def _with_offsets(fit: Fit, error: Floats) -> Fit:
 
 def _of_lower(swings: Sequence[Swing], runs: Sequence[CubicSpline], tracker: Tracker, lag: float) -> float:
     """Mean square error of the lower halves [m²]."""
-    squares: list[float] = []
-    for swing, run in zip(swings, runs, strict=True):
-        error = errors(swing, run, tracker, lag, latencies(swing, run, tracker, lag))
-        squares.append(float(np.nanmean(error[:, ~upper(swing.side)] ** 2)))
-    return float(np.mean(squares))
+    below = ~upper(swings[0].side)
+    return float(np.mean([np.nanmean(error[:, below] ** 2) for error in left(swings, runs, tracker, lag)]))
 
 
 def _stepped(fit: Fit, swings: Sequence[Swing], runs: Sequence[CubicSpline], parts: Sequence[Linear]) -> Fit:
@@ -164,7 +166,7 @@ def _stepped(fit: Fit, swings: Sequence[Swing], runs: Sequence[CubicSpline], par
     change = np.concatenate([part.change for part in parts], axis=1)
     free = change.shape[0]
     if CAMERA in fit.sought:
-        places = [_away(s, r, tracker, at.lag, own) for s, r, own in zip(swings, runs, late, strict=True)]
+        places = [run(instants(s, at.lag, own)) - tracker.about for s, run, own in zip(swings, runs, late, strict=True)]
         change = np.concatenate([change, _mapped(np.concatenate(places))])
     if OFFSETS in fit.sought:
         change = change - np.nanmean(np.where(np.isnan(error), np.nan, change), axis=1, keepdims=True)
@@ -177,19 +179,14 @@ def _stepped(fit: Fit, swings: Sequence[Swing], runs: Sequence[CubicSpline], par
     precision = 1 / np.square(PRIOR)
     normal[:4, :4] += np.diag(precision)
     right[:3] -= precision[:3] * away
-    covariance = np.linalg.pinv(normal, rcond=1e-10, hermitian=True)  # offsets take the shift in: it stays as it is
-    step = covariance @ right
+    # Where offsets are fitted they take the shift in, which then stays as it is.
+    step = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) @ right
     longest = np.array([*_LONGEST, *(4 * abs(_step(name, value)) for name, value in at.strengths.items())])
     parameters = _within(at.moved(np.clip(step[:free], -longest, longest).tolist()))
     if CAMERA in fit.sought:
         mapped = step[free:].reshape(3, 4)
         tracker = replace(tracker, camera=tracker.camera + mapped[:, :3], shift=tracker.shift + mapped[:, 3])
-    return replace(fit, parameters=parameters, tracker=tracker, error=np.sqrt(np.diag(covariance))[:free])
-
-
-def _away(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float, late: Floats) -> Floats:
-    """(frame, node, 3) predicted places from the mean one [m]."""
-    return run(np.clip(swing.times - lag - late, 0.0, swing.tool_times[-1])) - tracker.about
+    return replace(fit, parameters=parameters, tracker=tracker)
 
 
 def _mapped(places: Floats) -> Floats:

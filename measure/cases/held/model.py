@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from flagdata.errors import UsageError
 from measure.cases.held.reading import Floats, Swing
+from measure.cases.held.tracker import instants
 from sim import handles
 from sim.anchors import AnchorTracks
 from sim.effects import EFFECTS, Effect, Parameter, apply
@@ -168,8 +169,8 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
 
 def rigid(cloth: Cloth, swing: Swing, lag: float) -> Floats:
     """(frame, node, 3) observed less what a board would do that hangs from the tool as the cloth does at rest [m]."""
-    own = np.clip(swing.times - lag, 0.0, swing.tool_times[-1])
-    return swing.positions - CubicSpline(swing.tool_times, cloth.carried(swing, range(cloth.side**2)))(own)
+    board = CubicSpline(swing.tool_times, cloth.carried(swing, range(cloth.side**2)))
+    return swing.positions - board(instants(swing, lag))
 
 
 def _effects(parameters: Sequence[Parameters], dtype: torch.dtype) -> list[Effect]:

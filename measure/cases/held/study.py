@@ -82,9 +82,9 @@ class HeldCloth:
         reductions: on the held-out programmes, as one effect after another is added; the first is the calibrated model.
         late: what tells latencies from another freedom of each frame; None where they were not added.
         of_fitted, of_held_out: model → error, before and after.
-        parts: of the held-out errors after: what is the same all the time at a node, what a frame's nodes share
-            beside it, and the rest, root mean squares [m].
-        median: of the held-out errors after [m].
+        parts: of the held-out errors with all that was added: what is the same all the time at a node, what a frame's
+            nodes share beside it, and the rest, root mean squares [m].
+        median: of the held-out errors of the calibrated model [m].
         extents: width and height in motion, tracked and predicted [m], held out.
         pairs: of repeats.
         p_pairs: chance of so many pairs at `LEVEL`, or more, if nothing told repeats apart.
@@ -169,7 +169,7 @@ def _reductions(cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]) 
     before: Floats | None = None
     for name, fit in fits.items():
         squares = lower(left_errors(cloth, unseen, fit))
-        gained = squares - squares if before is None else before - squares
+        gained = (squares if before is None else before) - squares
         made.append(Reduction(
             model=name, lower=float(np.sqrt(squares.mean())), gain=float(gained.mean()),
             error=float(gained.std(ddof=1) / np.sqrt(len(gained))),

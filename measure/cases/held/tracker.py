@@ -78,8 +78,21 @@ def errors(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float, late: F
     """
     own = swing.times - lag - (0.0 if late is None else late)
     within = (own >= 0) & (own <= swing.tool_times[-1])
-    told = tracker.seen(run(np.clip(own, 0.0, swing.tool_times[-1])))
+    told = tracker.seen(run(instants(swing, lag, late)))
     return np.where(within[:, None, None], swing.positions - told, np.nan)
+
+
+def instants(swing: Swing, lag: float, late: Floats | float | None = None) -> Floats:
+    """(frame,) when frames were taken, on the tool's clock and within its time [s]."""
+    return np.clip(swing.times - lag - (0.0 if late is None else late), 0.0, swing.tool_times[-1])
+
+
+def left(swings: Sequence[Swing], runs: Sequence[CubicSpline], tracker: Tracker, lag: float) -> list[Floats]:
+    """(frame, node, 3) errors on each recording [m], with its own latencies where the tracker has any."""
+    return [
+        errors(swing, run, tracker, lag, latencies(swing, run, tracker, lag))
+        for swing, run in zip(swings, runs, strict=True)
+    ]
 
 
 def latencies(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> Floats:
@@ -93,8 +106,7 @@ def latencies(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> F
     tried = tried[order]
     costs = []
     for late in tried:
-        own = np.clip(swing.times - lag - late, 0.0, swing.tool_times[-1])
-        squares = ((swing.positions - tracker.seen(run(own)))[:, above] ** 2).sum(axis=2)
+        squares = ((swing.positions - tracker.seen(run(instants(swing, lag, late))))[:, above] ** 2).sum(axis=2)
         seen = ~np.isnan(squares)
         mean = np.where(seen, np.minimum(squares, _FAR**2), 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
         costs.append(mean + (tracker.stiffness * late) ** 2)
