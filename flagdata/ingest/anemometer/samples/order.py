@@ -10,7 +10,7 @@ Rules, in order:
    except that without a word of the user nothing is changed. Refused: time that runs back again and again, or by no
    whole hour to where the log never was, as in files that were joined.
 5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.
-6. Rows equal in stamp and values are the same row written twice: one is kept.
+6. Rows equal in stamp and values are the same row written several times: one is kept.
 7. Rows that share a stamp are given instants of their own (`spread`).
 """
 
@@ -36,6 +36,10 @@ SMALL = 60 * NANOSECONDS
 """A clock may be set back by any constant up to this where nothing else speaks for it."""
 AGAIN = 0.9
 """Share of a stretch's rows that must come with the stamps and values of earlier ones to be taken for a repetition."""
+ISOLATED = 0.2
+"""Share of the pairs of neighbours that share a stamp, up to which the alike among them are taken for copies."""
+COPIES, COPIED = 2.0, 0.1
+"""Changes of the values within stamps that readings would have shown, and the share of them that copies may show."""
 
 
 def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None) -> Reading:
@@ -197,25 +201,48 @@ def _without_repeated_stretches(reading: Reading) -> Reading:
 
 
 def _without_repeats(reading: Reading) -> Reading:
+    """The rows without those that repeat the row before them in stamp and in everything that is read."""
     if len(reading.time) < 2:
         return reading
-    same = np.diff(reading.time) == 0
+    again = np.diff(reading.time) == 0
+    differs = np.zeros(len(again), dtype=bool)
     for values in reading.channels.values():
-        equal = (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
-        same &= equal
+        differs |= ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
     if reading.host_time is not None:
-        same &= np.diff(reading.host_time) == 0
-    # Coarse stamps make equal rows too: only isolated pairs are the same row written twice.
-    shared = float((np.diff(reading.time) == 0).mean())
-    same &= ~_with_room(reading)
-    if not same.any() or shared > 0.2:
+        differs |= np.diff(reading.host_time) != 0
+    same = again & ~differs
+    if not _copied(again, differs):
+        # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice.
+        same &= ~_with_room(reading)
+        same &= int(again.sum()) <= max(1.0, ISOLATED * len(again))
+    if not same.any():
         return reading
     twice = np.concatenate(([False], same))
+    count, rows = int(twice.sum()), np.diff(np.flatnonzero(np.append(~twice, True)))
+    most = int(rows.max())
+    what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in all that is read"
+    what += f", up to {most} rows alike" if most > 2 else ""
     finding = Finding(
-        kind="duplicate-rows", severity=Severity.WARNING, count=int(twice.sum()),
-        where=f"line {reading.line[twice][0]}", what=f"{int(twice.sum())} rows repeat the one before them; left out",
+        kind="duplicate-rows", severity=Severity.WARNING, count=count, where=f"line {reading.line[twice][0]}",
+        what=f"{what}; left out as copies",
     )  # fmt: skip
     return reading.take(~twice).with_findings((finding,))
+
+
+def _copied(again: NDArray[np.bool_], differs: NDArray[np.bool_]) -> bool:
+    """Whether rows that share a stamp are copies, and not readings below a coarse stamp.
+
+    Readings change from row to row as often within a stamp as from stamp to stamp; copies change with the stamp alone.
+    Of a log of one stamp nothing is known but that its rows are alike.
+
+    Args:
+        again: (n - 1,) whether a row has the stamp of the one before.
+        differs: (n - 1,) whether it has other values.
+    """
+    if again.all():
+        return not differs.any()
+    expected = float(differs[~again].mean()) * int(again.sum())
+    return expected >= COPIES and int((differs & again).sum()) <= COPIED * expected
 
 
 def _with_room(reading: Reading) -> NDArray[np.bool_]:
