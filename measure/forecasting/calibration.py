@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from measure.observe.trajectory import DENSITY_UNCERTAINTY
 from sim.material import Material
 
 
@@ -58,10 +60,16 @@ THETA: tuple[tuple[str, str, float], ...] = (("density", "ln", 0.1), ("bending",
 DAMPING = [name for name, *_ in THETA].index("damping")
 """Place of the damping among `THETA`."""
 
-PRIOR = np.array([0.3, 1.0, 1.5])
-"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a cloth weighed to
-30 %, its bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever
-measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard deviations."""
+PRIOR = np.array([DENSITY_UNCERTAINTY, 1.0, 1.5])
+"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a density known as
+well as where nobody says how well, bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011).
+Damping is hardly ever measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard
+deviations."""
 
 PRIOR_WITHOUT_MASS = np.array([1.0, 1.0, 1.5])
 """The same of a cloth that was not weighed and whose material is a guess: its density within a factor of e."""
+
+
+def prior(density_uncertainty: float) -> NDArray[np.float64]:
+    """`PRIOR` for a cloth whose density has a relative standard uncertainty that is given."""
+    return np.array([density_uncertainty, *PRIOR[1:]])

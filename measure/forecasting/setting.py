@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from measure.forecasting.alignment import aligned
-from measure.forecasting.calibration import PRIOR, PRIOR_WITHOUT_MASS, Calibration
+from measure.forecasting.calibration import PRIOR_WITHOUT_MASS, Calibration, prior
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
@@ -92,7 +92,8 @@ class Setting:
     @property
     def prior(self) -> Floats:
         """(theta,) standard deviations of the calibrated parameters."""
-        return PRIOR if self.experiment.specimen.mass_known else PRIOR_WITHOUT_MASS
+        specimen = self.experiment.specimen
+        return prior(specimen.density_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
 
     @property
     def recording(self) -> NDArray[np.int64]:

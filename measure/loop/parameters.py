@@ -19,36 +19,42 @@ from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Estimate, Parameter
 
 
-def parameters(base: Refined, larger: Refined | None, reach: NDArray[np.float64]) -> tuple[Parameter, ...]:
+def parameters(
+    base: Refined, larger: Refined | None, reach: NDArray[np.float64], *, weighed: float
+) -> tuple[Parameter, ...]:
     """Density, bending and damping, which are estimated by their logarithms, of the base and of a larger model.
 
     Args:
         reach: (theta,) standard errors to either side within which this code's nulls lie.
+        weighed: relative standard uncertainty of the density before anything was fitted.
     """
     made: list[Parameter] = []
     for place, (name, _, _) in enumerate(THETA):
         half = float(reach[place]) * base.errors[place]
-        before = _estimate(name, base.model.calibration, half)
+        before = _estimate(name, base.model.calibration, half, weighed)
         within = half / CRITERIA.reach
         if larger is None:
             made.append(Parameter(name=name, before=before, after=None, shift=None, within=within))
             continue
         steps = larger.model.calibration.steps_from(base.model.calibration)
-        after = _estimate(name, larger.model.calibration, float(reach[place]) * larger.errors[place])
+        after = _estimate(name, larger.model.calibration, float(reach[place]) * larger.errors[place], weighed)
         shift = steps[place] / base.errors[place]
         made.append(Parameter(name=name, before=before, after=after, shift=shift, within=within))
     return tuple(made)
 
 
-def _estimate(name: str, calibration: Calibration, half: float) -> Estimate:
-    """A parameter with its interval, of half the width `half` in its logarithm by this code alone."""
+def _estimate(name: str, calibration: Calibration, half: float, weighed: float) -> Estimate:
+    """A parameter with its interval, of half the width `half` in its logarithm by this code alone.
+
+    What codes differ by does not make that of the density wider than what was known before.
+    """
     if name == "damping":
         return _damping(calibration.damping, half)
-    value, between = {
-        "density": (calibration.density, CRITERIA.density_between),
-        "bending": (calibration.bending, CRITERIA.bending_between),
+    value, between, known = {
+        "density": (calibration.density, CRITERIA.density_between, weighed),
+        "bending": (calibration.bending, CRITERIA.bending_between, math.inf),
     }[name]
-    whole = math.hypot(half, CRITERIA.reach * between)
+    whole = min(math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * known))
     return Estimate(
         value=value, low=value * math.exp(-whole), high=value * math.exp(whole), unit="of nominal",
         level=CRITERIA.interval,

@@ -117,7 +117,9 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         found, projection = _looked_at(setting)
     tell("sensitivities", 1, 1)
     bank = supply.supplied(setting, options, stage=tell)
-    reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=options.seed)
+    reference = bank.reference(
+        len(setting.segments), noise=setting.design.noise, seed=options.seed, prior=setting.prior
+    )
     tell("base model", 0, 1)
     setting, fits = _calibrated(setting, _fits(setting, found, projection, bank), bank)
     tell("base model", 1, 1)
@@ -278,7 +280,8 @@ def _outcome(
     after = None if larger is None else _unseen(setting, larger)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="", test=_test(solved, bank, options),
-        parameters=parameters(solved.base, larger, solved.reference.reach), ranking=_ranking(solved, larger),
+        parameters=parameters(solved.base, larger, solved.reference.reach, weighed=float(setting.prior[0])),
+        ranking=_ranking(solved, larger),
         comparisons=trial.comparisons, apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         provenance={

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
-from measure.forecasting.calibration import DAMPING, THETA, Calibration
+from measure.forecasting.calibration import DAMPING, PRIOR, THETA, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.evidence import Evidence, best_gain
 from measure.inference.fluctuation import fluctuation
@@ -112,12 +112,14 @@ class NullBank:
         own = replace(self.nulls.statistics, turning=None, course=None)
         return replace(self, nulls=replace(self.nulls, statistics=own))
 
-    def reference(self, segments: int, *, noise: float, seed: int) -> Reference:
+    def reference(self, segments: int, *, noise: float, seed: int, prior: Floats = PRIOR) -> Reference:
         """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
         that has seen none of its numerics.
 
         Args:
             noise: of the data's markers [m].
+            prior: (theta,) standard deviations of the data's calibrated parameters about the nominal ones: nulls are
+                judged under the same.
 
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
@@ -125,7 +127,7 @@ class NullBank:
         plain: list[_Found] = []
         beside_gusts: list[_Found] = []
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
-            evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model)
+            evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model.under(prior))
             for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
                 picked, own = evidence.select(chosen), kept.outside.select(chosen[:1])
                 plain.append(_Found.of(picked, self.columns, own))
@@ -164,10 +166,13 @@ class _Found(Rows):
     def of(cls, evidence: Evidence, columns: tuple[str, ...], own: Nulls) -> _Found:
         """Of one group, whose statistics are at its true calibration.
 
+        A null's cloth is as far from the nominal one as cloths known to `PRIOR` are. Where the data's is known better,
+        that of a null lies nearer to its nominal one by as much.
+
         Args:
             own: one segment of it.
         """
-        nominal = -own.calibration[0]
+        nominal = -own.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
         swing = np.zeros(0) if evidence.swing is None else evidence.swing
         return cls(
             shares=unscaled(evidence, columns)[None], left=np.array([evidence.fit(()).left]),

@@ -58,7 +58,8 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
             replace(r, attachments=np.einsum("sm,fmi->fsi", onto(r.markers, seats), r.positions)) for r in recordings
         )
     specimen = Specimen(
-        mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known, held=held,
+        mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known,
+        density_uncertainty=setup.density_uncertainty, held=held,
         anchors=anchors_of(recordings, seats), anchors_told=False, stiffness=_stiffness(known, setup),
         gravity=(
             _agreed([k.gravity for k in known], None, GRAVITY, "gravity")

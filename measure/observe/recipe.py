@@ -39,7 +39,7 @@ from measure.observe.cloth import VERTICES, outline
 from measure.observe.experiment import Observed, observe
 from measure.observe.observation import Observation, Up
 from measure.observe.setup import Hold, Setup, sheet
-from measure.observe.trajectory import WindTrack
+from measure.observe.trajectory import DENSITY_UNCERTAINTY, WindTrack
 from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
 from sim.arcsim import read_material
@@ -185,7 +185,7 @@ def _setup(top: Table, folder: Path) -> Setup:
     flat.done()
     pins, stiffness, carried = _pins(top.table("pins"))
     stuff = top.table("material")
-    mass_known = not stuff.flag("mass-unknown")
+    mass_known, uncertainty = _weighed(stuff)
     air = top.table("air")
     gravity = air.number("gravity", 0.0, least=0.0) if "gravity" in air else None
     force = None
@@ -196,9 +196,22 @@ def _setup(top: Table, folder: Path) -> Setup:
         )
     air.done()
     return Setup(
-        material=_material(stuff, folder), mass_known=mass_known, outline=corners, pins=pins, carried=carried,
-        stiffness=stiffness, gravity=gravity, air=force, vertices=vertices,
+        material=_material(stuff, folder), mass_known=mass_known, density_uncertainty=uncertainty,
+        outline=corners, pins=pins, carried=carried, stiffness=stiffness, gravity=gravity, air=force, vertices=vertices,
     )  # fmt: skip
+
+
+def _weighed(stuff: Table) -> tuple[bool, float]:
+    """Whether the cloth's mass is known, and the relative standard uncertainty of its density."""
+    unknown = stuff.flag("mass-unknown")
+    if "density-uncertainty" not in stuff:
+        return not unknown, DENSITY_UNCERTAINTY
+    if unknown:
+        raise UsageError(
+            "both mass-unknown and a density-uncertainty are given", where=stuff.where,
+            fix="keep mass-unknown for a cloth that nobody weighed, density-uncertainty for one whose density is known",
+        )  # fmt: skip
+    return True, stuff.number("density-uncertainty", DENSITY_UNCERTAINTY, above=0.0)
 
 
 def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, float | None, bool]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from measure.observe.cloth import VERTICES
+from measure.observe.trajectory import DENSITY_UNCERTAINTY
 from sim.air import AirForce
 from sim.material import Material
 
@@ -34,6 +35,7 @@ class Setup:
         material: nominal.
         mass_known: whether the cloth was weighed, or its material is known; else its density is a guess, and all that
             is found is a ratio to it.
+        density_uncertainty: relative standard uncertainty of the cloth's density where the mass is known.
         outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
         pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
         carried: whether the attachments move: the cloth is held by hands or by a robot. They then go where the markers
@@ -49,6 +51,7 @@ class Setup:
 
     material: Material | None = None
     mass_known: bool = True
+    density_uncertainty: float = DENSITY_UNCERTAINTY
     outline: NDArray[np.float64] | None = None
     pins: Hold | tuple[tuple[float, float], ...] | None = None
     carried: bool = False
@@ -68,6 +71,11 @@ class Setup:
             raise self._wrong(f"a stiffness of {self.stiffness!r}", "give N/m, or infinity for rigid pins")
         if self.carried and self.stiffness not in (None, math.inf):
             raise self._wrong("a stiffness of pins that are carried", "leave it out: they hold rigidly")
+        if not 0 < self.density_uncertainty <= 1:
+            raise self._wrong(
+                f"a density uncertainty of {self.density_uncertainty!r}",
+                "give the relative standard uncertainty, such as 0.02 for 2 %",
+            )
         if self.gravity is not None and not (math.isfinite(self.gravity) and self.gravity >= 0):
             raise self._wrong(f"a gravity of {self.gravity!r}", "give m/s², downward")
         if self.vertices < 16:

@@ -23,6 +23,8 @@ DIRECTION = math.radians(5.0)
 """rad: how well north, or the axis of a tunnel, is lined up with a camera's axes by eye and compass."""
 CLOCK = 0.3
 """s: a log of 1 Hz whose stamps are rounded, or a cup's lag at a few metres a second."""
+DENSITY_UNCERTAINTY = 0.3
+"""Relative standard uncertainty of a cloth's density [kg/m²] where nobody says how well it is known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,6 +170,7 @@ class Specimen:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.
         material: nominal.
         mass_known: whether its density is known about as well as a material's name tells it.
+        density_uncertainty: relative standard uncertainty of its density, where that is so.
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
@@ -186,6 +189,7 @@ class Specimen:
     stiffness: float = ARCSIM_STIFFNESS
     anchors_told: bool = True
     mass_known: bool = True
+    density_uncertainty: float = DENSITY_UNCERTAINTY
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
 

@@ -114,7 +114,7 @@ def weigh(
     supply.check(bank, setting)
     bank = bank.plain()
     parts = split(setting.segments, setting.speeds)
-    null = bank.model(setting.design)
+    null = bank.model(setting.design).under(setting.prior)
     stage("terms", 0, 1)
     whole = Lens.of(setting.forecaster, setting.segments, weighed)
     lens = whole.select(np.flatnonzero(parts.seen))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure.forecasting.calibration import PRIOR, THETA
+from measure.forecasting.calibration import THETA
 from measure.inference.evidence import Evidence, gains
 from measure.loop.validation import total_error
 from measure.propose.family import Family
@@ -142,7 +142,7 @@ def _cosines(evidence: Evidence, beside: Sequence[int]) -> np.ndarray:
     """(column, column) of directions, beside the nuisances and some columns more; 0 with those."""
     total = evidence.curvature.sum(axis=0)
     fixed = [*evidence.nuisance, *beside]
-    priors = np.concatenate([PRIOR**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(beside))])
+    priors = np.concatenate([evidence.prior**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(beside))])
     inner = total[np.ix_(fixed, fixed)] + np.diag(priors)
     left = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
     size = np.sqrt(np.maximum(np.diag(left), 1e-9 * np.diag(total)))

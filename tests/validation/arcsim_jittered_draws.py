@@ -52,7 +52,9 @@ def by_draws(
 def _tested(setting: Setting, whitened: WhitenedMisfit, bank: NullBank, seed: int) -> tuple[Reference, float]:
     """Null distributions by a bank, and the statistic of the global test by them."""
     null = bank.model(setting.design).under(setting.prior)
-    reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=seed).at(setting.calibration)
+    reference = bank.reference(len(setting.segments), noise=setting.design.noise, seed=seed, prior=setting.prior).at(
+        setting.calibration
+    )
     evidence = Evidence.of(whitened.found, whitened.speeds, null)
     return reference, reference.farthest(evidence, names())
 

@@ -17,11 +17,11 @@ from measure.verdict.record import Parameter
 REACH = 1.6448536269514722  # of a normal, 90 % to either side
 
 
-def told(calibration: Calibration, errors: dict[str, float]) -> dict[str, Parameter]:
+def told(calibration: Calibration, errors: dict[str, float], *, weighed: float = 0.3) -> dict[str, Parameter]:
     fitted: Any = SimpleNamespace(
         model=SimpleNamespace(calibration=calibration), errors=np.array([errors[name] for name, _, _ in THETA])
     )
-    return {one.name: one for one in parameters(fitted, None, np.full(len(THETA), REACH))}
+    return {one.name: one for one in parameters(fitted, None, np.full(len(THETA), REACH), weighed=weighed)}
 
 
 def test_scatter_and_spread_among_codes_add_in_quadrature() -> None:
@@ -35,6 +35,22 @@ def test_scatter_and_spread_among_codes_add_in_quadrature() -> None:
     assert math.log(bending.before.high / bending.before.low) == pytest.approx(2 * REACH, rel=1e-6)
     assert density.within == pytest.approx(0.03)
     assert bending.within == pytest.approx(0.8)
+
+
+def test_codes_do_not_make_the_interval_wider_than_the_scale_did() -> None:
+    """Weighed to 2 %: what codes differ by, 7 %, is no doubt of the weight. Known to 50 %, it is."""
+    fitted, errors = Calibration(density=1.01), {"density": 0.015, "bending": 0.8, "damping": 0.1}
+    density = told(fitted, errors, weighed=0.02)["density"].before
+    assert math.log(density.high / density.value) == pytest.approx(REACH * 0.02, rel=1e-6)
+    density = told(fitted, errors, weighed=0.5)["density"].before
+    assert math.log(density.high / density.value) == pytest.approx(REACH * math.hypot(0.015, 0.07), rel=1e-6)
+
+
+def test_nulls_that_are_off_by_more_than_the_scale_widen_it() -> None:
+    """An error of 5 % by nulls stands although the cloth is said to be known to 2 %."""
+    errors = {"density": 0.05, "bending": 0.8, "damping": 0.1}
+    density = told(Calibration(), errors, weighed=0.02)["density"].before
+    assert math.log(density.high) == pytest.approx(REACH * 0.05, rel=1e-6)
 
 
 def test_of_little_damping_the_interval_is_that_of_the_codes_and_begins_at_zero() -> None:

@@ -15,6 +15,7 @@ from flagdata.ingest.meshes import write_folder
 from flagdata.ingest.meshes.store import ingest_meshes
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence
+from measure.forecasting.setting import Setting
 from measure.observe.meshes import from_folder
 from measure.observe.recipe import load, read
 from sim.material import named
@@ -72,6 +73,18 @@ def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table
     np.testing.assert_array_equal(specimen.material.bending, named("camel-ponte-roma").bending)
     np.testing.assert_allclose(specimen.anchors[:, :2], 0.0, atol=1e-3)
     assert observed.findings == ()
+
+
+@pytest.mark.parametrize(
+    ("line", "uncertainty"), [("", 0.3), ("density-uncertainty = 0.02", 0.02), ("mass-unknown = true", 1.0)]
+)
+def test_how_well_the_cloth_was_weighed_is_the_prior_of_its_density(
+    table: Path, tmp_path: Path, line: str, uncertainty: float
+):
+    entry = f'[[recording]]\nsource = "{table}"\nrate = {RATE}\nunit = "mm"\ntake = "calm"\nwind = {{ speed = 4.0 }}\n'
+    common = COMMON.replace("density = 0.2", f"density = 0.2\n{line}")
+    observed = read(load(_recipe(tmp_path, f'up = "y"\n{common}{entry}')))
+    assert Setting.of(observed.experiment).prior.tolist() == [uncertainty, 1.0, 1.5]
 
 
 def _meshes(seconds: float = 2.2) -> MeshSequence:
@@ -147,6 +160,13 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
         ("[cloth]\nwidth = 1\n[[recording]]\nsource = 'a'", UsageError, "half a size"),
         ("[pins]\nat = 'hoist'\npoints = [[0, 0]]\n[[recording]]\nsource = 'a'", UsageError, "both at and points"),
         ("[pins]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
+        (
+            "[material]\nmass-unknown = true\ndensity-uncertainty = 0.1\n[[recording]]\nsource = 'a'",
+            UsageError,
+            "both mass-unknown and a density-uncertainty",
+        ),
+        ("[material]\ndensity-uncertainty = 2\n[[recording]]\nsource = 'a'", InputError, "density uncertainty of 2.0"),
+        ("[material]\ndensity-uncertainty = 0\n[[recording]]\nsource = 'a'", InputError, "density-uncertainty"),
         ("[material]\nname = 'camel'\n[[recording]]\nsource = 'a'", UnknownNameError, "camel"),
         ("up = 'w'\n[[recording]]\nsource = 'a'", UnknownNameError, "unknown up 'w'"),
     ],

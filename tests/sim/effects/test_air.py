@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +22,9 @@ from sim.effects.tangential_linear_drag import TangentialLinearDrag
 from sim.effects.tangential_quadratic_drag import TangentialQuadraticDrag
 from sim.handles import Handles
 from sim.integrate.symplectic import Backend, advance
-from sim.material import isotropic
+from sim.material import isotropic, named
 from sim.mesh import grid
+from sim.scene import Scene, assemble
 
 NO_AIR = QuadraticNormal(density=0.0)
 
@@ -158,3 +160,30 @@ def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the
         errors.append(float((final.velocity[:, 1] - 3 * np.exp(-1)).abs().max()))
     assert errors[1] < 1e-4
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_pressure_is_told_from_weight_by_nothing_where_stiffness_is_free() -> None:
+    """Newton's law by the mass: a = g + (pressure + inner forces)/m. So a pressure that is 1.6 times as large moves a
+    cloth as one that is 1.6 times lighter, and as many times softer in stretching and in bending, and no other."""
+    flat = grid(width=0.6, height=0.4, columns=6, rows=4)
+    cloth = replace(named("camel-ponte-roma"), damping=2e-3)
+    ends = []
+    for material, change in (
+        (cloth, 0.6),
+        (cloth.scaled(density=1 / 1.6, stretching=1 / 1.6, bending=1 / 1.6), 0.0),
+        (cloth.scaled(density=1 / 1.6, bending=1 / 1.6), 0.0),
+    ):
+        start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
+        held = tuple(int(v) for v in np.flatnonzero(flat.rest[:, 0] == 0))
+        scene = Scene(
+            mesh=flat, position=start + 1e-3 * np.sin(7 * flat.rest[:, :1] + 1), material=material,
+            wind=(4.0, 0.5, 0.0), handles=Handles(vertices=held, stiffness=math.inf),
+        )  # fmt: skip
+        system, state = assemble([scene])
+        if change:
+            system, state = apply([AirDensityChange(change=change)], system, state)
+        ends.append(advance(system, state, 0.2, steps=800, backend=Backend.TORCH).position.numpy())
+    denser, lighter, stiff = ends
+    np.testing.assert_allclose(denser, lighter, rtol=0, atol=1e-6)
+    assert np.abs(denser - start[..., None]).max() > 0.05
+    assert np.abs(denser - stiff).max() > 1e-4

@@ -1,4 +1,4 @@
-"""Rows that repeat a stamp and all their values are copies of one row: left out and told, never spread to other times."""
+"""Rows that repeat a stamp and all their values are copies of one row: left out and told, never spread."""
 
 from __future__ import annotations
 
