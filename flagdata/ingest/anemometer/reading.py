@@ -36,6 +36,7 @@ class Reading:
         rules: what is known about the instrument's errors.
         host_time: (n,) the logging computer's clock, where the file has it.
         findings: of the format.
+        stamped: whether each row has a stamp of its own; the lines of a stream have not, and cannot be sorted.
         drafted: the recipe (TOML) that was drafted from the file, "" where it was read by another.
         understood: what in the file spoke for that draft, completed by what the user said.
     """
@@ -49,6 +50,7 @@ class Reading:
     rules: QualityRules = field(default_factory=QualityRules)
     host_time: Instants | None = None
     findings: tuple[Finding, ...] = ()
+    stamped: bool = True
     drafted: str = ""
     understood: tuple[str, ...] = ()
 

@@ -59,6 +59,8 @@ def rows(form: str, count: int = 20) -> str:
 
 KN, KMH = 1852 / 3600, 1 / 3.6
 ONE = {"": (3.0, 4.9)}
+UNEVEN = (0, 1, 5, 6, 12, 13, 15, 22, 23, 24, 31, 33, 34, 38, 41, 42, 46, 51, 52, 58)
+"""Minutes of rows that come when something happens."""
 CASES = {
     "zone": Case(
         text="time,wind speed (m/s),wind dir\n" + rows("2026-05-01 14:{m:02d}:00,{v},{d}"), takes=["zone"], speeds=ONE
@@ -139,6 +141,14 @@ CASES = {
     "counts": Case(
         text="time,pulses\n" + rows("2026-05-01T12:{m:02d}:00Z,{n}"),
         takes=["columns"], answers={"2": "wind_speed[0.75 m/s]"}, speeds={"": (0.75, 15.0)}, direction=None,
+    ),
+    "rows-out-of-order-that-come-unevenly": Case(
+        text="time,wind speed (m/s),wind dir\n"
+        + "".join(
+            f"2026-05-01T12:{UNEVEN[at]:02d}:00Z,{3 + at / 10:.1f},{200 + at}\n"
+            for at in (*range(6), 8, 9, 6, 7, *range(10, 20))
+        ),
+        takes=["clock"], finding="time-backwards", speeds=ONE,
     ),
     "another-unit-by-the-values": Case(
         text="time,wind speed (m/s)\n"

@@ -150,7 +150,7 @@ class Nmea:
         return Reading(
             time=placed.time, channels=channels, flags=flags, line=line,
             sensor=Sensor(name=f"NMEA 0183 talker {talkers}"), step=NANOSECONDS,
-            findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, *about),
+            stamped=False, findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, *about),
         )  # fmt: skip
 
 

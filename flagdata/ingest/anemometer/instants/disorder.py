@@ -22,6 +22,9 @@ from flagdata.timebase import NANOSECONDS
 KIND = "rows-sorted"
 NEAR = 0.5
 """A step within this share of the usual one is regular."""
+SORT = "if the stamps are right and the rows are only out of order in the file, sort them: --clock sort"
+EDGES = 3
+"""Changes from one block to another among sorted rows, for each fall of the stamps, up to which they are few."""
 FITTING = 0.8
 """Share of the displaced rows that must lie a regular step from both their neighbours once sorted."""
 
@@ -92,6 +95,33 @@ def sorting(time: Instants, choice: ClockChoice | None) -> Sorting | None:
         order=order, displaced=int(displaced.sum()), first=int(np.flatnonzero(displaced)[0]),
         irregular=(before, after), step=step, told=told,
     )  # fmt: skip
+
+
+def in_blocks(time: Instants) -> bool:
+    """Whether rows that run back may be blocks out of order: sorted, each fills a place that the others leave free.
+
+    Of a clock that was set back the sorted rows lie among those before, row by row, or share their stamps; a stamp that
+    is wrong lies by itself. Where rows come unevenly nothing tells more, so it is for the user to say.
+
+    Args:
+        time: (n,) stamps in the order of the file.
+    """
+    falls = int((np.diff(time) < 0).sum())
+    order = np.argsort(time, kind="stable")
+    cuts = np.flatnonzero(np.diff(order) != 1)
+    steps = np.diff(time[order])
+    if not 0 < len(cuts) <= EDGES * falls or not np.all(steps[cuts] > 0):
+        return False
+    kept = np.zeros(len(time), dtype=bool)
+    kept[longest_rise(time)] = True
+    usual = np.diff(time[kept])
+    widest = int(usual.max()) if len(usual) else 0
+    edges = np.concatenate(([0], cuts + 1, [len(time)]))
+    for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        beside = [int(steps[at]) for at in (first - 1, end - 1) if 0 <= at < len(steps)]
+        if not kept[order[first]] and min(beside) > widest:
+            return False
+    return True
 
 
 def longest_rise(time: Instants) -> NDArray[np.int64]:

@@ -112,6 +112,8 @@ def _one_clock(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | 
     time, shifted = clock.continued(reading.time, every, choice)
     flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
     found = clock.report(reading.time, every, reading.line, choice)
+    if choice is None and jumps and _may_be_sorted(reading):
+        found = tuple(replace(one, fix=f"{one.fix}; {disorder.SORT}") for one in found)
     return replace(reading, time=time).with_findings(found, flags=flags)
 
 
@@ -165,7 +167,13 @@ def _left_out(reading: Reading, wild: NDArray[np.bool_], lag: NDArray[np.int64])
         value=float(lag.max()) / NANOSECONDS,
         what=f"{int(wild.sum())} rows with stamps far from their neighbours' ({iso(int(reading.time[first]))}); "
         "left out",
+        fix=disorder.SORT if _may_be_sorted(reading) else None,
     )  # fmt: skip
+
+
+def _may_be_sorted(reading: Reading) -> bool:
+    """Whether the user may say that the rows are out of order: they have stamps of their own, and fit where sorted."""
+    return reading.stamped and disorder.in_blocks(reading.time)
 
 
 def _without_repeated_stretches(reading: Reading) -> Reading:

@@ -144,3 +144,56 @@ def test_a_single_stamp_of_another_year_is_no_row_out_of_order(choice: ClockChoi
 
 def test_the_longest_rise_is_the_longest() -> None:
     assert longest_rise(np.array([3, 1, 2, 9, 4, 5])).tolist() == [1, 2, 4, 5]
+
+
+UNEVEN = np.cumsum(stream(10, "disorder").integers(1, 9, N)).tolist()
+"""Minutes of rows that come when something happens: sorted or not, their steps differ from the usual one."""
+GAPPY = [row + 4 * (row // 10) for row in range(N)]
+"""Minutes of rows with an interval behind every tenth."""
+
+
+def at_minutes(minutes: Sequence[int], rows: Sequence[int]) -> str:
+    lines = [f"{START + dt.timedelta(minutes=minutes[row])},{SPEEDS[row]}\n" for row in rows]
+    return "Timestamp,Wind speed (m/s)\n" + "".join(lines)
+
+
+def moved(first: int, count: int, to: int) -> list[int]:
+    rows = [row for row in range(N) if not first <= row < first + count]
+    return [*rows[:to], *range(first, first + count), *rows[to:]]
+
+
+@pytest.mark.parametrize(
+    ("minutes", "rows", "kind"),
+    [
+        (UNEVEN, moved(100, 1, 104), "time-backwards"),
+        (UNEVEN, moved(100, 8, 130), "time-backwards"),
+        (UNEVEN, moved(100, 40, 160), "clock-set-back"),
+        (UNEVEN, moved(200, 30, 100), "clock-set-back"),
+        (GAPPY, moved(100, 3, 105), "time-backwards"),
+        (GAPPY, blocks([0, 3, 1, 2, 4, 5]), "clock-set-back"),
+    ],
+)
+def test_blocks_that_sorting_would_put_in_their_place_are_left_to_the_user(
+    minutes: list[int], rows: list[int], kind: str, read: Read
+) -> None:
+    text = at_minutes(minutes, rows)
+    finding = told(read(text, zone="UTC"), kind)
+    assert "--clock sort" in (finding.fix or "")
+    found = read(text, zone="UTC", clock="sort")
+    assert found.series.channels["wind_speed"].tolist() == SPEEDS.tolist()
+    assert ((found.series.time - found.series.time[0]) // 60_000_000_000).tolist() == [
+        minute - minutes[0] for minute in minutes
+    ]
+
+
+@pytest.mark.parametrize("size", [-7, -30, -61])
+def test_sorting_is_not_offered_where_a_clock_was_set_back(size: int, read: Read) -> None:
+    minutes = [minute + (size if row >= 150 else 0) for row, minute in enumerate(UNEVEN)]
+    found = read(at_minutes(minutes, range(N)), zone="UTC")
+    assert not [f for f in found.findings if "--clock sort" in (f.fix or "")]
+
+
+def test_sorting_is_not_offered_for_a_stamp_far_from_all_others(read: Read) -> None:
+    minutes = [minute if row != 150 else -600_000 for row, minute in enumerate(UNEVEN)]
+    finding = told(read(at_minutes(minutes, range(N)), zone="UTC"), "time-backwards")
+    assert finding.fix is None
