@@ -25,9 +25,10 @@ no clock was set and the rows are out of order."""
 
 JITTER = 2 * NANOSECONDS
 """Disorder that buffers of a computer explain; a clock that is set back jumps further."""
-_REGULAR, _AROUND = 10, 20
-"""Steps within a tenth of the usual one are regular; so many before and after a small step back show a clock that was
-set."""
+_LEAST, _AROUND = 5, 20
+"""Steps before and after a small step back that are looked at, and those of them that must be steady up to it."""
+_APART = 1 / 3
+"""Share of a small jump by which no row around it may be off the clock on its side."""
 HOUR = 3600 * NANOSECONDS
 DAY = 24 * HOUR
 MOST = 4
@@ -82,14 +83,58 @@ def stepped_back(time: Instants) -> tuple[Jump, ...]:
         time: (n,) instants in the order of the rows.
     """
     rows = np.concatenate(([0], np.flatnonzero(np.diff(time)) + 1))
-    step, steps = usual(time), np.diff(time[rows])
-    regular = np.abs(steps - step) <= step // _REGULAR
-    found: list[Jump] = []
-    for at in np.flatnonzero(steps < 0).tolist():
-        before, after = regular[max(0, at - _AROUND) : at], regular[at + 1 : at + 1 + _AROUND]
-        if min(len(before), len(after)) == _AROUND and before.all() and after.all():
-            found.append(Jump(row=int(rows[at + 1]), size=int(steps[at]) - step, whole=False))
-    return tuple(found) if len(found) <= MOST else ()
+    steps = np.diff(time[rows])
+    found = [_stepped(time[rows], at, rows) for at in np.flatnonzero((steps < 0) & (steps >= -JITTER)).tolist()]
+    jumps = tuple(jump for jump in found if jump is not None)
+    return jumps if len(jumps) <= MOST else ()
+
+
+def stood(time: Instants) -> tuple[Jump, ...]:
+    """Rows of a steady log that share the stamp of the row before: one too many, or the first behind a clock that was
+    set back by one step. Where they are more than `MOST` it is the stamps that are coarse; of steps shorter than a
+    second rows that waited in a buffer are likelier.
+
+    Args:
+        time: (n,) instants in the order of the rows.
+    """
+    at = np.flatnonzero(np.diff(time) == 0)
+    if len(at) > MOST or usual(time) < NANOSECONDS:
+        return ()
+    every = np.arange(len(time))
+    return tuple(jump for row in at.tolist() if (jump := _stepped(time, row, every)) is not None)
+
+
+def _stepped(time: Instants, at: int, rows: NDArray[np.int64]) -> Jump | None:
+    """The jump between the rows `at` and `at + 1` of (n,) instants, where both sides of it are steady.
+
+    Args:
+        rows: (n,) numbers of the rows in the log.
+    """
+    step, steps = usual(time), np.diff(time)
+    near = np.abs(steps - step) <= step / 2
+    before = _length(near[max(0, at - _AROUND) : at][::-1])
+    after = _length(near[at + 1 : at + 1 + _AROUND])
+    if min(before, after) < _LEAST:
+        return None
+    behind = at + 1 + after
+    clock = [
+        (time[side] - time[at]).astype(np.float64) for side in (slice(at - before, at + 1), slice(at + 1, behind + 1))
+    ]
+    place = [np.arange(-before, 1.0), np.arange(1.0, after + 2)]
+    spread = [(row - row.mean(), since - since.mean()) for row, since in zip(place, clock, strict=True)]
+    # One step for both sides, by least squares; what is left between their means is the jump.
+    slope = sum(float(row @ since) for row, since in spread) / sum(float(row @ row) for row, _ in spread)
+    shift = round(float(clock[1].mean() - clock[0].mean() - slope * (place[1].mean() - place[0].mean())))
+    far = max(float(np.abs(since - slope * row).max()) for row, since in spread)
+    undone = behind < len(steps) and abs(int(steps[behind]) - step + shift) <= _APART * abs(shift)
+    if shift >= 0 or far > _APART * abs(shift) or undone:
+        return None
+    return Jump(row=int(rows[at + 1]), size=shift, whole=False)
+
+
+def _length(steady: NDArray[np.bool_]) -> int:
+    """How many of the first are true."""
+    return len(steady) if steady.all() else int(np.argmin(steady))
 
 
 def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
@@ -236,6 +281,21 @@ def doubt(time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64]) -> tup
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def doubt_where_it_stood(time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64]) -> tuple[Finding, ...]:
+    """What is said of rows of a steady log that share the stamp of the row before (`stood`); nothing is changed."""
+    return tuple(
+        Finding(
+            kind="clock-set-back", severity=Severity.WARNING, value=jump.size / NANOSECONDS,
+            where=f"line {line[jump.row]}",
+            what=f"the steady rows from line {line[jump.row]} on begin with the stamp of the row before them, "
+            f"{iso(int(time[jump.row]))}: either the clock was {jump.told()} at line {line[jump.row]} and what comes "
+            "before or after is off by that much, or there is one row too many; stamps are taken as written",
+            fix=_fix(jump),
+        )
+        for jump in jumps
+    )  # fmt: skip
 
 
 def _fix(jump: Jump) -> str:

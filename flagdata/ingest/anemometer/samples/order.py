@@ -7,7 +7,8 @@ Rules, in order:
 4. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
    those before, or those before are made to fit the ones after, as the user says; without a word of the user it is
    reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. So it is where the clock was set on,
-   except that without a word of the user nothing is changed. Refused: time that runs back again and again, or by no
+   except that without a word of the user nothing is changed, and where one row of a steady log repeats the stamp before
+   it, since the clock may have been set back by one step. Refused: time that runs back again and again, or by no
    whole hour to where the log never was, as in files that were joined.
 5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.
 6. Rows equal in stamp and values are the same row written several times: one is kept.
@@ -72,7 +73,7 @@ def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:
 def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
     lag = np.maximum.accumulate(reading.time) - reading.time
     if len(lag) == 0 or int(lag.max()) <= JITTER:
-        return _late_rows_sorted(_one_clock(reading, clock.stepped_back(reading.time), choice))
+        return _late_rows_sorted(_steady(reading, choice))
     few = max(FEW, len(reading.time) // 1000)
     jumps = clock.set_back(reading.time)
     wild = clock.excursions(reading.time, most=few) if len(jumps) <= few else np.zeros(len(lag), dtype=bool)
@@ -83,6 +84,17 @@ def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading
     if wild.any():
         settled = settled.with_findings((_left_out(reading, wild, lag),))
     return _late_rows_sorted(_one_clock(settled, jumps, choice))
+
+
+def _steady(reading: Reading, choice: ClockChoice | None) -> Reading:
+    """Rows that run back by no more than buffers explain, on one clock where it was set back by so little."""
+    differs = _differs(reading)
+    stood = tuple(jump for jump in clock.stood(reading.time) if differs[jump.row - 1])
+    if choice is None:
+        reading = reading.with_findings(clock.doubt_where_it_stood(reading.time, stood, reading.line))
+        stood = ()
+    jumps = (*clock.stepped_back(reading.time), *stood)
+    return _one_clock(reading, jumps, choice)
 
 
 def _believable(reading: Reading, jump: Jump, choice: ClockChoice | None) -> bool:
@@ -212,12 +224,7 @@ def _without_repeats(reading: Reading) -> Reading:
     """The rows without those that repeat the row before them in stamp and in everything that is read."""
     if len(reading.time) < 2:
         return reading
-    again = np.diff(reading.time) == 0
-    differs = np.zeros(len(again), dtype=bool)
-    for values in reading.channels.values():
-        differs |= ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
-    if reading.host_time is not None:
-        differs |= np.diff(reading.host_time) != 0
+    again, differs = np.diff(reading.time) == 0, _differs(reading)
     same = again & ~differs
     if not _copied(again, differs):
         # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice.
@@ -235,6 +242,16 @@ def _without_repeats(reading: Reading) -> Reading:
         what=f"{what}; left out as copies",
     )  # fmt: skip
     return reading.take(~twice).with_findings((finding,))
+
+
+def _differs(reading: Reading) -> NDArray[np.bool_]:
+    """(n - 1,) whether a row has other values than the one before it."""
+    differs = np.zeros(max(0, len(reading.time) - 1), dtype=bool)
+    for values in reading.channels.values():
+        differs |= ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
+    if reading.host_time is not None:
+        differs |= np.diff(reading.host_time) != 0
+    return differs
 
 
 def _copied(again: NDArray[np.bool_], differs: NDArray[np.bool_]) -> bool:

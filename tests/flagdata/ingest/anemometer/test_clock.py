@@ -94,6 +94,65 @@ def test_a_clock_set_back_by_two_seconds_in_a_steady_log_loses_no_row(
     )  # fmt: skip
 
 
+def fast(seconds: np.ndarray) -> str:
+    """As `log`, with stamps to the millisecond."""
+    stamps = [(NOON + dt.timedelta(seconds=float(at))).isoformat(" ", "milliseconds") for at in seconds]
+    values = readings(len(seconds))
+    return "time,wind_speed\n" + "".join(f"{at}Z,{v}\n" for at, v in zip(stamps, values, strict=True))
+
+
+@pytest.mark.parametrize(("n", "row", "size", "period"), [(30, 15, -2, 1), (14, 7, -2, 1), (24, 18, -1, 0.5)])
+def test_a_clock_set_back_by_a_second_in_a_short_log_loses_no_row(
+    n: int, row: int, size: float, period: float, read: Read
+) -> None:
+    found = read(fast(jumped(n, row, size, period)))
+    assert after(found) == pytest.approx((period * np.arange(n)).tolist())
+    assert found.series.channels["wind_speed"].tolist() == readings(n).tolist()
+    said = told(found, "clock-set-back")
+    assert (said.value, said.where) == (size, f"line {row + 2}")
+    assert f"clock set back {-size:g} s at line {row + 2}" in said.what
+    assert not [f for f in found.findings if f.kind in ("duplicate-stamps", "equal-stamps", "time-backwards")]
+    last = read(fast(jumped(n, row, size, period)), clock="last")
+    assert after(last) == pytest.approx((period * np.arange(n) + size).tolist())
+
+
+def test_a_clock_set_back_by_a_second_shows_through_unsteady_stamps(read: Read) -> None:
+    # the time of each row is off by up to a fifth of the step, so the rows tell the size of the jump together
+    noise = stream(7, "clock").uniform(-0.1, 0.1, 400)
+    found = read(fast(jumped(400, 200, -1, 0.5) + noise))
+    assert len(found.series) == 400
+    assert float(told(found, "clock-set-back").value or 0) == pytest.approx(-1, abs=0.1)
+    assert after(found) == pytest.approx((0.5 * np.arange(400)).tolist(), abs=0.2)
+
+
+def test_rows_that_come_late_together_are_no_clock(read: Read) -> None:
+    seconds = 0.5 * np.arange(200)
+    seconds[80:88] -= 1  # a block of rows whose stamps are a second early, and those after it are not
+    found = read(fast(seconds))
+    assert "clock-set-back" not in {finding.kind for finding in found.findings}
+
+
+@pytest.mark.parametrize("period", [1, 60])
+def test_one_stamp_twice_in_a_steady_log_may_be_a_clock_set_back_by_one_step(period: int, read: Read) -> None:
+    text = log(jumped(200, 80, -period, period))
+    found = read(text)
+    assert len(found.series) == 199  # without a word of the user a second record of an instant is left out
+    said = told(found, "clock-set-back")
+    assert (said.value, said.where, said.severity) == (-period, "line 82", Severity.WARNING)
+    assert "set back 1 " in said.what
+    for choice, shift in (("first", 0), ("last", -period)):
+        assert choice in (said.fix or "")
+        assert after(read(text, clock=choice)) == (period * np.arange(200) + shift).tolist()
+
+
+def test_a_row_written_twice_in_a_steady_log_is_no_clock(read: Read) -> None:
+    lines = log(np.arange(200.0)).splitlines(keepends=True)
+    found = read("".join([*lines[:81], *lines[80:]]))
+    assert {finding.kind for finding in found.findings} == {"duplicate-rows"}
+    told_first = read("".join([*lines[:81], *lines[80:]]), clock="first")
+    assert after(told_first) == list(range(200))
+
+
 def test_a_row_that_comes_late_by_a_second_is_no_clock(read: Read) -> None:
     seconds = np.arange(200.0)
     seconds[[80, 81]] = seconds[[81, 80]]
