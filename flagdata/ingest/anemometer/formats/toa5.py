@@ -23,7 +23,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
-from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.tables import offered_columns
 from flagdata.ingest.anemometer.tables.rowclock import Given
 from flagdata.ingest.anemometer.tables.table import read_table
 from flagdata.ingest.anemometer.text.layout import lay_out
@@ -257,7 +257,7 @@ def _offer(source: TextFile) -> str:
         return ""
     time = find_time(layout)
     winds, _, _ = find_winds(layout, time=time.columns if time is not None else ())
-    offered = f"{stated_columns.offer(layout, time, winds)}; or "
+    offered = f"{offered_columns.offer(layout, time, winds)}; or "
     if not winds:
         return offered
     unit_too = " --unit m/s (or km/h, mph, kn, after the program)" if any(wind.without_unit() for wind in winds) else ""

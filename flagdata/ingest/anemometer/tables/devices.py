@@ -23,7 +23,7 @@ from flagdata.ingest.anemometer.instants.clock import JITTER
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
-from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.tables import offered_columns, stated_columns
 from flagdata.ingest.anemometer.text.layout import Layout, lay_out
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -217,7 +217,7 @@ def _fix(layout: Layout, at: int, options: WindOptions, *, clock: bool) -> str:
         line = f'say which column tells them apart: --columns "{stated_columns.with_site(options.columns, at)}"'
     else:
         time = find_time(layout, order=options.date_order)
-        line = stated_columns.offer(replace(layout, site=at), time, _winds(layout, time, options))
+        line = offered_columns.offer(replace(layout, site=at), time, _winds(layout, time, options))
     line += "" if options.wind is None else ", in place of --wind"
     if not clock:
         return line

@@ -16,7 +16,14 @@ import numpy as np
 from flagdata.ingest.anemometer.instants import counted, yearless, zones
 from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.ingest.anemometer.recipe import DELIMITERS
-from flagdata.ingest.anemometer.tables import quality_columns, stated_columns, stated_rate, unread, unread_winds
+from flagdata.ingest.anemometer.tables import (
+    offered_columns,
+    quality_columns,
+    stated_columns,
+    stated_rate,
+    unread,
+    unread_winds,
+)
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.tables.stated_unit import stated_unit
 from flagdata.ingest.anemometer.text.cells import numbers
@@ -229,13 +236,13 @@ def _doubts(
     found: list[Doubt] = []
     names = ", ".join(repr(name) for name in layout.names if name) or "no names"
     if time is None:
-        offered = stated_columns.offer(layout, time, winds)
+        offered = offered_columns.offer(layout, time, winds)
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
         above = stated_rate.advice(lines[: layout.preamble])
         fix += f" ({above})" if above else ""
         found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
     elif time.doubt is not None and time.fix is not None:
-        offered = f"; {stated_columns.offer(layout, time, winds)}" if time.counts else ""
+        offered = f"; {offered_columns.offer(layout, time, winds)}" if time.counts else ""
         found.append(Doubt(what=time.doubt, fix=f"{time.fix}{offered}"))
     classes = beaufort(layout)
     if not winds and classes:
@@ -244,11 +251,11 @@ def _doubts(
     elif not winds and (counted_by := counts(layout)):
         what = f"column {layout.names[counted_by[0]]!r} is what an anemometer counts or gives, not yet a speed"
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
-        found.append(Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, counted_by[0])))
+        found.append(Doubt(what=what, fix=fix + offered_columns.calibrated(layout, time, counted_by[0])))
     elif not winds and (directions := _directions(layout)):
         what = f"column {directions[0]!r} is a direction of the wind, but no column is its speed"
         fix = "log the speed beside it; if a column is the speed all the same, or the direction alone is wanted, "
-        fix += stated_columns.offer(layout, time, winds)
+        fix += offered_columns.offer(layout, time, winds)
         found.append(Doubt(what=what, fix=fix))
     elif not winds:
         fix = "name the column of the wind's speed by its heading or number: --wind COLUMN, with its unit: --unit m/s"
@@ -256,7 +263,7 @@ def _doubts(
             name = in_shell(layout.names[only] if layout.by_name else str(only + 1))
             fix = f"if column {only + 1}, the only one of numbers, is the wind's speed: --wind {name} --unit m/s"
             fix += " (or its unit)"
-        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
+        fix += "" if time is None or time.counts else f"; or {offered_columns.offer(layout, time, winds)}"
         own = own_motion.doubt(layout)
         what = f"no column is surely a wind; {f'{own}; ' if own else ''}the columns are {names}"
         found.append(Doubt(what=what, fix=fix))
@@ -273,7 +280,7 @@ def _doubts(
     unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
     if unsure:
         fix = f"if it is the wind, name it: --wind {in_shell(unsure[0])}"
-        fix += "" if time is None or time.counts else f"; or {stated_columns.offer(layout, time, winds)}"
+        fix += "" if time is None or time.counts else f"; or {offered_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         own = own_motion.doubt(layout)
         what += f"; {own}" if own else ""
@@ -294,7 +301,7 @@ def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
             continue
         what = f"column {wind.label!r} goes below zero, to {known.min():g}: a component of the wind, not its speed"
-        line = stated_columns.offer(layout, time, ())
+        line = offered_columns.offer(layout, time, ())
         fix = (
             f"if two columns are its components, say so with wind_x and wind_y (x to the east, y to the north): {line}"
         )
@@ -328,7 +335,7 @@ def _unit_doubt(
     if column in counts(layout):
         what = f"column {layout.names[column]!r} is what an anemometer counts or gives, not yet a speed"
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
-        return Doubt(what=what, fix=fix + stated_columns.calibrated(layout, time, column))
+        return Doubt(what=what, fix=fix + offered_columns.calibrated(layout, time, column))
     value = numbers(layout.column(column), decimal=layout.decimal).value
     if missing[0] == "wind_speed" and cumulated.grows(value):
         what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {cumulated.WHAT}"
@@ -413,7 +420,7 @@ def skeleton(lines: Sequence[str]) -> tuple[str, str, str] | None:
         f"a table of {layout.number_of_columns()} columns divided by {delimiter_name(layout.delimiter)!r}, "
         f"{f'called {names}' if names else 'which no line names'}, the first row {first}"
     )
-    return what, stated_columns.offer(layout, None, ()), _toml(layout, None, None)
+    return what, offered_columns.offer(layout, None, ()), _toml(layout, None, None)
 
 
 def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.tables import offered_columns, stated_columns
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
@@ -27,7 +27,7 @@ def from_either_north(layout: Layout, time: TimeChoice | None, winds: Sequence[W
             continue
         what = f"column {name!r} may be from true or magnetic north: left out"
         if time is not None and winds:
-            line = stated_columns.read_also(layout, time, winds[0], index)
+            line = offered_columns.read_also(layout, time, winds[0], index)
             what += f'; if from true north: --columns "{line}", else with wind_direction_magnetic for wind_direction'
         found.append(what)
     return tuple(found)
@@ -56,18 +56,18 @@ def directions(
         called = repr(name) if name else f"number {index + 1}"
         units = _may_be(layout, index)
         if units:
-            line = stated_columns.read_also(layout, time, wind, index, unit_name=units[0])
+            line = offered_columns.read_also(layout, time, wind, index, unit_name=units[0])
             others = f", or with {' or '.join(f'[{unit}]' for unit in units[1:])}" if units[1:] else ""
             found.append(f'to read column {called} as the wind\'s direction: --columns "{line}"{others}')
             continue
         if any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
             continue
         if set(words_of(name)) & _RELATIVE:
-            line = stated_columns.read_also(layout, time, wind, index, channel="apparent_wind_direction")
+            line = offered_columns.read_also(layout, time, wind, index, channel="apparent_wind_direction")
             what = "is a direction from its platform's bow or mark, not from north"
             found.append(f'column {called} {what}: left out; to keep it as such: --columns "{line}"')
             continue
-        line = stated_columns.read_also(layout, time, wind, index)
+        line = offered_columns.read_also(layout, time, wind, index)
         found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
     return tuple(found) or _unnamed_direction(layout, time, wind, taken)
 
@@ -78,11 +78,9 @@ def _unnamed_direction(layout: Layout, time: TimeChoice, wind: Wind, taken: Coll
     if speed is None or understand(layout.names[speed.index], layout.units[speed.index]).channel:
         return ()
     headings = enumerate(zip(layout.names, layout.units, strict=True))
-    others = [at for at, heading in headings if at not in taken and not understand(*heading).quantity]
-    if not others:
+    if all(at in taken or understand(*heading).quantity for at, heading in headings):
         return ()
-    line = stated_columns.read_also(layout, time, wind, others[0], unit_name="deg")
-    line = line.replace(f"{others[0] + 1}=wind_direction", "?=wind_direction")
+    line = offered_columns.read_also(layout, time, wind, None)
     return (f'no direction is read beside this speed; if one holds it: --columns "{line}" with its number for the ?',)
 
 
@@ -101,11 +99,11 @@ def otherwise(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str,
     if not judged.doubt:
         return ()
     if judged.may_be and judged.may_be[0] != column.unit:
-        line = stated_columns.read_also(layout, time, wind, column.index, unit_name=judged.may_be[0])
+        line = offered_columns.read_also(layout, time, wind, column.index, unit_name=judged.may_be[0])
         return (f'to read column {name!r} in {judged.may_be[0]}: --columns "{line}"',)
     if set(words_of(name)) & COURSES:
         to = stated_columns.TOWARDS
-        line = stated_columns.read_also(layout, time, wind, column.index, unit_name=column.unit, channel=to)
+        line = offered_columns.read_also(layout, time, wind, column.index, unit_name=column.unit, channel=to)
         return (f'to read column {name!r} as where the wind blows to: --columns "{line}"',)
     return ()
 

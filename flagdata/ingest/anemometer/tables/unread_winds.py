@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.tables import offered_columns
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import own_motion
@@ -69,7 +69,7 @@ def remark(
     speed = next((index for index in speeds if _words(layout, index) & _HIGHEST), next(iter(speeds), None))
     if speed is None or time is None or wind is None:
         return (what,)
-    line = stated_columns.read_instead(layout, time, wind, speed)
+    line = offered_columns.read_instead(layout, time, wind, speed)
     read = f"to read {layout.names[speed]!r} as a wind of its own, ingest the file once more with"
     return (f'{what}; {read} --columns "{line}"',)
 

@@ -160,6 +160,6 @@ def test_a_speed_that_the_user_names_by_its_number_tells_that_no_direction_is_re
     rows = "".join(f"20260501-12{at:02d}00 4.4 87.8 {1 + at / 10:.1f} {20 + at}.5 0.8\n" for at in range(12))
     log = read_log(log_file(rows), WindOptions(wind="4", unit="m/s", zone="UTC"))
     told = " ".join(finding.what for finding in log.findings if finding.kind == "columns-not-read")
-    assert '--columns "1=time,?=wind_direction[deg],4=wind_speed[m/s]"' in told
+    assert '--columns "1=time,4=wind_speed[m/s],?=wind_direction[deg]"' in told
     read = read_log(log_file(rows), WindOptions(columns="1=time,5=wind_direction[deg],4=wind_speed[m/s]", zone="UTC"))
     np.testing.assert_allclose(np.rad2deg(read.series.channels["wind_direction"][:2]), [20.5, 21.5], atol=1e-9)

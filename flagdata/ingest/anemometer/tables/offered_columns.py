@@ -1,0 +1,227 @@
+"""Lines of columns that are offered to the user: what is known of a table filled in, and "?" where it is not.
+
+They are lines as `stated_columns` reads them, so that each can be given back as it is printed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARDS, shown
+from flagdata.ingest.anemometer.text.cells import numbers
+from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
+from flagdata.ingest.anemometer.winds.directions import judge
+from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Wind
+from flagdata.ingest.anemometer.words import headings
+from flagdata.ingest.anemometer.words.headings import fits, understand
+from flagdata.schema import CHANNELS
+
+_COUNT_AND_WIND, _ROWS, _UNEVEN = 2, 4, 0.01
+"""Columns and steps from which a count is told, and the share of a step by which others may differ."""
+_WIDE = 12
+"""Columns up to which an offer lists all of them."""
+
+
+def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str:
+    """The option with which the user says what the columns are, as far as they are known; "?" where they are not."""
+    width, own = layout.number_of_columns(), own_motion.columns(layout)
+    known = _known(layout, time, winds)
+    speeds = [entry for entry in known.values() if entry.split("[")[0] in (*SPEEDS, *COMPONENTS)]
+    if speeds:  # weather of a unit that nothing tells is not to be asked for with the wind
+        known = {at: entry for at, entry in known.items() if not entry.endswith("[?]") or _of_wind_or_time(entry)}
+    named = "?" in known.values() or any("wind" in entry for entry in known.values())
+    if width > _WIDE or not named:
+        listed = [f"{at + 1}={entry}" for at, entry in sorted(known.items()) if "?" not in entry.split("[")[0]]
+        entries = {entry.split("[")[0] for entry in known.values()}
+        listed += ["?=time"] if time is None and not {"time", "date"} & entries else []
+        directed = any("wind_direction" in entry for entry in known.values())
+        listed += ["?=wind_speed[?]"] if not winds and not speeds else []
+        listed += ["?=wind_direction[deg]"] if not winds and not speeds and not directed else []
+        line = ",".join(listed)
+    else:
+        line = ",".join(known.get(at, "") for at in range(width))
+    others = [
+        name for at, name in enumerate(layout.names) if at not in {*known, *own}
+        and ("wind_speed" if _alone(layout, at) else understand(name, layout.units[at]).channel)
+        in {entry.split("[")[0] for entry in speeds}
+    ]  # fmt: skip
+    further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
+    example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
+    steady = _steady(layout) if time is None and "time[?]" in known.values() else None
+    if steady is not None:
+        units = ", ".join(counted.UNITS[:-1]) + f" or {counted.UNITS[-1]}"
+        counts = f"; where column {steady + 1} is the time since a start, write {units} in time[?] and add --start TIME"
+        further = counts + further
+    return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
+
+
+def _steady(layout: Layout) -> int | None:
+    """The first column, where it has no heading and rises by a steady step, as the time since a start does."""
+    if layout.names[0] or layout.number_of_columns() < _COUNT_AND_WIND:
+        return None
+    value = numbers(layout.column(0), decimal=layout.decimal).value
+    step = np.diff(value)
+    if len(step) < _ROWS or not np.all(np.isfinite(step)) or value[0] < 0:
+        return None
+    usual = float(np.median(step))
+    return 0 if usual > 0 and bool(np.all(np.abs(step - usual) <= _UNEVEN * usual)) else None
+
+
+def _of_wind_or_time(entry: str) -> bool:
+    return "wind" in entry or entry.startswith(("time", "date"))
+
+
+def read_also(
+    layout: Layout, time: TimeChoice, wind: Wind, direction: int | None, *, unit_name: str | None = None,
+    channel: str = "wind_direction",
+) -> str:  # fmt: skip
+    """The line that says what was understood of a table, and that a further column is the wind's direction.
+
+    Args:
+        direction: its column; `None` where only the user knows it, who writes its number in place of the "?".
+        unit_name: of the direction; `None` takes the one its values are likely in, degrees where no column is named.
+        channel: that the direction is.
+    """
+    unit = unit_name or ("deg" if direction is None else unit_of(layout, direction))
+    entries = _understood(layout, time, (wind,))
+    if direction is not None:
+        entries[direction] = f"{channel}[{unit}]"
+    return ",".join([*_numbered(entries), *([f"?={channel}[{unit}]"] if direction is None else [])])
+
+
+def _numbered(entries: Mapping[int, str]) -> list[str]:
+    """Entries behind the numbers of their columns."""
+    return [f"{at + 1}={entry}" for at, entry in sorted(entries.items())]
+
+
+def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> str:
+    """The line that reads another column as the wind's speed, by the time and the direction of the one understood."""
+    known = wind.columns.get("wind_speed")
+    stated_unit = understand(layout.names[speed], layout.units[speed]).unit or (known.unit if known else None)
+    others = {
+        name: column for name, column in wind.columns.items()
+        if not name.startswith(("apparent", "theoretical")) and name not in ("wind_speed", *COMPONENTS)
+    }  # fmt: skip
+    entries = _understood(layout, time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
+    return ",".join(_numbered(entries))
+
+
+def calibrated(layout: Layout, time: TimeChoice | None, column: int) -> str:
+    """The option that reads a column of counts or of a frequency as a speed, by what one of them is in m/s."""
+    known = {at: entry for at, entry in _known(layout, time, ()).items() if "?" not in entry and "speed" not in entry}
+    entries = {**known, column: "wind_speed[? m/s]"}
+    line = ",".join(_numbered(entries))
+    return (
+        f'--columns "{line}" with what one of them is in m/s in place of the ?, as wind_speed[0.765 m/s]; '
+        "a calibration with an offset is a recipe's gain and offset"
+    )
+
+
+def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of the columns of the site, of the time and of the first wind, by their index."""
+    found: dict[int, str] = {} if layout.site is None else {layout.site: SITE}
+    if time is not None:
+        forms = (time.form or "").split(" ")
+        parts = {form: name for name, form in PARTS.items()}
+        if 1 < len(time.columns) == len(forms):
+            found |= {at: _part(form, parts) for at, form in zip(time.columns, forms, strict=True)}
+        elif len(time.columns) == 1:
+            elapsed = time.form is not None and counted.is_elapsed(time.form)
+            found[time.columns[0]] = f"time[{time.form}]" if elapsed else "time[?]" if time.counts else "time"
+        else:
+            found |= dict(zip(time.columns, ("date", *["time"] * len(time.columns)), strict=False))
+    for wind in winds[:1]:
+        for channel, column in wind.columns.items():
+            name = TOWARDS if column.towards else channel
+            found.setdefault(column.index, f"{name}[{column.unit or '?'}]")
+    return found
+
+
+def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
+    """Entries of columns by their index."""
+    found = _understood(layout, time, winds)
+    timed = time is not None
+    steady, own = None if timed else _steady(layout), own_motion.columns(layout)
+    stamped = _stamped(layout)
+    if steady is not None:
+        found[steady] = "time[?]"
+    for at, name in enumerate(layout.names):
+        if at in found:
+            continue
+        kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
+        heading = understand(name, layout.units[at])
+        if not timed and at == stamped and not any(e.startswith("time") for e in found.values()):
+            found[at] = "time[?]"
+        elif at in own:
+            found |= {} if winds else {at: "?"}
+        elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
+            if compass_unit(layout, at) is not None:
+                found[at] = heading.channel
+                continue
+            if heading.channel in COMPONENTS and _alone(layout, at):
+                # v_wind may be a speed (v, velocity), or the component towards the north
+                found |= {} if winds else {at: "?"}
+                continue
+            guessed = heading.unit if fits(heading.channel, heading.unit) else None
+            if guessed is None and CHANNELS[heading.channel].unit == "rad" and _in_doubt(layout, at):
+                guessed = "?"
+            found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
+        elif heading.quantity:
+            continue
+        elif may_be_direction(layout, at) and not any("wind_direction" in entry for entry in found.values()):
+            found[at] = "wind_direction" if compass_unit(layout, at) else "wind_direction[deg]"
+        elif (not winds and {"number", "stamp"} & set(kinds)) or (
+            not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
+        ):
+            found[at] = "?"
+    return found
+
+
+def _stamped(layout: Layout) -> int | None:
+    """The first column of stamps, or else the first whose heading is a time above words with digits."""
+    columns = [[cell for cell in layout.column(at) if cell_kind(cell) != "missing"] for at in range(len(layout.names))]
+    stamps = (at for at, cells in enumerate(columns) if cells and cell_kind(cells[0]) == "stamp")
+    worded = (
+        at for at, cells in enumerate(columns)
+        if cells and cell_kind(cells[0]) == "text" and re.search(r"\d", cells[0])
+        and headings.names_time(layout.names[at])
+    )  # fmt: skip
+    return next(stamps, next(worded, None))
+
+
+def _alone(layout: Layout, index: int) -> bool:
+    """Whether a column is a component of the wind, and none along another axis is beside it."""
+    along = {understand(name, stated).channel for name, stated in zip(layout.names, layout.units, strict=True)}
+    return along & set(COMPONENTS) == {understand(layout.names[index], layout.units[index]).channel}
+
+
+def _in_doubt(layout: Layout, index: int) -> bool:
+    """Whether the numbers of a direction may be in another unit than degrees, or are no angles."""
+    heading = understand(layout.names[index], layout.units[index])
+    judged = judge(heading, numbers(layout.column(index), decimal=layout.decimal).value, heading.channel)
+    return in_tens(layout, index) or bool(judged.left_out)
+
+
+def _part(form: str, parts: Mapping[str, str]) -> str:
+    """The entry of a column that is a part of a time, written as `form`; `parts` are names by directives."""
+    if form in parts:
+        return parts[form]
+    if form == "%b":
+        return "month"
+    if form == "%H%M":
+        return "time[%H%M]"
+    if form in ("%Q", "%J"):
+        return f"{'hour' if form == '%Q' else 'day_of_year'}[{form}]"
+    return "time" if counted.is_time_of_day(form) else "date" if set("dmyYb") & set(form) else f"time[{form}]"
+
+
+def _guessed(channel: str) -> str:
+    return "deg" if CHANNELS[channel].unit == "rad" else "?"
