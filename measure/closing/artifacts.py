@@ -128,7 +128,8 @@ def read(path: Path) -> tuple[Verdict, str]:
 
 
 def fingerprint(experiment: Experiment) -> str:
-    """SHA-256 of all that is known of an experiment: cloth, pins, recordings and wind; not of names and files."""
+    """SHA-256 of all that is known of an experiment, and how well: cloth, pins, recordings and wind; not of names and
+    files."""
     specimen = experiment.specimen
     material = specimen.material
     total = hashlib.sha256()
@@ -137,13 +138,15 @@ def fingerprint(experiment: Experiment) -> str:
         "anchors-told": specimen.anchors_told, "gravity": list(specimen.gravity),
         "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
         "material": [material.density, material.damping],
-        "recordings": [[r.rate, r.noise] for r in experiment.recordings],
+        "density-uncertainty": specimen.density_uncertainty if specimen.mass_known else None,
+        "recordings": [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings],
     }).encode())  # fmt: skip
     arrays: list[Any] = [
         specimen.mesh.rest, specimen.mesh.faces, specimen.anchors, material.stretching, material.bending,
     ]  # fmt: skip
     for recording in experiment.recordings:
         arrays += [recording.markers, recording.positions, recording.wind.times, recording.wind.velocity]
+        arrays += [] if recording.seen is None else [recording.seen]
     for values in arrays:
         array = np.ascontiguousarray(values)
         total.update(f"{array.dtype.str}{array.shape}".encode())

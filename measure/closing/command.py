@@ -62,6 +62,12 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 )
 @click.option("--zone", help="Time zone of the stamps of a log: +02:00, or an IANA name.")
 @click.option("--material", help="Nominal material, a name of the catalog; by default the one that the source states.")
+@click.option(
+    "--density-uncertainty",
+    type=click.FloatRange(0, 1, min_open=True),
+    help="Relative standard uncertainty of the material's area weight: 0.02 for a cloth that was weighed to 2 %; "
+    "by default 0.3.",
+)
 @click.option("--size", metavar="WxH", help="Size of the flat cloth [m]; by default the outline of the markers.")
 @click.option(
     "--pins",
@@ -99,6 +105,7 @@ def close_loop(
     sensor: str | None,
     zone: str | None,
     material: str | None,
+    density_uncertainty: float | None,
     size: str | None,
     pins: str | None,
     rate: float | None,
@@ -145,7 +152,7 @@ def close_loop(
     lake = None if lake_path is None else Lake.open(lake_path)
     said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
     options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
-    setup = _setup(Setup() if recipe is None else recipe.setup, material, size, pins)
+    setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
     if recipe is not None and recipe.recordings:
         observed = recipes.read(replace(recipe, setup=setup), lake)
     else:
@@ -249,7 +256,9 @@ def _up(context: click.Context, text: str, recipe: ExperimentRecipe | None) -> U
     return Up(text)
 
 
-def _setup(setup: Setup, material: str | None, size: str | None, pins: str | None) -> Setup:
+def _setup(
+    setup: Setup, material: str | None, density_uncertainty: float | None, size: str | None, pins: str | None
+) -> Setup:
     """A setup with what the command line says instead."""
     from measure.observe import Hold, sheet
     from sim.material import MATERIALS, named
@@ -258,6 +267,8 @@ def _setup(setup: Setup, material: str | None, size: str | None, pins: str | Non
         if material not in MATERIALS.names():
             raise UnknownNameError.of("material", material, MATERIALS.names(), where="--material")
         setup = replace(setup, material=named(material))
+    if density_uncertainty is not None:
+        setup = replace(setup, mass_known=True, density_uncertainty=density_uncertainty)
     if size is not None:
         try:
             width, height = (float(part) for part in size.lower().split("x"))

@@ -17,6 +17,7 @@ from scipy.spatial import Delaunay
 from flagdata.errors import FlagdataError
 from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
+from measure.forecasting.observer import SegmentWind
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.effects import Effect, apply
@@ -27,12 +28,14 @@ from sim.integrate.split import SplitEuler
 from sim.integrate.symplectic import SAFETY, Symplectic
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
+from sim.system import System
 
 Floats = NDArray[np.float64]
 
 _SETTLE = 3.0  # s; a flag of 1.5 m has forgotten a start from rest after two swings
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
+_SAMPLED = 0.05  # s, of winds that blow
 _UNEVEN = 0.2  # share of the spacing by which inner vertices are moved at most
 _HALVINGS = 3  # of the step of a run that diverges
 _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
@@ -50,6 +53,7 @@ class NullBatch:
         noise: standard deviation of a marker's coordinate [m].
         calibrations: one a recording.
         speeds: of the wind, along +x, one a recording [m/s].
+        winds: that blow in place of steady ones of these speeds, one a recording; none where they are steady.
         seed: of the numerics, the starts and the noise.
         stretching: factor on the nominal tables of stretching.
         effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
@@ -64,6 +68,7 @@ class NullBatch:
     speeds: tuple[float, ...]
     seed: int
     stretching: float = 1.0
+    winds: tuple[WindTrack, ...] = ()
     effects: tuple[Effect, ...] = ()
 
     def simulate(self) -> list[Trajectory]:
@@ -74,9 +79,9 @@ class NullBatch:
         return [
             Trajectory(
                 name=f"null {self.seed}-{place}", markers=self.markers, positions=seen[..., place] + jitter[..., place],
-                rate=self.rate, wind=WindTrack.constant((speed, 0.0, 0.0)), noise=self.noise,
+                rate=self.rate, wind=wind, noise=self.noise,
             )
-            for place, speed in enumerate(self.speeds)
+            for place, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
         ]  # fmt: skip
 
     @property
@@ -143,6 +148,8 @@ class NullBatch:
                 )
             )  # fmt: skip
         system, state = apply(self.effects, *assemble(scenes))
+        if self.winds:
+            system = replace(system, wind=self._blowing(system))
         frames = []
         with torch.no_grad():
             for frame in range(round((_SETTLE + self.duration) * self.rate)):
@@ -150,6 +157,13 @@ class NullBatch:
                 if frame >= round(_SETTLE * self.rate):
                     frames.append(state.position.double().numpy().copy())
         return np.stack(frames)
+
+    def _blowing(self, system: System) -> SegmentWind:
+        """The winds since the start of the run."""
+        times = np.arange(math.ceil((_SETTLE + self.duration) / _SAMPLED) + 1, dtype=np.float64) * _SAMPLED - _SETTLE
+        samples = np.stack([wind.at(times) for wind in self.winds], axis=-1)
+        blown = torch.as_tensor(samples, dtype=system.cloth.dtype, device=system.cloth.device)
+        return SegmentWind(period=_SAMPLED, samples=blown)
 
     def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
         """A method for these dampings with steps that were halved so often, and the damping it adds by itself [s]."""

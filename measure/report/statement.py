@@ -14,7 +14,7 @@ from measure.loop.corrective_field import Mode
 from measure.loop.run import Outcome
 from measure.loop.selection import heterogeneous
 from measure.nulls.conformal import MOST_KINDS, kinds_needed
-from measure.observe.trajectory import Experiment
+from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.course import ALONG, LEFT, Variation
 from measure.probes.lines import STROUHAL, Line
 from measure.report.sentences import readable, titles
@@ -36,6 +36,8 @@ _SEPARATES: dict[frozenset[str], str] = {
 }
 
 
+_ROUGH = 0.1
+"""Relative uncertainty of the density from which on weighing the cloth tells more than its name."""
 _AXES = ("along the wind", "across the wind", "up")
 
 
@@ -196,6 +198,19 @@ def _where(mode: FieldColumn) -> str:
     return f"{_AXES[mode.axis]}, {shapes[mode.mode]}"
 
 
+def _weighed(specimen: Specimen) -> tuple[str, ...]:
+    """How well its mass is known, and what that leaves open; nothing where it is not known."""
+    known = specimen.density_uncertainty
+    if not specimen.mass_known:
+        return ()
+    told = f"its density is known to {100 * known:.2g} % (one standard deviation)"
+    weighing = (
+        ": a pressure of the air that is off by as much is told from another weight only by how the cloth stretches, "
+        "which a cloth that was weighed to 2 % would settle (density-uncertainty = 0.02)"
+    )
+    return (told + weighing if known >= _ROUGH else told,)
+
+
 def assumptions(experiment: Experiment) -> tuple[str, ...]:
     """What was taken as given."""
     specimen = experiment.specimen
@@ -220,6 +235,7 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
+        *_weighed(specimen),
         f"it is held at {len(specimen.held)} points {held}{places}",
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
         logged,

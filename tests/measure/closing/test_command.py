@@ -17,9 +17,10 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.markers.store import ingest_markers
 from flagdata.lake import Lake
+from measure.closing.command import _setup as setup_of
 from measure.closing.command import doubted
 from measure.closing.sources import Reading, read
-from measure.observe import Up
+from measure.observe import Setup, Up
 from measure.verdict.record import Conclusion
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag
 from tests.measure.report.verdicts import Size, verdict
@@ -57,6 +58,8 @@ def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[
         (["nowhere.csv", "--nulls", "200", "--bank", "."], 2, "both --nulls and --bank"),
         (["nowhere.csv", "--level", "1.5"], 2, "1.5"),
         (["nowhere.csv", "--material", "camel-ponte-rom"], 2, "camel-ponte-rom"),
+        (["nowhere.csv", "--density-uncertainty", "0"], 2, "density-uncertainty"),
+        (["nowhere.csv", "--density-uncertainty", "2"], 2, "density-uncertainty"),
         (["nowhere.csv", "--size", "1.5"], 2, "not a size"),
         (["nowhere.csv", "--pins", "hoist-corner"], 2, "no place"),
         (["nowhere.csv", "--up", "w"], 2, "unknown axis"),
@@ -189,3 +192,10 @@ def test_a_speed_needs_an_axis_and_a_source_a_place(table: Path) -> None:
 def test_recordings_of_one_name_are_told_apart(table: Path) -> None:
     names = [seen.name for seen in read([str(table), str(table)], ["4"], Reading(rate=RATE), None)]
     assert len(set(names)) == 4
+
+
+def test_the_uncertainty_of_the_weight_on_the_command_line_is_that_of_the_setup() -> None:
+    unweighed = Setup(mass_known=False)
+    setup = setup_of(unweighed, None, 0.02, None, None)
+    assert (setup.mass_known, setup.density_uncertainty) == (True, 0.02)
+    assert setup_of(unweighed, None, None, None, None) == unweighed

@@ -129,10 +129,17 @@ def test_the_identity_is_that_of_all_that_was_known(specimen: Specimen) -> None:
     moved = replace(specimen, anchors=specimen.anchors + 1e-3)
     others = [
         experiment(specimen, speed=4.1), experiment(heavier), experiment(moved),
-        experiment(replace(specimen, stiffness=math.inf)),
+        experiment(replace(specimen, stiffness=math.inf)), experiment(replace(specimen, density_uncertainty=0.02)),
+        experiment(replace(specimen, mass_known=False)),
     ]  # fmt: skip
+    (seen,) = experiment(specimen).recordings
+    otherwise = (
+        replace(seen, wind=replace(seen.wind, clock=1.0)),
+        replace(seen, seen=np.ones(seen.positions.shape[:2], dtype=np.bool_)),
+    )
+    others += [Experiment(specimen=specimen, recordings=(recording,)) for recording in otherwise]
     assert fingerprint(experiment(specimen, name="renamed", source="f" * 32)) == base
-    assert len({base, *map(fingerprint, others)}) == 5
+    assert len({base, *map(fingerprint, others)}) == 1 + len(others)
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
 from measure.forecasting.calibration import Calibration
 from measure.nulls.simulation import NullBatch
-from measure.observe.trajectory import Specimen
+from measure.observe.trajectory import Specimen, WindTrack
 
 
 def batch(specimen: Specimen, *, speed: float) -> NullBatch:
@@ -39,3 +41,19 @@ def test_a_run_that_does_not_diverge_keeps_its_steps(specimen: Specimen) -> None
 def test_a_cloth_that_no_step_holds_is_refused_with_its_numbers(specimen: Specimen) -> None:
     with pytest.raises(FlagdataError, match=r"1e\+05 m/s: .* even in steps 8 times smaller.*check the unit"):
         batch(specimen, speed=1e5).simulate()
+
+
+def test_a_wind_that_blows_is_the_steady_one_where_it_does_not_vary(specimen: Specimen) -> None:
+    """A logged wind without variation gives the recording of the steady one; a wind that falls to nothing half a second
+    before the first frame, another, and it is what stands beside the recording."""
+    calm = batch(specimen, speed=9.0)
+    level = WindTrack(times=np.array([-4.0, 1.0]), velocity=np.full((2, 3), [9.0, 0.0, 0.0]))
+    falls = WindTrack(times=np.array([-4.0, -0.6, -0.5]), velocity=np.outer([9.0, 9.0, 0.0], [1.0, 0.0, 0.0]))
+    (steady,), (same,), (other,) = (made.simulate() for made in (calm, _in(calm, level), _in(calm, falls)))
+    np.testing.assert_allclose(same.positions, steady.positions, rtol=0, atol=1e-6)
+    assert np.abs(other.positions[0] - steady.positions[0]).max() > 1e-3
+    assert other.wind is falls
+
+
+def _in(nulls: NullBatch, wind: WindTrack) -> NullBatch:
+    return replace(nulls, winds=(wind,))

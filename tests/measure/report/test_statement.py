@@ -14,7 +14,7 @@ from measure.loop.run import Outcome
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 from measure.probes.course import Variation
 from measure.probes.lines import Line
-from measure.report.statement import blowing, bounds, by_draw, proposal, sentence, shedding, stated
+from measure.report.statement import assumptions, blowing, bounds, by_draw, proposal, sentence, shedding, stated
 from measure.verdict.record import Conclusion
 from tests.measure.report.verdicts import verdict
 
@@ -125,3 +125,23 @@ def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: Outcome) -> N
 
 def test_an_outcome_with_an_answer_proposes_nothing(outcome: Outcome) -> None:
     assert stated(replace(outcome, field=())).proposal == ""
+
+
+@pytest.mark.parametrize(
+    ("known", "told", "weigh"),
+    [(0.3, "known to 30 %", True), (0.1, "known to 10 %", True), (0.02, "known to 2 %", False)],
+)
+def test_how_well_the_cloth_was_weighed_is_an_assumption(
+    outcome: Outcome, known: float, told: str, weigh: bool
+) -> None:
+    specimen = replace(outcome.experiment.specimen, density_uncertainty=known)
+    (said,) = (
+        text for text in assumptions(replace(outcome.experiment, specimen=specimen)) if "density is known" in text
+    )
+    assert told in said
+    assert ("density-uncertainty" in said) == weigh
+
+
+def test_a_cloth_that_nobody_weighed_is_not_said_to_be_known(outcome: Outcome) -> None:
+    specimen = replace(outcome.experiment.specimen, mass_known=False)
+    assert not any("density is known" in t for t in assumptions(replace(outcome.experiment, specimen=specimen)))
