@@ -78,7 +78,7 @@ def _spread(p: np.ndarray[Any, np.dtype[np.float64]], kinds: int) -> dict[str, A
     }  # fmt: skip
 
 
-def page_of_all(told: Mapping[str, Any]) -> list[str]:
+def page_of_all(told: Mapping[str, Any], *, heading: str) -> list[str]:
     """Lines of the page: p by all draws, beside the verdicts, and what smaller draws say."""
     first = next(iter(told.values()))
     whole = (
@@ -90,7 +90,7 @@ def page_of_all(told: Mapping[str, Any]) -> list[str]:
         "nine of ten of them lie between."
     )
     lines = [
-        "## All draws together", "", whole, "", "| what acted | statistic | p | settled by |", "|---|---|---|---|"
+        f"## {heading}", "", whole, "", "| what acted | statistic | p | settled by |", "|---|---|---|---|"
     ]  # fmt: skip
     for name, own in told.items():
         settled = "more than 1,000 kinds" if own["settling"] is None else f"{own['settling']} kinds"
