@@ -142,6 +142,10 @@ CASES = {
         text="time,pulses\n" + rows("2026-05-01T12:{m:02d}:00Z,{n}"),
         takes=["columns"], answers={"2": "wind_speed[0.75 m/s]"}, speeds={"": (0.75, 15.0)}, direction=None,
     ),
+    "dates-without-a-time-of-day": Case(
+        text="date,wind speed (m/s),wind dir\n" + rows("2026-05-01,{v},{d}"),
+        takes=["columns", "start", "rate"], answers={"TIME": "2026-05-01T14:00:00+02:00", "HZ": "0.1"}, speeds=ONE,
+    ),
     "rows-out-of-order-that-come-unevenly": Case(
         text="time,wind speed (m/s),wind dir\n"
         + "".join(
@@ -231,7 +235,7 @@ def check(path: Path, arguments: Sequence[str], case: Case) -> None:
         **{name: given[name] for name in (
             "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "unit", "start",
             "wind", "columns",
-        )}, rate=None,
+        )}, rate=given["rate"] if "rate" in case.takes else None,
     ).wind  # fmt: skip
     labels = anemometers(path, options) or ("",)
     assert sorted(labels) == sorted(case.speeds)

@@ -37,6 +37,8 @@ SMALL = 60 * NANOSECONDS
 """A clock may be set back by any constant up to this where nothing else speaks for it."""
 AGAIN = 0.9
 """Share of a stretch's rows that must come with the stamps and values of earlier ones to be taken for a repetition."""
+DATES_SHARED = 0.5
+"""Share of the rows that share a date without a time of day, from which they are refused."""
 ISOLATED = 0.2
 """Share of the pairs of neighbours that share a stamp, up to which the alike among them are taken for copies."""
 COPIES, COPIED = 2.0, 0.1
@@ -51,13 +53,33 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
             nobody said.
 
     Raises:
-        TimeError: time runs back in a way that no rule explains.
+        TimeError: time runs back in a way that no rule explains, or most rows share a date without a time of day.
     """
     reading = _put_in_order(reading, choice)
     reading = _without_repeated_stretches(reading)
     reading = _sorted(reading, where, None if choice == "sort" else choice)
     reading = _without_repeats(reading)
+    _refuse_bare_dates(reading, where)
     return distinct(reading)
+
+
+def _refuse_bare_dates(reading: Reading, where: str) -> None:
+    """Refuse rows whose stamps are dates alone, and are shared by most.
+
+    Raises:
+        TimeError: nothing tells when within its day a row was read.
+    """
+    again = np.diff(reading.time) == 0
+    shared = np.concatenate(([False], again)) | np.concatenate((again, [False]))
+    if reading.step < DAY or len(again) == 0 or float(shared.mean()) < DATES_SHARED:
+        return
+    raise TimeError(
+        f"the stamps are dates without a time of day, and {int(shared.sum())} of {len(shared)} rows share theirs with "
+        f"others: nothing tells when within {iso(int(reading.time[shared][0]))[:10]} each was read",
+        where=f"{where}, line {reading.line[shared][0]}",
+        fix="name the column of the time of day beside that of the date; if the rows came at a steady rate, read the "
+        "wind alone (--columns) with --start TIME --rate HZ; else export the log with the time of each row",
+    )  # fmt: skip
 
 
 def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:

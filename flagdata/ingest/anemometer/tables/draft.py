@@ -28,6 +28,7 @@ from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.tables.stated_unit import stated_unit
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, lay_out
+from flagdata.ingest.anemometer.times import bare_dates
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
@@ -235,7 +236,12 @@ def _doubts(
 ) -> list[Doubt]:
     found: list[Doubt] = []
     names = ", ".join(repr(name) for name in layout.names if name) or "no names"
-    if time is None:
+    dates = _bare_dates(layout, time, chosen or next(iter(winds), None))
+    if dates and winds:
+        one = " and ".join(stated_columns.named(layout, at) for at in dates)
+        what = f"{one} is a date without a time of day, rows share it, and no column is read as the time of day"
+        found.append(Doubt(what=what, fix=offered_columns.of_bare_dates(layout, dates, [chosen or winds[0]])))
+    elif time is None:
         offered = offered_columns.offer(layout, time, winds)
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
         above = stated_rate.advice(lines[: layout.preamble])
@@ -286,6 +292,14 @@ def _doubts(
         what += f"; {own}" if own else ""
         found.append(Doubt(what=what, fix=fix))
     return found
+
+
+def _bare_dates(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> tuple[int, ...]:
+    """The columns of a date without a time of day that rows share, where they are the time, or no column is."""
+    if time is None:
+        column = bare_dates.column(layout)
+        return () if column is None else (column,)
+    return time.columns if bare_dates.are_time(layout, time, wind.site if wind is not None else None) else ()
 
 
 def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[Doubt]:

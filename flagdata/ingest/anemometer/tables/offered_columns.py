@@ -102,6 +102,25 @@ def _numbered(entries: Mapping[int, str]) -> list[str]:
     return [f"{at + 1}={entry}" for at, entry in sorted(entries.items())]
 
 
+def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -> str:
+    """What the user can say of a table whose rows have dates without a time of day.
+
+    Args:
+        dates: the columns of the date.
+    """
+    known = _understood(layout, None, winds)
+    others = [at for at in range(layout.number_of_columns()) if at not in {*known, *dates}]
+    said = []
+    if others and len(dates) == 1:
+        line = ",".join([*_numbered(known | {dates[0]: "date"}), "?=time"])
+        said.append(f'if a column is the time of day: --columns "{line}" with its number for the ?')
+    line = ",".join(_numbered(known))
+    said.append(f'if the rows came at a steady rate, leave the date out: --columns "{line}" --start TIME --rate HZ')
+    if layout.site is None and others:
+        said.append("if the rows of a date are of several stations, name the column that tells them apart as site")
+    return "; ".join([*said, "else export the log with the time of each row"])
+
+
 def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> str:
     """The line that reads another column as the wind's speed, by the time and the direction of the one understood."""
     known = wind.columns.get("wind_speed")

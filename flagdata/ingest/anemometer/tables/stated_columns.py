@@ -206,6 +206,9 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
         missing = CLOCKS if entry.name == "time" else date_forms(layout, index, order)
         tried = (" ".join(form or other for form in forms) for other in missing)
         choice = next((found for form in tried if (found := time_as(layout, columns, form)) is not None), None)
+    if choice is None and not known and [entry.name for _, entry in entries] == ["date"]:
+        tried = date_forms(layout, columns[0], order)  # alone it may be no time yet, which the draft tells
+        choice = next((found for form in tried if (found := time_as(layout, columns, form)) is not None), None)
     if choice is None:
         fix = (
             f"state the format in brackets, such as time[%d.%m.%Y %H:%M], time[epoch-s] or time[elapsed-ms]; the first "
