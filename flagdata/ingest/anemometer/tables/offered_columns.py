@@ -18,8 +18,8 @@ from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import own_motion
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
-from flagdata.ingest.anemometer.winds.directions import judge
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Wind
+from flagdata.ingest.anemometer.winds.directions import Judged, judge
+from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.words import headings
 from flagdata.ingest.anemometer.words.headings import fits, understand
 from flagdata.schema import CHANNELS
@@ -85,13 +85,16 @@ def read_also(
 ) -> str:  # fmt: skip
     """The line that says what was understood of a table, and that a further column is the wind's direction.
 
+    It stands in place of a direction that is read already.
+
     Args:
         direction: its column; `None` where only the user knows it, who writes its number in place of the "?".
         unit_name: of the direction; `None` takes the one its values are likely in, degrees where no column is named.
         channel: that the direction is.
     """
     unit = unit_name or ("deg" if direction is None else unit_of(layout, direction))
-    entries = _understood(layout, time, (wind,))
+    known = _understood(layout, time, (wind,))
+    entries = {at: entry for at, entry in known.items() if entry.split("[")[0].removesuffix("_to") != channel}
     if direction is not None:
         entries[direction] = f"{channel}[{unit}]"
     return ",".join([*_numbered(entries), *([f"?={channel}[{unit}]"] if direction is None else [])])
@@ -122,7 +125,10 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
 
 
 def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> str:
-    """The line that reads another column as the wind's speed, by the time and the direction of the one understood."""
+    """The option that reads another column as the wind's speed, by the time and the direction of the one understood.
+
+    A direction whose unit is in doubt is given in the one that its numbers speak for; the heading's stands beside.
+    """
     known = wind.columns.get("wind_speed")
     stated_unit = understand(layout.names[speed], layout.units[speed]).unit or (known.unit if known else None)
     others = {
@@ -130,7 +136,32 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> st
         if not name.startswith(("apparent", "theoretical")) and name not in ("wind_speed", *COMPONENTS)
     }  # fmt: skip
     entries = _understood(layout, time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
-    return ",".join(_numbered(entries))
+    direction = others.get("wind_direction")
+    ways = _ways(layout, direction) if direction is not None else ()
+    if direction is None or not ways:
+        return f'--columns "{",".join(_numbered(entries))}"'
+    line = ",".join(_numbered(entries | {direction.index: ways[0]}))
+    return f'--columns "{line}", or with {" or ".join(ways[1:])} for the direction, which is in doubt'
+
+
+def _ways(layout: Layout, column: Column) -> tuple[str, ...]:
+    """The entries that a column of directions may be, that which its numbers speak for first; none without a doubt."""
+    judged = doubted(layout, column)
+    own = f"{TOWARDS if column.towards else 'wind_direction'}[{column.unit}]"
+    if judged is None:
+        return ()
+    if not judged.may_be:
+        return own, f"{TOWARDS}[{column.unit}]"
+    ways = (*(f"wind_direction[{unit}]" for unit in judged.may_be), own)
+    return ways if len(set(ways)) > 1 else ()
+
+
+def doubted(layout: Layout, column: Column) -> Judged | None:
+    """What speaks against how a direction is read, by its heading and numbers; `None` where nothing does."""
+    heading = understand(layout.names[column.index], layout.units[column.index])
+    value = numbers(layout.column(column.index), decimal=layout.decimal).value
+    judged = judge(heading, value, "wind_direction")
+    return judged if judged.doubt and not column.towards else None
 
 
 def calibrated(layout: Layout, time: TimeChoice | None, column: int) -> str:
@@ -167,6 +198,9 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
 def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
     """Entries of columns by their index."""
     found = _understood(layout, time, winds)
+    for column in (wind.columns.get("wind_direction") for wind in winds[:1]):
+        if column is not None and len(_ways(layout, column)) > 1:
+            found[column.index] = "wind_direction[?]"
     timed = time is not None
     steady, own = None if timed else _steady(layout), own_motion.columns(layout)
     stamped = _stamped(layout)

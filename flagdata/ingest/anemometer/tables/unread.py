@@ -90,14 +90,10 @@ def otherwise(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str,
     It may be in another unit, or where the wind blows to.
     """
     column = wind.columns.get("wind_direction")
-    if time is None or column is None or column.towards:
+    judged = offered_columns.doubted(layout, column) if column is not None else None
+    if time is None or column is None or judged is None:
         return ()
     name = layout.names[column.index]
-    heading = understand(name, layout.units[column.index])
-    value = numbers(layout.column(column.index), decimal=layout.decimal).value
-    judged = judge(heading, value, "wind_direction")
-    if not judged.doubt:
-        return ()
     if judged.may_be and judged.may_be[0] != column.unit:
         line = offered_columns.read_also(layout, time, wind, column.index, unit_name=judged.may_be[0])
         return (f'to read column {name!r} in {judged.may_be[0]}: --columns "{line}"',)

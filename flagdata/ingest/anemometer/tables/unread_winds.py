@@ -69,9 +69,9 @@ def remark(
     speed = next((index for index in speeds if _words(layout, index) & _HIGHEST), next(iter(speeds), None))
     if speed is None or time is None or wind is None:
         return (what,)
-    line = offered_columns.read_instead(layout, time, wind, speed)
+    option = offered_columns.read_instead(layout, time, wind, speed)
     read = f"to read {layout.names[speed]!r} as a wind of its own, ingest the file once more with"
-    return (f'{what}; {read} --columns "{line}"',)
+    return (f"{what}; {read} {option}",)
 
 
 def _speaks_of_wind(layout: Layout, index: int) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flagdata.errors import InputError
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -27,3 +28,56 @@ def test_a_direction_that_the_user_alone_knows_is_offered_with_one_number_to_fil
     found = read(text, columns=line.replace("?", str(before + 4)))
     assert found.series.channels["wind_speed"].tolist() == pytest.approx([3 + at / 10 for at in range(20)])
     assert np.degrees(found.series.channels["wind_direction"]) == pytest.approx(np.arange(200, 220))
+
+
+def turns(form: Callable[[int], str], heading: str = "wind dir (deg)") -> str:
+    """Rows of a speed, a gust and a direction."""
+    rows = "".join(
+        f"2026-05-01T12:{at:02d}:00Z,{3 + at % 7 / 10:.1f},{6 + at % 5 / 10:.1f},{form(at)}\n" for at in range(30)
+    )
+    return f"time,wind speed (m/s),gust (m/s),{heading}\n{rows}"
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "as_stated"),
+    [
+        (turns(lambda at: str(20 + at % 9)), 200.0, 20.0),
+        (turns(lambda at: f"{3 + at / 10:.1f}"), float(np.degrees(3)), 3.0),
+        (turns(lambda at: "12", "wind dir"), 270.0, 12.0),
+    ],
+)
+def test_a_gust_is_offered_with_its_direction_in_the_unit_that_the_note_names(
+    text: str, first: float, as_stated: float, read: Read
+) -> None:
+    note, gust = lines(read(text))
+    assert [line.rpartition("=")[2] for line in (note, gust)] == [note.rpartition("=")[2]] * 2
+    found = read(text, columns=gust)
+    assert found.series.channels["wind_speed"][:2].tolist() == pytest.approx([6.0, 6.1])
+    assert np.degrees(found.series.channels["wind_direction"][0]) == pytest.approx(first)
+    (said,) = [one.what for one in read(text).findings if one.kind == "columns-not-read"]
+    assert "wind_direction[deg] for the direction, which is in doubt" in said
+    other = read(text, columns=f"{gust.rpartition('=')[0]}=wind_direction[deg]")
+    assert np.degrees(other.series.channels["wind_direction"][0]) == pytest.approx(as_stated)
+
+
+def test_a_gust_beside_a_heading_of_the_wind_is_offered_both_ways(read: Read) -> None:
+    text = turns(lambda at: str(200 + at), "wind heading (deg)")
+    (said,) = [one.what for one in read(text).findings if one.kind == "columns-not-read"]
+    assert '4=wind_direction[deg]", or with wind_direction_to[deg] for the direction' in said
+
+
+def test_a_speed_in_doubt_is_offered_with_a_question_where_the_direction_is_in_doubt_too(read: Read) -> None:
+    text = turns(lambda at: str(20 + at % 9)).replace("wind speed (m/s)", "U (m/s)")
+    with pytest.raises(InputError) as caught:
+        read(text)
+    (line,) = re.findall(r'--columns "([^"]*)"', caught.value.fix or "")
+    assert line.endswith("wind_direction[?]")
+    found = read(text, columns=line.replace("[?]", "[10 deg]"))
+    assert np.degrees(found.series.channels["wind_direction"][0]) == pytest.approx(200)
+
+
+def test_a_second_direction_is_offered_in_the_place_of_the_first(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{3 + at % 7},{200 + at},{100 + at}\n" for at in range(30))
+    (line,) = lines(read(f"time,wind speed (m/s),wind dir (deg),TWD\n{rows}"))
+    found = read(f"time,wind speed (m/s),wind dir (deg),TWD\n{rows}", columns=line)
+    assert np.degrees(found.series.channels["wind_direction"]) == pytest.approx(np.arange(100, 130))
