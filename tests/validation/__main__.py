@@ -26,6 +26,7 @@ VALIDATIONS = {
     "renderers": "tests.validation.renderers",
     "replicates": "tests.validation.replicates",
     "robot-held": "tests.validation.robot_held",
+    "stressors": "tests.validation.stressors",
     "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",
     "wave-ablation": "tests.validation.wave_ablation",
