@@ -124,6 +124,11 @@ CASES = {
         + rows("A,2026-05-01T12:{m:02d}:00Z,{v},{d}") + rows("B,2026-05-01T12:{m:02d}:00Z,1{v},{d}"),
         takes=["columns"], finding="columns-not-read", speeds={"A": (3.0, 4.9), "B": (13.0, 14.9)},
     ),
+    "direction-beside-numbered-devices": Case(
+        text="pod,time,wind speed (m/s),bearing\n"
+        + re.sub(r"(?m)^(.*)\n", r"1,\1\n2,\1\n", rows("2026-05-01T12:{m:02d}:00Z,{v},{d}")),
+        takes=["columns"], finding="columns-not-read", speeds={"1": (3.0, 4.9), "2": (3.0, 4.9)},
+    ),
     "points-whose-o-is-east-or-west": Case(
         text="time,wind speed (m/s),wind dir\n"
         + "".join(f"2026-05-01T12:{at:02d}:00Z,{3 + at / 10:.1f},{'ONSO'[at % 4]}\n" for at in range(20)),

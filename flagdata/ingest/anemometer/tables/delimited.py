@@ -74,7 +74,9 @@ class Delimited:
         if options.recipe not in recipes.SENSORS.names():  # whoever writes a recipe names what is wanted
             return reading
         mixed = devices.check(source, source.head(HEAD_LINES), reading, recipe, options, where)
-        return reading.with_findings((*_not_read(unread_by_recipe.remarks(source, recipe)), *mixed))
+        devices_by = None if mixed is None else mixed.column
+        told = _not_read(unread_by_recipe.remarks(source, recipe, devices_by=devices_by))
+        return reading.with_findings(told if mixed is None else (*told, mixed.finding))
 
     def _by_draft(self, source: TextFile, options: WindOptions, where: str) -> Reading:
         proposal = drafted(source, options)
@@ -106,10 +108,13 @@ class Delimited:
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in proposal.warnings
         ]
-        found += _not_read(proposal.remarks)
-        lines = source.head(HEAD_LINES)
-        findings = (*reading.findings, *found, *devices.check(source, lines, reading, recipe, options, where))
-        return replace(reading, findings=findings, drafted=proposal.toml, understood=proposal.understood)
+        mixed = devices.check(source, source.head(HEAD_LINES), reading, recipe, options, where)
+        of_each = drafted(source, options, devices_by=mixed.column) if mixed is not None else None
+        found += _not_read((of_each or proposal).remarks)
+        found += [] if mixed is None else [mixed.finding]
+        return replace(
+            reading, findings=(*reading.findings, *found), drafted=proposal.toml, understood=proposal.understood
+        )
 
 
 _WEST = 1.5 * np.pi
@@ -127,14 +132,14 @@ def guess(proposal: Draft) -> Guess:
     )  # fmt: skip
 
 
-def drafted(source: TextFile, options: WindOptions) -> Draft | None:
-    """The draft of a file's recipe, completed by what the user says."""
+def drafted(source: TextFile, options: WindOptions, *, devices_by: int | None = None) -> Draft | None:
+    """The draft of a file's recipe, completed by what the user says; `devices_by`: see `draft`."""
     lines = tuple(source.head(HEAD_LINES))
     if len(lines) == HEAD_LINES:
         lines = (*lines, *_of_later_sites(source, lines), *filled_later.rows(source, lines))
     return draft(
         lines, unit=options.unit, order=options.date_order, wind=options.wind, columns=options.columns,
-        where=str(source.path),
+        where=str(source.path), devices_by=devices_by,
     )  # fmt: skip
 
 

@@ -62,10 +62,18 @@ class _Rows:
     names: Mapping[int, tuple[str, ...]]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Mixed:
+    """A column that may tell devices apart, and the warning that says so."""
+
+    column: int
+    finding: Finding
+
+
 def check(
     source: TextFile, lines: Sequence[str], reading: Reading, recipe: Recipe, options: WindOptions, where: str
-) -> tuple[Finding, ...]:
-    """A warning where a column may tell devices apart; none where the user says whose clock is right.
+) -> Mixed | None:
+    """The column that may tell devices apart; `None` where none does, or the user says whose clock is right.
 
     Args:
         lines: of the beginning of the file.
@@ -77,7 +85,7 @@ def check(
     """
     layout = lay_out(lines, interest=interest)
     if layout is None or recipe.rows is not None or options.clock is not None:
-        return ()
+        return None
     order = np.argsort(reading.line, kind="stable")
     time, line = reading.time[order], reading.line[order]
     if len(time) > 2 and float((np.diff(time) < 0).mean()) > 0.5:  # the newest row comes first
@@ -89,7 +97,7 @@ def check(
         if found is not None:
             what = f"{_tells(layout, rows, found)}: the stamps of each rise, and those of all together run back"
             raise SeveralDevicesError(what, where=where, fix=_fix(layout, found, options, clock=True))
-        return ()
+        return None
     rows = _first(layout, others, time, line)
     found = _best(layout, rows, [at for at in rows.code if _in_turn(layout, rows, at)])
     if found is not None and options.columns is None:
@@ -97,11 +105,12 @@ def check(
         raise SeveralDevicesError(what, where=where, fix=_fix(layout, found, options, clock=False))
     found = _best(layout, rows, [at for at in rows.code if _parts_stamps(rows, at)]) if found is None else found
     if found is None:
-        return ()
+        return None
     what = f"{stated_columns.named(layout, found)} may tell {len(rows.names[found])} devices apart whose rows "
     what += "are read as those of one"
     fix = _fix(layout, found, options, clock=False)
-    return (Finding(kind="devices-mixed", severity=Severity.WARNING, what=what, fix=f"if it does, {fix}"),)
+    finding = Finding(kind="devices-mixed", severity=Severity.WARNING, what=what, fix=f"if it does, {fix}")
+    return Mixed(column=found, finding=finding)
 
 
 def _other_columns(layout: Layout, recipe: Recipe) -> list[int]:

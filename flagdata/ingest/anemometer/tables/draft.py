@@ -114,6 +114,7 @@ def draft(
     wind: str | None = None,
     columns: str | None = None,
     where: str = "",
+    devices_by: int | None = None,
 ) -> Draft | None:
     """What the table is that `lines` seem to begin; `None` where they hold no table, or neither time nor wind.
 
@@ -123,6 +124,7 @@ def draft(
         wind: label of the anemometer to describe, of those that `Draft.winds` lists.
         columns: what the columns are, by the user's word (see `stated_columns`).
         where: the file, for messages.
+        devices_by: a column that may tell devices apart by all rows of the file: the lines that are offered name it.
 
     Raises:
         UsageError, UnknownNameError, InputError: `columns` do not fit the table.
@@ -153,8 +155,8 @@ def draft(
         if time is None and not winds:
             return None
     parts: tuple[str, ...] = ("",)
+    layout = replace(layout, site=devices_by if mixed is None else mixed[0])
     if mixed is not None:
-        layout = replace(layout, site=mixed[0])
         parts = site_labels.columns(winds, named=named)
         winds = site_labels.of_sites(winds, *mixed, named=named)
     labels = tuple(one.label for one in winds)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
 from flagdata.ingest.anemometer.tables import unread, unread_winds
@@ -12,15 +14,17 @@ from flagdata.ingest.anemometer.winds.instruments import Column, Wind
 from flagdata.ingest.anemometer.words.headings import interest
 
 
-def remarks(source: TextFile, recipe: Recipe) -> tuple[str, ...]:
+def remarks(source: TextFile, recipe: Recipe, *, devices_by: int | None = None) -> tuple[str, ...]:
     """A remark for each kind of column that speaks of the wind, with the line that reads it; none where all are read.
 
     Args:
         recipe: that the file was read by.
+        devices_by: a column that may tell devices apart, which the lines name.
     """
     layout = lay_out(source.head(HEAD_LINES), interest=interest)
     if layout is None or not any(layout.names):
         return ()
+    layout = replace(layout, site=devices_by)
     columns = {
         channel: Column(index=at, unit=column.unit, told="by the recipe", towards=column.convention == "to")
         for channel, column in recipe.channels.items() if (at := _index(layout, column.column)) is not None

@@ -19,7 +19,8 @@ _SITES = frozenset(
         "città", "località", "stad", "plaats", "weerstation", "stasjon", "stacja", "miasto", "buoy", "boya", "wtg",
         "turb", "mac", "imei", "eui", "uuid", "gerät", "geraet", "gerat", "knoten", "dispositivo", "nodo", "appareil",
         "capteur", "dispositif", "noeud", "nœud", "apparaat", "enhet", "enhed", "urządzenie", "czujnik", "aparelho",
-        "strumento", "beacon", "mote", "probe",
+        "strumento", "beacon", "mote", "probe", "stationname", "stationid", "stationcode", "sitename", "siteid",
+        "devicename", "deviceid", "sensorname", "sensorid", "nodeid", "locationname", "wmo",
     }
 )  # fmt: skip
 _STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})

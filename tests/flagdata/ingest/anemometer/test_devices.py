@@ -13,7 +13,9 @@ import pytest
 
 from flagdata.errors import SeveralDevicesError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.signals import WindLog
 
+Read = Callable[..., WindLog]
 Write = Callable[[str], Path]
 START = dt.datetime(2026, 5, 1, tzinfo=dt.UTC)
 MANY = 1020
@@ -147,3 +149,17 @@ def test_devices_of_a_table_of_the_catalog_are_refused_as_those_of_another(log_f
     first, second = (read_log(path, replace(options, wind=name)).series for name in ("A", "B"))
     assert first.channels["wind_speed"][:3].tolist() == pytest.approx([1, 2, 3])
     assert second.channels["wind_speed"][:3].tolist() == pytest.approx([10, 11, 12])
+
+
+@pytest.mark.parametrize("name", ["pod", "generic-csv"])
+def test_lines_beside_devices_that_share_stamps_name_their_column(read: Read, name: str) -> None:
+    stamps = [f"2026-05-01T12:{at:02d}:00Z" for at in range(30)]
+    recipe = {} if name == "pod" else {"recipe": name}
+    heading = "pod,time,wind speed (m/s),gust,bearing" if name == "pod" else "pod,time,wind_speed,gust,bearing"
+    rows = "".join(f"{pod},{stamp},{pod + at % 4},{9 + at % 3},{200 + at}\n" for at, stamp in enumerate(stamps)
+                   for pod in (1, 2))  # fmt: skip
+    found = read(f"{heading}\n{rows}", **recipe)
+    told = " ".join(one.what for one in found.findings if one.kind == "columns-not-read")
+    offered = re.findall(r'--columns "([^"]*)"', told)
+    assert offered
+    assert all(line.startswith("1=site,") for line in offered), offered

@@ -103,3 +103,18 @@ def test_heights_of_a_profile_are_anemometers(log_file: Write, heading: str, by_
 def test_heights_that_do_not_return_with_each_stamp_are_no_anemometers(log_file: Write) -> None:
     rows = "".join(f"2026-05-01T12:0{at}:00Z,{100 + at},{3 + at}.1\n" for at in range(9))
     assert len(read_log(log_file(f"time,altitude,wind speed (m/s)\n{rows}"), WindOptions()).series) == 9
+
+
+@pytest.mark.parametrize("heading", ["stationname", "station", "StationID", "wmo"])
+def test_stations_one_after_another_are_told_and_named_in_the_line_of_a_direction(
+    log_file: Write, heading: str
+) -> None:
+    rows = [f"{name},2026-05-01T12:{at:02d}:00Z,{3 + at % 7}.5,{200 + at}" for name, first in (("A", 0), ("B", 20))
+            for at in range(first, first + 20)]  # fmt: skip
+    path = log_file("\n".join([f"{heading},time,wind speed (m/s),bearing", *rows, ""]))
+    assert anemometers(path, WindOptions()) == ("A", "B")
+    told = " ".join(one.what for one in read_log(path, WindOptions(wind="B")).findings)
+    (line,) = re.findall(r'--columns "([^"]*)"', told)
+    assert line == "1=site,2=time,3=wind_speed[m/s],4=wind_direction[deg]"
+    found = read_log(path, WindOptions(wind="B", columns=line)).series
+    np.testing.assert_allclose(np.rad2deg(found.channels["wind_direction"]), np.arange(220, 240))
