@@ -11,7 +11,8 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds.angles import compass_unit, may_be_direction, may_be_two
 from flagdata.ingest.anemometer.winds.directions import judge
 from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, Wind
-from flagdata.ingest.anemometer.words.headings import COURSES, understand, words_of
+from flagdata.ingest.anemometer.words.headings import understand, words_of
+from flagdata.ingest.anemometer.words.wind_words import COURSES
 
 _RELATIVE = frozenset({"rel", "relative", "apparent", "bow", "awa"})
 """Words of a direction from its platform's bow or mark."""

@@ -12,6 +12,7 @@ from flagdata.ingest.anemometer.winds import own_motion
 from flagdata.ingest.anemometer.winds.instruments import Wind
 from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
+from flagdata.ingest.anemometer.words.wind_words import WIND
 
 _SPEAKS = re.compile(
     r"wind|wnd|gust|rafale|racha|rajada|raffica|beaufort|(?:^|_)(?:wg|ws|wd|wspd|wdir)(?:_|$)|b(?:ö|oe)en?(?:_|$)"
@@ -79,7 +80,7 @@ def _speaks_of_wind(layout: Layout, index: int) -> bool:
     words = words_of(layout.names[index])
     if set(words) & _NO_WIND:
         return False
-    if set(words) & GUSTS - {"spitze", "spitzen"} or _SPEAKS.search("_".join(words)):
+    if set(words) & (WIND | GUSTS - {"spitze", "spitzen"}) or _SPEAKS.search("_".join(words)):
         return True
     return "wind" in understand(layout.names[index], layout.units[index]).quantity
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds import own_motion
-from flagdata.ingest.anemometer.words.headings import VERTICAL, Heading, words_of
+from flagdata.ingest.anemometer.words.headings import Heading, words_of
+from flagdata.ingest.anemometer.words.wind_words import VERTICAL
 
 _AXES = (
     frozenset({"north", "northward", "meridional", "vwn"}), frozenset({"east", "eastward", "zonal", "vwe"}),

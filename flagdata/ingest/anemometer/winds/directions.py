@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer.winds import codes
-from flagdata.ingest.anemometer.words.headings import COURSES, Heading, fits, words_of
+from flagdata.ingest.anemometer.words.headings import Heading, fits, words_of
+from flagdata.ingest.anemometer.words.wind_words import COURSES
 
 _TURN = (-181.0, 361.0)
 _GON, _MILS = 401.0, 6401.0

@@ -17,7 +17,8 @@ from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort
 from flagdata.ingest.anemometer.winds.vanes import number, vanes
-from flagdata.ingest.anemometer.words.headings import WIND, Heading, fits, understand, words_of
+from flagdata.ingest.anemometer.words.headings import Heading, fits, understand, words_of
+from flagdata.ingest.anemometer.words.wind_words import WIND
 from flagdata.units import spelled, unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")

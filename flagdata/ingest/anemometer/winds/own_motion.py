@@ -14,7 +14,8 @@ import numpy as np
 
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.words.headings import WIND, understand, words_of
+from flagdata.ingest.anemometer.words.headings import understand, words_of
+from flagdata.ingest.anemometer.words.wind_words import WIND
 
 _LATITUDE, _LONGITUDE = frozenset({"lat", "latitude"}), frozenset({"lon", "lng", "long", "longitude"})
 _STILL = 1e-4

@@ -12,8 +12,22 @@ from functools import lru_cache
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
-from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.words.languages import in_english
+from flagdata.ingest.anemometer.words.wind_words import (
+    AXES,
+    COURSES,
+    DIRECTION,
+    MEAN,
+    OTHER,
+    PLACES,
+    PLAIN,
+    SPEED,
+    SPREAD,
+    SURE_DIRECTION,
+    VERTICAL,
+    WIND,
+    parted,
+)
 from flagdata.schema import CHANNELS
 from flagdata.timebase import zone
 from flagdata.units import UNITS, spelled
@@ -29,71 +43,6 @@ _TOWARDS = re.compile(
     r"\btowards?\b|\bblowing to\b|\bto dir|\bgoing to\b|\bdir(?:ection)? to\s*(?:[\[(]|$)", re.IGNORECASE
 )
 _PLACE = re.compile(r"[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+(?:/[A-Z][A-Za-z_]+)?")
-WIND = frozenset({"wind", "wnd", "vent", "viento", "vento", "vind", "windspeed", "winddir"})
-"""Words of the wind."""
-_SPEED = frozenset(
-    {
-        "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "geschwindigkeit",
-        "windgeschwindigkeit", "vit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
-        "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
-        "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "wg", "wv", "mph", "kmh", "kph", "knots", "windstrength",
-    }
-)  # fmt: skip
-_DIRECTION = frozenset(
-    {
-        "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
-        "dd", "vane", "wvane", "windvane", "angle", "direccion", "dirección", "direção", "direcao", "richting",
-        "windrichting", "direzione", "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire",
-        "deg", "winddeg", "azimuth", "bearing",
-    }
-)  # fmt: skip
-_SURE_DIRECTION = _DIRECTION - {"angle", "deg", "azimuth", "bearing", "dd", "vane"}
-"""Words that mean a direction whatever unit stands behind them."""
-COURSES = frozenset({"heading", "course"})
-"""Words of the wind's direction that leave open whether it blows from or to it."""
-VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", "vertikale", "vertic"})
-"""Words of the component of the wind upwards, which is no speed of wind."""
-_OTHER = frozenset(
-    {
-        "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "sos",
-        "rotor", "radial", "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
-        "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
-        "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
-        "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
-        "load", "density", "elevation", *VERTICAL, "gyro", "acc", "accel", "course", "heading", "track", "duration",
-        "id", "unit", "units",
-    }
-)  # fmt: skip
-_SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
-    {
-        "std", "sd", "sdev", "stdev", "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov",
-        "covariance", "peak", "lull", "hi", "high", "low", "lo", "ti", "turbulence", "flag", "flags", "qc", "quality",
-        "qf", "qa", "err", "error", "diag", "diagnostic", "status", "skew", "skewness", "kurt", "kurtosis",
-        "windgustdir", "windrun", "sum", "total", "range", "wvc", "rms", "uncertainty", "unc", "samples", "nsamples",
-        "percentile", "trend", "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast",
-        "threshold", "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr",
-        "setpoint", "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
-        "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
-    }
-)  # fmt: skip
-_AXES = frozenset(
-    {"north", "east", "south", "west", "northward", "eastward", "zonal", "meridional", "upward", "up", "down"}
-)
-"""Words of a component of the wind along an axis of the Earth, which is no speed of wind."""
-_MEAN = frozenset(
-    {
-        "avg", "average", "mean", "ave", "av", "moy", "moyen", "moyenne", "promedio", "mittel", "mittelwert", "media",
-        "medio", "smp",
-    }
-)  # fmt: skip
-_PLAIN = frozenset(
-    {
-        "sensor", "value", "instant", "instantaneous", "inst", "current", "latest", "horizontal", "hor", "data",
-        "measured", "raw", "the", "of", "in", "s", "wvt", "d", "u", "at", "ch", "channel", "sonic", "anemometer",
-        "anem", "smp", "true", "mag", "magnetic", "outdoor", "out", "from", "north", "wind", "cup", "vane", "station",
-        "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
-    }
-)  # fmt: skip
 _APPARENT = frozenset({"apparent", "aws", "awa", "rel", "relative", "awd", "app", "apparente", "bow"})
 _THEORETICAL = frozenset({"tws", "twa", "theoretical"})
 _ABBREVIATED = {
@@ -214,27 +163,27 @@ def understand(name: str, stated: str = "") -> Heading:
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
     known = set(words)
     compact = "".join(words)
-    spread = bool(known & _SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
+    spread = bool(known & SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
     misstated = _misstated(known, unit)
     unit = None if misstated else unit
     quantity, sure, used = _quantity(words, compact, unit, rest)
     courses = {"course", "heading"} if known & WIND else {"course"}
-    if quantity and known & _OTHER and not (quantity.endswith("direction") and known & courses):
+    if quantity and known & OTHER and not (quantity.endswith("direction") and known & courses):
         allowed = VERTICAL if quantity == "wind_z" else {"scalar"} if "sonic" in known else frozenset()
-        excluded = known & _OTHER - allowed
+        excluded = known & OTHER - allowed
         if "wind" in quantity and excluded:
             quantity, sure = "", False
     if quantity == "wind_speed" and len(along := known & {"x", "y", "z"}) == 1:
         quantity, sure = _COMPONENTS[next(iter(along))], bool(known & WIND)
-    if quantity.endswith("wind_speed") and known & _AXES:
+    if quantity.endswith("wind_speed") and known & AXES:
         quantity, sure = "", False
     left = list(words)
     for word in used:
         left.remove(word)
-    label = tuple(word for word in left if word not in _MEAN | _SPREAD | _PLAIN | WIND)
+    label = tuple(word for word in left if word not in MEAN | SPREAD | PLAIN | WIND)
     return Heading(
         name=name, channel="" if spread else quantity, sure=sure, spread=spread, quantity=quantity,
-        mean=bool(known & _MEAN or averaged), unit=unit, height=height, label=label,
+        mean=bool(known & MEAN or averaged), unit=unit, height=height, label=label,
         magnetic=bool(known & {"mag", "magnetic"}) or (north is not None and north["north"].lower().startswith("m")),
         towards=bool(_TOWARDS.search(text.replace("_", " "))), misstated=misstated,
         strange=tenfold[0].strip() if tenfold is not None
@@ -319,10 +268,9 @@ def _words(text: str) -> list[str]:
             found.append(word)
         elif word.isupper() or word.islower():
             joined = _SPEED_AND_UNIT.fullmatch(word.lower())
-            found.extend(joined.groups() if joined is not None else (word.lower(),))
+            found.extend(joined.groups() if joined is not None else parted(word.lower()))
         else:
-            parts = [part.lower() for part in _CAMEL.findall(word)]
-            found.extend(parts)
+            found.extend(part for cut in _CAMEL.findall(word) for part in parted(cut.lower()))
     return found
 
 
@@ -388,30 +336,30 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
     known = set(words)
     si = UNITS[unit].si if unit is not None else None
     windy = bool(known & WIND) or compact.startswith(("wind", "wnd"))
-    if words[:1] == ["w"] and words[1:2] and words[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
+    if words[:1] == ["w"] and words[1:2] and words[1] in {*SPEED, *DIRECTION} - {"vel", "velocity"}:
         windy = True
     component = _component(words, si)
     if component is not None:
         return component, True, set(words) & {*_COMPONENTS, "velocity", "vel", "speed", "comp", "component"}
-    if known & WIND and si in (None, "rad") and known & COURSES and not known - WIND - _MEAN - COURSES - {"deg"}:
+    if known & WIND and si in (None, "rad") and known & COURSES and not known - WIND - MEAN - COURSES - {"deg"}:
         return "wind_direction", True, known & COURSES
     if si in (None, "rad", "1") or windy:
-        away = known & _DIRECTION
+        away = known & DIRECTION
         if (away or re.search(r"wind?.?dir|windricht|wind_?ri\b|^wd\d*$|winddeg", compact)) and si in (None, "rad"):
             sure = windy or bool(known & {"dir", "wd", "wdir", "drct", "dd", "vane", "wvane"}) or "dir" in compact
             if away and away <= {"deg", "azimuth", "bearing", "angle"} and not windy and not known & {"awa", "twa"}:
                 return "", False, set()
-            return _by_platform(known, "direction"), sure, known & (_DIRECTION | _APPARENT | _THEORETICAL)
-        if si == "rad" and windy and not known - WIND - _MEAN - _PLAIN:
+            return _by_platform(known, "direction"), sure, known & (DIRECTION | _APPARENT | _THEORETICAL)
+        if si == "rad" and windy and not known - WIND - MEAN - PLAIN:
             return _by_platform(known, "direction"), True, known & WIND
     if si in (None, "m/s"):
         for word, channel in _ABBREVIATED.items():
             if word in known and (si == "m/s") <= channel.endswith("speed"):
                 return channel, True, {word}
-        named = known & _SPEED or (known & {"strength"} if windy else set())
+        named = known & SPEED or (known & {"strength"} if windy else set())
         if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
             return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
-        if windy and len(known - WIND - _MEAN - _PLAIN) == 0:
+        if windy and (not known - WIND - MEAN - (PLAIN - {"d", "u"}) or _of_a_place(known)):
             return "wind_speed", True, known & WIND
         if _of_a_cup(words):
             return "wind_speed", True, {"cup"}
@@ -420,7 +368,7 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
     if si in (None, "rad") and known & {"awa", "twa", "awd"}:
         word = next(iter(sorted(known & {"awa", "twa", "awd"})))
         return _ABBREVIATED[word], True, {word}
-    if si == "m/s" and not known & _OTHER:
+    if si == "m/s" and not known & OTHER:
         return "wind_speed", False, set()
     return _weather(words, compact, si, windy)
 
@@ -428,20 +376,27 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
 def _of_a_cup(words: list[str]) -> bool:
     """Whether a heading names a cup anemometer, and beside it its height, side or statistic alone ("Cup116m_Mean")."""
     known = {word for word in words if len(word) > 2 and not word.isdigit()}
-    return "cup" in known and known <= {"cup", *_MEAN, *_SPREAD, *_PLAIN, "north", "east", "south", "west"}
+    return "cup" in known and known <= {"cup", *MEAN, *SPREAD, *PLAIN, "north", "east", "south", "west"}
+
+
+def _of_a_place(known: set[str]) -> bool:
+    """Whether a heading says the wind and whose it is, and no more ("Station1_WND", "Mast B wind")."""
+    rest = known - WIND - MEAN - PLACES
+    marks = rest - {*_COMPONENTS, "d"}
+    return bool(known & PLACES) and rest == marks and all(word.isdigit() or len(word) == 1 for word in marks)
 
 
 def _misstated(known: set[str], unit: str | None) -> str:
     """The unit of a speed behind words that are of a direction alone; "" where there is none."""
-    if unit is None or UNITS[unit].si != "m/s" or known & (_SPEED | _OTHER | _COMPONENTS.keys()):
+    if unit is None or UNITS[unit].si != "m/s" or known & (SPEED | OTHER | _COMPONENTS.keys()):
         return ""
-    return unit if known & _SURE_DIRECTION else ""
+    return unit if known & SURE_DIRECTION else ""
 
 
 def _component(words: list[str], si: str | None) -> str | None:
     if si not in (None, "m/s"):
         return None
-    core = [word for word in words if word not in _MEAN and not word.isdigit()]
+    core = [word for word in words if word not in MEAN and not word.isdigit()]
     head = [word for word in core if word not in _SENSORS]
     if head and head[0] in ("u", "v", "w") and head[1:2] and head[1] in ("x", "y", "z"):
         return _COMPONENTS[head[1]]
@@ -449,7 +404,7 @@ def _component(words: list[str], si: str | None) -> str | None:
         return _COMPONENTS[head[-1]]
     if not head or head[0] not in _COMPONENTS:
         return None
-    if head[0] == "w" and head[1:2] and head[1] in {*_SPEED, *_DIRECTION} - {"vel", "velocity"}:
+    if head[0] == "w" and head[1:2] and head[1] in {*SPEED, *DIRECTION} - {"vel", "velocity"}:
         return None
     if head[0] in ("x", "y", "z", "vx", "vy", "vz") and not set(core) & {"wind", "sonic", "csat"}:
         return None
