@@ -55,6 +55,12 @@ _COMPOUND = re.compile(rf"{_ONE}(?:(?:[. ]{_ONE}\^?-[123])+|/{_ONE}[23]?)")
 _BRACKETS = re.compile(r"[(\[（]([^()\[\]（）]{1,12})[)\]）]\s*$")
 _LEAST_UNITS = 2
 """In brackets that make a second line of names one that tells units."""
+_NAMELIST = re.compile(r"&[A-Za-z]\w*(?:\s|,|$)")
+"""How a namelist of Fortran begins."""
+_ASSIGNED = re.compile(
+    r"[^\W\d][\w%()]*\s*=\s*(?:[-+]?[\d.][\d.eEdD+-]*|'[^']*'|\"[^\"]*\"|\.?(?:true|false)\.?|[TF]),?", re.IGNORECASE
+)
+"""A name and its value, which name no column."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
 
@@ -403,7 +409,7 @@ def _heading(
     strange: list[str] = []
     for number in range(start - 1, max(-1, start - 1 - _HEADING_LINES), -1):
         line = lines[number].lstrip("\ufeff")
-        if not re.sub(r"[\s,;|]", "", line):
+        if not re.sub(r"[\s,;|]", "", line) or _of_settings(line, delimiter):
             continue
         cells, plain = _names(line, delimiter, *widths)
         if cells is None:
@@ -433,6 +439,15 @@ def _heading(
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
     by_name = plain and len(lines[at]) > 0
     return tuple(names), tuple(units), at, by_name, ()
+
+
+def _of_settings(line: str, delimiter: str) -> bool:
+    """Whether a line, a comment or not, sets values: a namelist of Fortran, or mostly names with their values."""
+    bare = _MARK.sub("", line).strip()
+    cells = [cell.strip() for cell in re.split(r"[\s,;]+", re.sub(r"\s*=\s*", "=", bare)) if cell.strip(" /&")]
+    assigned = sum(bool(_ASSIGNED.fullmatch(cell)) for cell in cells)
+    alone = "=" in (bare.split() if delimiter not in bare else cut(bare, delimiter))
+    return bool(_NAMELIST.match(bare)) or alone or assigned > 0.5 * len(cells)
 
 
 def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] | None, bool]:
