@@ -10,10 +10,10 @@
 Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
 Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (fields 6
 average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes) and "Standard log
-files" (day first; 6 average speed, 7 gust, 8 average bearing; units are the station's settings); Weather Display's list
-of the fields of clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock,
-35 and 36 day and month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes
-and of 5 seconds).
+files" (day first; 6 average speed, 7 gust, 8 average bearing, 15 latest speed and 25 latest bearing, as in WeeWX's list
+of these fields; units are the station's settings); Weather Display's list of the fields of clientraw.txt (1 average
+speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock, 35 and 36 day and month, 141 the year);
+NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes and of 5 seconds).
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ _UNITS = {"m/s": "m/s", "mph": "mph", "km/h": "km/h", "kts": "kn", "knots": "kn"
 _ASOS = re.compile(r"\s*\d{5}[A-Z0-9]{4}\s+[A-Z0-9]{3}(?P<day>\d{8})(?P<local>\d{4})(?P<utc>\d{4})(?P<rest>\s.*)")
 _FOUR = re.compile(r"(?:^|\s)[DN]\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})(?:\s|$)")
 _CUMULUS = 15
-"""Fields of Cumulus' monthly log up to the latest gust; its later versions have more."""
+"""Fields of Cumulus' monthly log up to the latest reading of the speed; its later versions have more."""
+_BEARING = 24
+"""Field of the latest reading of the direction in it, counted from 0."""
 _CLIENTRAW = 142
 """Fields of clientraw.txt up to the year."""
 
@@ -104,7 +106,8 @@ def _monthly(line: str) -> list[str] | None:
         return None
     if not (1 <= int(day) <= 31 and 1 <= int(month) <= 12):
         return None
-    return [f"20{year}-{int(month):02d}-{int(day):02d} {clock}", *cells[5:8], cells[3]]
+    bearing = cells[_BEARING] if len(cells) > _BEARING and _between(cells[_BEARING], 0, 360) else ""
+    return [f"20{year}-{int(month):02d}-{int(day):02d} {clock}", *cells[5:8], cells[3], cells[14], bearing]
 
 
 def _clientraw(line: str) -> list[str] | None:
@@ -159,7 +162,11 @@ _KINDS = (
     ),
     _Lines(
         about="Cumulus' monthly log",
-        names=("time", "wind speed average", "gust", "wind direction [deg]", "relative humidity [%]"), row=_monthly,
+        names=(
+            "time", "wind speed average", "gust", "wind direction [deg]", "relative humidity [%]",
+            "wind speed of latest samples", "wind direction of latest samples [deg]",
+        ),
+        row=_monthly,
     ),
     _Lines(
         about="Weather Display's clientraw.txt",

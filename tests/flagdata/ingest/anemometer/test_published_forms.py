@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
 from collections.abc import Callable
 from functools import reduce
 from operator import xor
@@ -241,6 +242,27 @@ def test_cumulus_monthly_log_is_told_by_its_fields_and_its_day_comes_first(
     log = read("\n".join(lines) + "\n", zone="UTC", unit="km/h")
     check(log, 1 / 3.6)
     np.testing.assert_allclose(log.series.channels["relative_humidity"], 0.87)
+
+
+@pytest.mark.parametrize("fields", [15, 27])
+def test_cumulus_momentary_readings_are_named_beside_its_averages(read: Read, fields: int) -> None:
+    lines = []
+    for at, (t, s, d) in enumerate(rows()):
+        cells = ["7.9", "87", "5.9", f"{s:.1f}", f"{s + 2:.1f}", f"{d}", "0.0", "0.0", "1028.0", "210.3", "21.5", "52",
+                 f"{s + 1:.1f}", "7.9", "7.9", *"0000500", f"{(d + 90 + at) % 360}", "0", "0"]  # fmt: skip
+        lines.append(",".join([t.strftime("%d/%m/%y"), t.strftime("%H:%M"), *cells[: fields - 2]]))
+    text = "\n".join(lines) + "\n"
+    log = read(text, zone="UTC", unit="km/h")
+    check(log, 1 / 3.6)
+    (told,) = [one.what for one in log.findings if one.kind == "columns-not-read"]
+    names = ["gust", "wind speed of latest samples", "wind direction of latest samples [deg]"]
+    assert [name in told for name in names] == [True, True, fields == 27]
+    columns = "time=time,wind speed of latest samples=wind_speed[km/h]"
+    latest = read(text, zone="UTC", columns=columns).series
+    np.testing.assert_allclose(latest.channels["wind_speed"], [(s + 1) / 3.6 for _, s, _ in rows()])
+    (line,) = re.findall(r'--columns "([^"]*)"', told)
+    gust = read(text, zone="UTC", columns=line.replace("[?]", "[km/h]")).series
+    np.testing.assert_allclose(gust.channels["wind_speed"], [(s + 2) / 3.6 for _, s, _ in rows()])
 
 
 def test_the_speeds_of_the_iowa_mesonet_are_miles_an_hour(read: Read) -> None:
