@@ -11,6 +11,7 @@ from typing import Literal
 
 from flagdata.compass import CALM
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
+from flagdata.ingest.anemometer.text import settings
 from flagdata.ingest.anemometer.text.cells import BELOW
 from flagdata.ingest.anemometer.text.rows import blank_cells
 from flagdata.ingest.anemometer.words.headings import names_time
@@ -55,12 +56,6 @@ _COMPOUND = re.compile(rf"{_ONE}(?:(?:[. ]{_ONE}\^?-[123])+|/{_ONE}[23]?)")
 _BRACKETS = re.compile(r"[(\[（]([^()\[\]（）]{1,12})[)\]）]\s*$")
 _LEAST_UNITS = 2
 """In brackets that make a second line of names one that tells units."""
-_NAMELIST = re.compile(r"&[A-Za-z]\w*(?:\s|,|$)")
-"""How a namelist of Fortran begins."""
-_ASSIGNED = re.compile(
-    r"[^\W\d][\w%()]*\s*=\s*(?:[-+]?[\d.][\d.eEdD+-]*|'[^']*'|\"[^\"]*\"|\.?(?:true|false)\.?|[TF]),?", re.IGNORECASE
-)
-"""A name and its value, which name no column."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
 
@@ -409,7 +404,8 @@ def _heading(
     strange: list[str] = []
     for number in range(start - 1, max(-1, start - 1 - _HEADING_LINES), -1):
         line = lines[number].lstrip("\ufeff")
-        if not re.sub(r"[\s,;|]", "", line) or _of_settings(line, delimiter):
+        bare = _MARK.sub("", line).strip()
+        if not re.sub(r"[\s,;|]", "", line) or settings.sets_values(bare, cut(bare, delimiter)):
             continue
         cells, plain = _names(line, delimiter, *widths)
         if cells is None:
@@ -433,21 +429,17 @@ def _heading(
     # A line that says what units there are ("Units: wind (m/s), dir (deg)") is none of names, however well it fits.
     named = [item for item in worded if not _SAYS_UNITS.match(lines[item[1]])] or worded
     _, at, names, plain = max(named, key=lambda item: (item[0], item[3], -item[1]))
-    units = next((cells for number, cells, _ in candidates if number > at and _are_units(cells)), None)
+    units_at, units = next(
+        ((number, cells) for number, cells, _ in candidates if number > at and _are_units(cells)), (at, None)
+    )
+    if units is not None and names[0] and len(cut(_MARK.sub("", lines[units_at].strip()), delimiter)) == width - 1:
+        odd = f"line {units_at + 1} has {width - 1} units for {width} columns: taken as those of all but the first"
+        return tuple(names), tuple(units), at, plain and len(lines[at]) > 0, (odd,)
     if units is None:
         units = next((own for number, cells, _ in candidates if number != at and (own := _in_brackets(cells))), nothing)
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
     by_name = plain and len(lines[at]) > 0
     return tuple(names), tuple(units), at, by_name, ()
-
-
-def _of_settings(line: str, delimiter: str) -> bool:
-    """Whether a line, a comment or not, sets values: a namelist of Fortran, or mostly names with their values."""
-    bare = _MARK.sub("", line).strip()
-    cells = [cell.strip() for cell in re.split(r"[\s,;]+", re.sub(r"\s*=\s*", "=", bare)) if cell.strip(" /&")]
-    assigned = sum(bool(_ASSIGNED.fullmatch(cell)) for cell in cells)
-    alone = "=" in (bare.split() if delimiter not in bare else cut(bare, delimiter))
-    return bool(_NAMELIST.match(bare)) or alone or assigned > 0.5 * len(cells)
 
 
 def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] | None, bool]:

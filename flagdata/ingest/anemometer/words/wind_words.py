@@ -51,7 +51,9 @@ SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
         "percentile", "trend", "attr", "attributes", "code", "valid", "se", "ste", "mode", "median", "fc", "forecast",
         "threshold", "dispersion", "spread", "intensity", "ratio", "shear", "veer", "availability", "cnr", "snr",
         "setpoint", "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
-        "target", "nominal", "rated", "alarm", "limit", "bias", "correction",
+        "target", "nominal", "rated", "alarm", "limit", "bias", "correction", "spikes", "spike", "strg", "storage",
+        "rand", "random", "outlier", "outliers", "mask", "nan", "nans", "iqr", "quantile", "quartile", "residual",
+        "anomaly", "skw", "kur", "qcflag", "itc", "scf", "zcl", "timelag",
     }
 )  # fmt: skip
 AXES = frozenset(

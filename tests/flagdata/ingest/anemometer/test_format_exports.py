@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flagdata.errors import InputError, TimeError
+from flagdata.ingest.anemometer import WindOptions, anemometers
+from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -305,6 +309,76 @@ def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
     assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
     assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(200))
     assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+
+
+EDDYPRO = {
+    "filename": "", "date": "[yyyy-mm-dd]", "time": "[HH:MM]", "DOY": "[ddd.ddd]", "H_strg": "[W+1m-2]",
+    "sonic_temperature": "[K]", "air_temperature": "[K]", "air_pressure": "[Pa]", "RH": "[%]", "u_rot": "[m+1s-1]",
+    "v_rot": "[m+1s-1]", "w_rot": "[m+1s-1]", "wind_speed": "[m+1s-1]", "max_wind_speed": "[m+1s-1]",
+    "wind_dir": "[deg_from_north]", "yaw": "[deg]", "u_spikes": "[#]", "v_spikes": "[#]", "u_var": "[m+2s-2]",
+}  # fmt: skip
+"""Some columns of EddyPro's full output with their units."""
+
+
+def eddypro(units: Sequence[str]) -> str:
+    def row(at: int) -> str:
+        own = {"filename": f"f{at}.raw", "date": "2026-05-01", "time": f"{12 + at // 2}:{30 * (at % 2):02d}"}
+        own |= {"wind_speed": f"2.{at}", "wind_dir": f"{200 + at}", "air_temperature": "289.5", "RH": "60.5"}
+        return ",".join(own.get(name, f"{at % 3}") for name in EDDYPRO)
+
+    head = ["file_info" + "," * (len(EDDYPRO) - 1), ",".join(EDDYPRO), ",".join(units)]
+    return "\n".join([*head, *map(row, range(10)), ""])
+
+
+@pytest.mark.parametrize("lost", ["filename", "date", "DOY", "H_strg", "air_temperature"])
+def test_eddypro_units_that_lack_a_cell_are_refused_with_the_line_that_reads_them(read: Read, lost: str) -> None:
+    text = eddypro([unit for name, unit in EDDYPRO.items() if name != lost])
+    with pytest.raises(InputError, match="1 fewer of them, do not stand below their names") as caught:
+        read(text, zone="UTC")
+    (line,) = re.findall(r'--columns "([^"]*)"', caught.value.fix or "")
+    found = read(text, zone="UTC", columns=line)
+    assert first(found) == "2026-05-01T12:00:00Z"
+    assert found.series.channels["wind_speed"] == pytest.approx([2 + at / 10 for at in range(10)])
+    assert np.degrees(found.series.channels["wind_direction"]) == pytest.approx(np.arange(200, 210))
+    assert found.series.channels["air_temperature"] == pytest.approx(289.5)
+
+
+def test_eddypro_units_that_end_early_but_stand_below_their_names_are_taken(read: Read) -> None:
+    found = read(eddypro(list(EDDYPRO.values())[:-2]), zone="UTC")
+    assert (found.format, len(found.series)) == ("eddypro", 10)
+
+
+def test_eddypro_directions_in_the_unit_of_another_column_are_refused_with_a_step(read: Read) -> None:
+    with pytest.raises(InputError, match=r"wind_dir in \[K\+1\]") as caught:
+        read(eddypro([unit if name != "wind_dir" else "[K+1]" for name, unit in EDDYPRO.items()]), zone="UTC")
+    assert "--columns" in (caught.value.fix or "")
+
+
+def test_a_line_of_units_that_lacks_one_is_told(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{3 + at % 5},{200 + at}\n" for at in range(20))
+    told = {one.what for one in read(f"time,wind,wind dir\nm/s,deg\n{rows}").findings}
+    assert "line 2 has 2 units for 3 columns: taken as those of all but the first" in told
+    assert not any("units for" in one.what for one in read(f"time,wind,wind dir\n,m/s,deg\n{rows}").findings)
+
+
+def test_statistics_of_components_are_no_wind_of_a_table_read_without_its_format(
+    log_file: Callable[[str], Path],
+) -> None:
+    path = log_file(eddypro(list(EDDYPRO.values())))
+    labels = anemometers(path, WindOptions(format="delimited", zone="UTC"))
+    assert labels == ("wind_speed", "u_rot")
+
+
+STATISTICS = (
+    "spikes", "skewness", "kurtosis", "flag", "qc", "var", "cov", "rand_err", "strg", "stdev", "sd", "skw", "kur", "se",
+    "quality_flag", "itc", "timelag_hf", "mask", "error", "count",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("stem", ["u", "v", "w", "Ux", "u_rot", "wind_speed", "WS", "VENTO"])
+@pytest.mark.parametrize("statistic", STATISTICS)
+def test_a_heading_that_ends_in_a_statistic_is_never_a_wind(stem: str, statistic: str) -> None:
+    assert understand(f"{stem}_{statistic}").channel == ""
 
 
 def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:
