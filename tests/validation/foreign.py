@@ -148,12 +148,18 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "p_of_nulls": sorted(row["p"] for row in nulls),
         "right": Share.of(row["grade"] == "right" for row in acting).as_dict(),
         "right_or_among": Share.of(row["grade"] in ("right", "among") for row in acting).as_dict(),
-        "wrong": Share.of(row["grade"] == "wrong" for row in acting).as_dict(),
+        "missed": Share.of(missed(row) for row in acting).as_dict(),
+        "wrong": Share.of(row["grade"] == "wrong" and not missed(row) for row in acting).as_dict(),
         "covered": {name: Share.of(own[name]["covers"] for own in intervals).as_dict() for name in _COVERED},
         "covered_of_nulls": {
             name: Share.of(row["parameters"][name]["covers"] for row in nulls).as_dict() for name in _COVERED
         },
     }  # fmt: skip
+
+
+def missed(row: Mapping[str, Any]) -> bool:
+    """Whether something acted and no effect is needed."""
+    return row["grade"] == "wrong" and row["said"] == Conclusion.SUFFICIENT.value
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -162,7 +168,8 @@ def page(found: Mapping[str, Any]) -> str:
         "| share | value | of | 90 % bounds |", "|---|---|---|---|",
         *(_share(title, found[key]) for title, key in (
             ("nulls that were rejected", "false_rejections"), ("effects named rightly", "right"),
-            ("effects named rightly, or among several", "right_or_among"), ("effects told wrongly", "wrong"),
+            ("effects named rightly, or among several", "right_or_among"), ("effects not seen", "missed"),
+            ("effects told wrongly", "wrong"),
         )),
         *(_share(f"90 % intervals of {name} that cover", found["covered"][name]) for name in _COVERED),
         "", f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.", "",
