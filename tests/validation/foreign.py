@@ -5,8 +5,9 @@ one (see `tests.validation.mujoco`). Everything is judged through the public int
 tables that a user would bring, against one bank of nulls by flagdata's own simulator, which serves all experiments.
 
 Environment variables: FLAGDATA_FOREIGN_NULLS (how many nulls), FLAGDATA_FOREIGN_EFFECTS (how many of each effect),
-FLAGDATA_FOREIGN_KINDS (kinds of numerics in the bank), FLAGDATA_FOREIGN_FOLDER (where bank, recordings and verdicts are
-kept; a run that was stopped goes on there).
+FLAGDATA_FOREIGN_KINDS (kinds of numerics in the bank), FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each
+cloth is weighed with; its own density is then what is declared), FLAGDATA_FOREIGN_FOLDER (where bank, recordings and
+verdicts are kept; a run that was stopped goes on there).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -32,7 +34,7 @@ from measure.observe.recipe import load, read
 from measure.shares import Share
 from measure.verdict.record import Conclusion, Estimate
 from tests.validation.mujoco import environment
-from tests.validation.mujoco.experiments import NOISE, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
+from tests.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
 
 _NULLS, _EFFECTS, _KINDS = 20, 1, 40
 _COVERED = ("density", "bending", "damping")
@@ -63,15 +65,26 @@ def _number(name: str, usual: int) -> int:
 
 def _row(truth: Truth, folder: Path, python: Path, seed: int) -> dict[str, Any]:
     """An experiment simulated, judged and graded; as it was kept, if it was."""
-    kept = folder / truth.name / "row.json"
+    weighed = os.environ.get("FLAGDATA_FOREIGN_WEIGHED", "")
+    kept = folder / truth.name / f"row{weighed and '-weighed-'}{weighed}.json"
     if not kept.is_file():
         recipe = folder / truth.name / "experiment.toml"
         if not recipe.is_file():
             write(truth, recipe.parent, python=python, seed=seed)
         observed = read(load(recipe))
-        row = _graded(truth, observed, _bank(folder / "bank", observed, seed), seed)
+        bank = _bank(folder / "bank", observed, seed)
+        row = _graded(truth, _weighed(observed, truth, float(weighed)) if weighed else observed, bank, seed)
         kept.write_text(json.dumps(row), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
+
+
+def _weighed(observed: Observed, truth: Truth, uncertainty: float) -> Observed:
+    """With the cloth's own density declared, known to a relative uncertainty, in place of the nominal one."""
+    specimen = observed.experiment.specimen
+    known = replace(
+        specimen, material=specimen.material.scaled(density=truth.factors["density"]), density_uncertainty=uncertainty
+    )
+    return replace(observed, experiment=replace(observed.experiment, specimen=known))
 
 
 def _bank(folder: Path, observed: Observed, seed: int) -> Path:
@@ -103,7 +116,12 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
     except InputError as error:
         return {**row, "refused": str(error), "grade": "refused"}
     of = {parameter.name: parameter.after or parameter.before for parameter in verdict.parameters}
-    true = {"density": truth.factors["density"], "bending": truth.factors["bending"], "damping": truth.damping}
+    declared = observed.experiment.specimen.material.density / NOMINAL.density
+    true = {
+        "density": truth.factors["density"] / declared,
+        "bending": truth.factors["bending"],
+        "damping": truth.damping,
+    }
     row |= {
         "said": verdict.conclusion.value, "named": list(verdict.named), "words": verdict.words,
         "statistic": verdict.test.statistic, "p": verdict.test.p_value.value,
