@@ -29,7 +29,7 @@ METHOD = {
     "nulls/bank": {"WINDS", "FILE_LIMIT", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING", "_STRETCHING"},
     "nulls/conformal": {"MOST_KINDS"},
     "nulls/reference": {"_GROUPS", "_NOTHING"},
-    "nulls/simulation": {"_SETTLE", "_FINER", "_STEPS", "_UNEVEN", "_HALVINGS", "_GENTLE"},
+    "nulls/simulation": {"_SETTLE", "_FINER", "_STEPS", "_SAMPLED", "_UNEVEN", "_HALVINGS", "_GENTLE"},
     "loop/gauss_newton": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST"},
     "loop/residuals": {"_SHOWN"},
     "loop/run": {"_FLOOR_COPIES", "_LOOKS"},
