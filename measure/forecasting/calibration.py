@@ -60,16 +60,21 @@ THETA: tuple[tuple[str, str, float], ...] = (("density", "ln", 0.1), ("bending",
 DAMPING = [name for name, *_ in THETA].index("damping")
 """Place of the damping among `THETA`."""
 
-PRIOR = np.array([DENSITY_UNCERTAINTY, 1.0, 1.5])
-"""Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`: a density known as
-well as where nobody says how well, bending within a factor of e (the spread of one kind of cloth: Wang et al. 2011).
-Damping is hardly ever measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard
-deviations."""
-
-PRIOR_WITHOUT_MASS = np.array([1.0, 1.0, 1.5])
-"""The same of a cloth that was not weighed and whose material is a guess: its density within a factor of e."""
-
 
 def prior(density_uncertainty: float) -> NDArray[np.float64]:
-    """`PRIOR` for a cloth whose density has a relative standard uncertainty that is given."""
-    return np.array([density_uncertainty, *PRIOR[1:]])
+    """Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`.
+
+    Bending is known within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever
+    measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard deviations.
+
+    Args:
+        density_uncertainty: relative standard uncertainty of the density.
+    """
+    return np.array([density_uncertainty, 1.0, 1.5])
+
+
+PRIOR = prior(DENSITY_UNCERTAINTY)
+"""Where nobody says how well the density is known."""
+
+PRIOR_WITHOUT_MASS = prior(1.0)
+"""Of a cloth that was not weighed and whose material is a guess: its density within a factor of e."""

@@ -101,13 +101,9 @@ def _all(known: float) -> str:
     return f"all draws, density known to {100 * known:.0f} %"
 
 
-def _known(experiments: Mapping[str, Experiment]) -> float:
-    return next(iter(experiments.values())).specimen.density_uncertainty
-
-
 def _together(place: Path, experiments: Mapping[str, Experiment], seed: int) -> dict[str, Any]:
     """p by the kinds of all draws, from its file where it was made before."""
-    kept = place / f"{len(DRAWS)}-{_known(experiments):g}.json"
+    kept = place / f"{len(DRAWS)}.json"
     if not kept.exists():
         nulls = place / f"nulls-of-{len(DRAWS)}"
         nulls.mkdir(parents=True, exist_ok=True)

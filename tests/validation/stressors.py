@@ -19,6 +19,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -61,7 +62,6 @@ NOISE = 1e-3
 _COUNT = 40
 _SETTLED = 3.5
 """s before the first frame from which winds blow: a simulation begins there."""
-_COVERED = ("density", "bending", "damping")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,9 +165,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             first = experiment(_truth(folder, "", 0, seed), name, seed)
             wanted = batches(Setting.of(first), kinds=CRITERIA.simulated_kinds, seed=child_seed(seed, "bank", name))
             banks.build(_bank(folder, name), wanted, workers=len(os.sched_getaffinity(0)))
-        jobs = [(folder, name, number, seed) for number in range(count) for name in STRESSORS]
+        judged = partial(_rows, folder, seed)
         with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=get_context("spawn")) as pool:
-            rows = list(pool.map(_row, *zip(*jobs, strict=True)))
+            rows = [row for own in pool.map(judged, range(count)) for row in own]
     found = {"nulls": count, "stressors": summary(rows), "experiments": rows, "criteria": CRITERIA.as_dict()}
     (out / "validate-stressors.md").write_text(page(found), encoding="utf-8")
     return found
@@ -177,9 +177,14 @@ def _bank(folder: Path, name: str) -> Path:
     return folder / f"nulls-{list(STRESSORS).index(name):02d}"
 
 
+def _rows(folder: Path, seed: int, number: int) -> list[dict[str, Any]]:
+    """Verdicts on one null by all stressors, one after another: most of them are of the same simulation."""
+    torch.set_num_threads(1)
+    return [_row(folder, stressor, number, seed) for stressor in STRESSORS]
+
+
 def _row(folder: Path, stressor: str, number: int, seed: int) -> dict[str, Any]:
     """A verdict on one null, from its file where it was made before."""
-    torch.set_num_threads(1)
     kept = folder / f"row-{list(STRESSORS).index(stressor):02d}-{number:02d}.json"
     if not kept.exists():
         case = _OTHER if stressor == _OTHER else _TURBULENT if stressor.startswith(_TURBULENT) else ""
