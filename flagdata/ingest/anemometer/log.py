@@ -88,7 +88,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
     zero.check(reading, options.zero_offset, where=str(path))
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
-    reading = zero.settle(possible.impossible(in_order(reading, where=str(path), choice=options.clock)), choice)
+    ordered = in_order(reading, where=str(path), choice=options.clock, source=source)
+    reading = zero.settle(possible.impossible(ordered), choice)
     for check in (quality.faults, quality.negative, quality.dead_zone, quality.idle, quality.stale, quality.at_nyquist):
         reading = _apply(reading, check)
     findings = (*reading.findings, *quality.gaps(reading))

@@ -106,7 +106,7 @@ class Davis:
             averaged=True,
             compass=_directions(assigned.channels),
         )
-        return read_export(source, export, options).with_findings((*found, finding))
+        return read_export(source, export, options).with_findings((*found, finding, *_gusts(columns, spelled, form)))
 
     def _read_site(self, source: TextFile, lines: Sequence[str], at: int, options: WindOptions) -> Reading:
         where = str(source.path)
@@ -142,7 +142,10 @@ def _directions(channels: Mapping[str, ChannelLayout]) -> tuple[int, ...]:
 
 
 def _program(lines: Sequence[str]) -> list[Column] | None:
-    """The columns of the program's export: each name is in two lines."""
+    """The columns of the program's export: each name is in two lines.
+
+    A column Dir right beside Wind Speed is the wind's, wherever "Wind" stands in the line above.
+    """
     if len(lines) < 3:
         return None
     upper, lower = lines[0].lstrip("\ufeff"), lines[1]
@@ -152,9 +155,27 @@ def _program(lines: Sequence[str]) -> list[Column] | None:
         names = [f"{a} {b}".strip() for a, b in zip(first, second, strict=False)]
     else:
         names = _above(upper, lower)
+    names = [
+        "Wind Dir" if name.lower() == "dir" and before.lower() == "wind speed" else name
+        for before, name in zip(["", *names], names, strict=False)
+    ]
     if [name.lower() for name in names[:2]] != ["date", "time"] or "wind speed" not in map(str.lower, names):
         return None
     return [Column(number=number, name=name) for number, name in enumerate(names, start=1)]
+
+
+def _gusts(columns: Sequence[Column], spelled: str, form: str) -> tuple[Finding, ...]:
+    """The finding that offers the gusts of the program's export as a wind of their own; none where it has none."""
+    by_name = {column.name.lower(): column.number for column in reversed(columns)}
+    speed, direction = by_name.get("hi speed"), by_name.get("hi dir")
+    if speed is None:
+        return ()
+    date, _, time = form.partition(" ")
+    line = f"1=date[{date}],2=time[{time}],{speed}=wind_speed[{spelled}]"
+    line += f",{direction}=wind_direction[points]" if direction is not None else ""
+    what = "column 'Hi Speed' is the highest speed of each interval and is not read; to read it as a wind of its own, "
+    what += f'ingest the file once more with --columns "{line}"'
+    return (Finding(kind="columns-not-read", severity=Severity.NOTE, count=1, what=what),)
 
 
 def _above(upper: str, lower: str) -> list[str]:

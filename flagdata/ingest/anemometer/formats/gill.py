@@ -30,6 +30,7 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.tables.unit_letters import GILL
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.ingest.anemometer.winds.sonic import with_horizontal
 from flagdata.schema import SampleFlag
@@ -39,7 +40,6 @@ from flagdata.units import UNITS
 CHANNELS = ("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature")
 _LINE = re.compile(r"(?:\x02|<STX>)?\s*(?P<body>[A-Z],.*?)(?P<end>\x03|<ETX>)?\s*(?P<sum>[0-9A-F]{2})?\s*", re.DOTALL)
 _BEGINS = re.compile(r"(?:\x02|<STX>)?\s*[A-Z],\s*(?:[+-]?\d|,)")
-_UNITS = {"M": "m/s", "N": "kn", "P": "mph", "K": "km/h", "F": "ft/min"}
 _POLAR = re.compile(r"(?:\d{1,3}(?:\.\d)?)?")
 _SIGNED = re.compile(r"[+-]\d+\.\d+")
 _SPEED = re.compile(r"\d+\.\d+")
@@ -99,10 +99,10 @@ def parse(raw: str) -> Sample | Defect:
 
 def _fields(body: str) -> Sample | None:
     cells = [cell.strip() for cell in body.split(",")]
-    at = next((index for index in (3, 4) if len(cells) > index and cells[index] in _UNITS), None)
+    at = next((index for index in (3, 4) if len(cells) > index and cells[index] in GILL), None)
     if at is None or any(len(cell) > 12 for cell in cells):
         return None
-    scale = UNITS[_UNITS[cells[at]]].scale
+    scale = UNITS[GILL[cells[at]]].scale
     vertical = math.nan
     if at == 4:
         if not _SIGNED.fullmatch(cells[3]):

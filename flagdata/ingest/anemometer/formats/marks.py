@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.bursts import Bursts
 from flagdata.ingest.anemometer.formats.sentences import TimeMark
 from flagdata.ingest.anemometer.instants import clock as clocks
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
@@ -42,6 +44,7 @@ class Placed:
         marks: number of marks used.
         kind: sentence they come from, or "TAG".
         findings: about midnight and marks that run backwards.
+        bursts: whether each line has the time of its burst's mark, and none is interpolated.
     """
 
     time: Instants
@@ -49,6 +52,7 @@ class Placed:
     marks: int
     kind: str
     findings: tuple[Finding, ...]
+    bursts: bool = False
 
 
 @dataclass
@@ -57,6 +61,7 @@ class TimeLine:
 
     line: dict[str, list[int]] = field(default_factory=dict)
     clock: dict[str, list[int]] = field(default_factory=dict)
+    bursts: Bursts = field(default_factory=Bursts)
     dated: tuple[int, int, dt.date] | None = None
     """First date the stream states: its line, time of day [ns] and date."""
 
@@ -83,13 +88,17 @@ class TimeLine:
         where: str,
         choice: ClockChoice | None = None,
         once: bool = False,
+        winds: Sequence[Hashable] = (),
     ) -> Placed:
         """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
+
+        Lines that come in bursts have the time of the mark of their burst instead.
 
         Args:
             date: day (UTC) of the first mark, for a stream that states none.
             choice: whose marks are right where the stream's clock was set back and stays so; `None` where nobody said.
             once: whether the lines are one reading, which may have one instant.
+            winds: which wind each line holds, where bursts are to be looked for.
 
         Raises:
             TimeError: fewer than two marks, unless all lines are close to the one, or no date.
@@ -143,9 +152,11 @@ class TimeLine:
                 "what tells the time and give --start TIME --rate HZ",
             )
         spacing = float(np.median(np.diff(marks))) / NANOSECONDS
+        time = self.bursts.placed(lines, winds, at, marks) if winds and kind != "TAG" else None
         return Placed(
-            time=_interpolate(lines, at, marks), spacing=spacing, marks=len(marks), kind=kind, findings=tuple(found)
-        )
+            time=_interpolate(lines, at, marks) if time is None else time, spacing=spacing, marks=len(marks), kind=kind,
+            findings=tuple(found), bursts=time is not None,
+        )  # fmt: skip
 
     def _single(self) -> str | None:
         """The kind of the one mark of the stream; `None` where there are more, or none but a TAG block."""

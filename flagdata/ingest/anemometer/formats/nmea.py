@@ -1,10 +1,11 @@
 """NMEA 0183 streams: wind from MWV and MWD, else VWR, VWT and MDA, time from the sentences around them.
 
 Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
-GGA, GLL, or the time of a TAG block), and the flag TIME_UNSURE. MWV,R is wind past the platform; MWV,T is
-"theoretical": what the instrument computed as if the platform stood still; both are relative to the bow. They stay in
-channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR, VWT and MDA are
-what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the same wind again.
+GGA, GLL, or the time of a TAG block), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is wind past the
+platform; MWV,T is "theoretical": what the instrument computed as if the platform stood still; both are relative to the
+bow. They stay in channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR,
+VWT and MDA are what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the
+same wind again.
 """
 
 from __future__ import annotations
@@ -128,8 +129,9 @@ class Nmea:
         if options.clock == "sort":
             fix = "give --clock first or --clock last, or leave it out"
             raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
-        once = len({frozenset(row) for row in stream.values}) == len(stream.values)
-        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, once=once)
+        winds = [frozenset(row) for row in stream.values]
+        once = len(set(winds)) == len(winds)
+        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, once=once, winds=winds)
         channels = {
             name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
         }
@@ -165,6 +167,7 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
         stream.not_sentences.append(at)
         return
     stream.kinds[sentence.kind] += 1
+    stream.times.bursts.sentence(f"{sentence.talker}{sentence.kind}", at)
     stream.unchecked += not sentence.checked
     if tagged is not None:
         stream.times.add_instant(at, tagged * 1_000_000)
@@ -376,6 +379,10 @@ def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
         what = f"{count} wind sentences carry no time: interpolated between {placed.marks} {placed.kind} marks "
         what += f"{placed.spacing:g} s apart"
         kind = "time-interpolated"
+        if placed.bursts:
+            what = f"{count} wind sentences carry no time: sentences come in bursts {placed.spacing:g} s apart, with "
+            what += f"one {placed.kind} in each, and each has the time of the {placed.kind} of its burst"
+            kind = "time-of-burst"
         found.insert(0, Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=what))
 
     def note(places: list[int], kind: str, severity: Severity, what: str) -> None:

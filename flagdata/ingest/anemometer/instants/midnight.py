@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants.seconds import with_mixed
 from flagdata.ingest.anemometer.instants.stamps import EPOCH, Stamps, parse
 
 _TIME = re.compile(r"%[HIMSpfT]")
@@ -24,7 +25,7 @@ def parse_as(texts: Sequence[str] | pa.StringArray, form: str) -> tuple[Stamps, 
         UsageError: see `stamps.pattern`.
     """
     if form in counted.FORMS or counted.needs_date(form):
-        return counted.parse(texts, form), 0
+        return with_mixed(texts, form, counted.parse), 0
     return parse_with_bare_dates(texts, form)
 
 
@@ -36,7 +37,7 @@ def parse_with_bare_dates(texts: Sequence[str] | pa.StringArray, form: str) -> t
     Raises:
         UsageError: see `stamps.pattern`.
     """
-    found = parse(texts, form)
+    found = with_mixed(texts, form, parse)
     end = "00:00:00" if form == "iso" else _midnight(form)
     if form in EPOCH or end is None or bool(found.valid.all()) or 2 * int(found.valid.sum()) <= len(texts):
         return found, 0

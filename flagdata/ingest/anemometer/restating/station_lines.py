@@ -8,12 +8,13 @@
     94846KORD ORD2024051716002200  0.113 D   229   8   229   12 …      NCEI DSI-6405, ASOS 1-minute
 
 Sources: NOAA NCEI, ISD-Lite format (UTC; temperature, pressure and speed times ten, -9999 missing; direction 0 calm);
-Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (fields 6
-average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes) and "Standard log
-files" (day first; 6 average speed, 7 gust, 8 average bearing, 15 latest speed and 25 latest bearing, as in WeeWX's list
-of these fields; units are the station's settings); Weather Display's list of the fields of clientraw.txt (1 average
-speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock, 35 and 36 day and month, 141 the year);
-NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes and of 5 seconds).
+Meteostat, "Hourly Data" (UTC; fields 8 direction, 9 speed and 10 gust in km/h); Cumulus Wiki, "Realtime.txt" (day
+first; fields 6 average and 7 latest speed, 8 bearing, 14 the unit of the speeds, 41 the highest gust of 10 minutes) and
+"Standard log files" (day first; 6 average speed, 7 gust, 8 average bearing, 15 latest speed and 25 latest bearing, as
+in WeeWX's list of these fields; units are the station's settings); Weather Display's list of the fields of
+clientraw.txt (1 average speed and 2 gust in knots, 3 direction, 4 °C, 5 %, 6 hPa, 29 to 31 the clock, 35 and 36 day and
+month, 141 the year); NCEI, DSI-6405 (local and UTC clock; direction and speed in knots over 2 minutes and of 5
+seconds).
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ _DAY = re.compile(r"\d{4}-\d\d-\d\d")
 _UNITS = {"m/s": "m/s", "mph": "mph", "km/h": "km/h", "kts": "kn", "knots": "kn"}
 _ASOS = re.compile(r"\s*\d{5}[A-Z0-9]{4}\s+[A-Z0-9]{3}(?P<day>\d{8})(?P<local>\d{4})(?P<utc>\d{4})(?P<rest>\s.*)")
 _FOUR = re.compile(r"(?:^|\s)[DN]\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})\s+(\d{1,3})(?:\s|$)")
+_MONTHS = 12
 _CUMULUS = 15
 """Fields of Cumulus' monthly log up to the latest reading of the speed; its later versions have more."""
 _BEARING = 24
@@ -202,6 +204,8 @@ def as_table(source: TextFile) -> TableText | None:
         speed, warm = units.pop()
         names[2:5] = [f"{name} [{speed}]" for name in names[2:5]]
         names[6] = f"{names[6]} [{warm}]" if warm else names[6]
+        if all(int(re.split(r"[-/.]", row[0])[1]) <= _MONTHS for row in found):
+            names[0] = "date (dd/mm/yy)"  # another program may have written the month first, and then some days show it
         found = [row[:-2] for row in found]
     return table(source, names, found, kind="published-lines", what=kind.about, left_out=other)
 

@@ -11,7 +11,8 @@ Rules, in order:
    it, since the clock may have been set back by one step. Refused: time that runs back again and again, or by no
    whole hour to where the log never was, as in files that were joined.
 5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.
-6. Rows equal in stamp and values are the same row written several times: one is kept.
+6. Rows equal in stamp and values, and in every cell that is not read, are the same row written several times: one is
+   kept.
 7. Rows that share a stamp are given instants of their own (`spread`).
 """
 
@@ -28,6 +29,8 @@ from flagdata.ingest.anemometer.instants import clock, disorder
 from flagdata.ingest.anemometer.instants.clock import DAY, JITTER, ClockChoice, Jump
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.samples.spread import FAST, distinct
+from flagdata.ingest.anemometer.samples.written import written_otherwise
+from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -45,10 +48,13 @@ COPIES, COPIED = 2.0, 0.1
 """Changes of the values within stamps that readings would have shown, and the share of them that copies may show."""
 
 
-def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None) -> Reading:
+def in_order(
+    reading: Reading, *, where: str, choice: ClockChoice | None = None, source: TextFile | None = None
+) -> Reading:
     """Apply the rules above.
 
     Args:
+        source: the file, whose lines tell whether rows are equal in the cells that are not read.
         choice: whose stamps are right where the clock was set anew, or that the rows are out of order; `None` where
             nobody said.
 
@@ -58,7 +64,7 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
     reading = _put_in_order(reading, choice)
     reading = _without_repeated_stretches(reading)
     reading = _sorted(reading, where, None if choice == "sort" else choice)
-    reading = _without_repeats(reading)
+    reading = _without_repeats(reading, source)
     _refuse_bare_dates(reading, where)
     return distinct(reading)
 
@@ -242,28 +248,38 @@ def _without_repeated_stretches(reading: Reading) -> Reading:
     return reading.take(~drop).with_findings((finding,))
 
 
-def _without_repeats(reading: Reading) -> Reading:
-    """The rows without those that repeat the row before them in stamp and in everything that is read."""
+def _without_repeats(reading: Reading, source: TextFile | None) -> Reading:
+    """The rows without those that repeat the row before them in stamp and in all cells."""
     if len(reading.time) < 2:
         return reading
-    again, differs = np.diff(reading.time) == 0, _differs(reading)
-    same = again & ~differs
-    if not _copied(again, differs):
-        # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice.
-        same &= ~_with_room(reading)
-        same &= int(again.sum()) <= max(1.0, ISOLATED * len(again))
+    differs = _differs(reading)
+    same = _repeats(reading, differs)
+    if same.any() and source is not None:
+        differs[same] = written_otherwise(source, reading.line[:-1][same], reading.line[1:][same])
+        same = _repeats(reading, differs)
     if not same.any():
         return reading
     twice = np.concatenate(([False], same))
     count, rows = int(twice.sum()), np.diff(np.flatnonzero(np.append(~twice, True)))
     most = int(rows.max())
-    what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in all that is read"
+    what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in all cells"
     what += f", up to {most} rows alike" if most > 2 else ""
     finding = Finding(
         kind="duplicate-rows", severity=Severity.WARNING, count=count, where=f"line {reading.line[twice][0]}",
         what=f"{what}; left out as copies",
     )  # fmt: skip
     return reading.take(~twice).with_findings((finding,))
+
+
+def _repeats(reading: Reading, differs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n - 1,) whether a row repeats the one before it; `differs` whether it differs in something beside the stamp."""
+    again = np.diff(reading.time) == 0
+    same = again & ~differs
+    if not _copied(again, differs):
+        # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice.
+        same &= ~_with_room(reading)
+        same &= int(again.sum()) <= max(1.0, ISOLATED * len(again))
+    return same
 
 
 def _differs(reading: Reading) -> NDArray[np.bool_]:

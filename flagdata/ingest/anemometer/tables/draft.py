@@ -13,19 +13,23 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.ingest.anemometer.instants import counted, yearless, zones
-from flagdata.ingest.anemometer.options import WindOptions, in_shell
+from flagdata.ingest.anemometer.instants import counted, yearless
+from flagdata.ingest.anemometer.options import in_shell
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.tables import (
+    beside_components,
     offered_columns,
     quality_columns,
+    stated_against,
     stated_columns,
     stated_rate,
     unread,
     unread_winds,
 )
+from flagdata.ingest.anemometer.tables.needs import Need, needs_of, stamps_of
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.tables.stated_unit import stated_unit
+from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, lay_out
 from flagdata.ingest.anemometer.times import bare_dates
@@ -57,19 +61,6 @@ class Doubt:
 
     what: str
     fix: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Need:
-    """What a table's stamps do not tell and no recipe can: what, how to say it, and the option that says it."""
-
-    what: str
-    fix: str
-    option: Literal["zone", "date", "start"]
-
-    def without(self, options: WindOptions) -> bool:
-        """Whether the user has not said it yet."""
-        return getattr(options, self.option) is None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,10 +123,11 @@ def draft(
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
-    named = False
+    layout, named = with_letters(layout), False
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
-        time, winds, remarks, warnings = known.time, (known.wind,), (), ()
+        time, winds, remarks = known.time, (known.wind,), ()
+        warnings = stated_against.warnings(layout, known.wind)
         of_time = time.columns if time is not None else ()
         mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
     else:
@@ -143,7 +135,7 @@ def draft(
         of_time = time.columns if time is not None else ()
         mixed = None
         if time is not None:
-            mixed = sites(layout, time=of_time, stamps=_stamps(layout, of_time))
+            mixed = sites(layout, time=of_time, stamps=stamps_of(layout, of_time))
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
         for part in () if wind is None else site_labels.parts(wind, mixed[1] if mixed is not None else ()):
             if part in {one.label for one in winds}:
@@ -151,6 +143,7 @@ def draft(
             said, odd = named_wind(layout, part, time=of_time, told=unit)
             winds, warnings, named = (*winds, *said), (*warnings, *odd), bool(said)
             if said:
+                warnings = (*warnings, *stated_against.warnings(layout, said[0]))
                 break
         if time is None and not winds:
             return None
@@ -188,49 +181,18 @@ def draft(
         warnings = (*warnings, *quality_columns.warnings(layout, taken=taken))
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
-        remarks = (*remarks, *unread.otherwise(layout, time, chosen))
-        remarks = (*remarks, *own_motion.remarks(layout))
+        remarks = (*remarks, *unread.otherwise(layout, time, chosen), *beside_components.remark(layout, time, chosen))
+        remarks = (*remarks, *own_motion.remarks(layout), *(unread.times(layout, time, remarks) if time else ()))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), needs=_needs(lines, layout, time),
+        doubts=tuple(doubts), needs=needs_of(lines, layout, time),
         unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth,
     )  # fmt: skip
-
-
-def _stamps(layout: Layout, columns: Sequence[int]) -> list[str]:
-    return [" ".join(row[index].strip() for index in columns) for row in layout.rows]
-
-
-def _needs(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tuple[Need, ...]:
-    """What the stamps of a time leave open: its start, its day, its zone."""
-    if time is None or time.counts:
-        return ()
-    if time.form is not None and counted.is_elapsed(time.form):
-        fix = "give the instant of the first: --start TIME"
-        above = stated_rate.advice(lines[: layout.preamble + max(1, layout.header)] if layout.header else ())
-        fix += f" ({above})" if above else ""
-        return (Need(what="its rows count from a start", fix=fix, option="start"),)
-    found: list[Need] = []
-    if time.form is not None and counted.is_time_of_day(time.form):
-        fix = "give the day of the first row: --date DATE"
-        found.append(Need(what="its stamps have no date", fix=fix, option="date"))
-    if time.form is not None and yearless.is_yearless(time.form):
-        texts = _stamps(layout, time.columns)
-        read = counted.parse([text for text in texts if text.strip()], time.form)
-        what, fix = yearless.missing(time.form, int(read.ns[read.valid].flat[0]))
-        found.append(Need(what=what, fix=fix, option="date"))
-    if not time.zoned and time.zone is None:
-        statement = zones.stated(lines)
-        fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
-        fix = f"{fix}; {statement.advice()}" if statement is not None else fix
-        fix = f"{fix}; {time.zone_advice}" if time.zone_advice else fix
-        found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
-    return tuple(found)
 
 
 def _doubts(
@@ -248,7 +210,8 @@ def _doubts(
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
         above = stated_rate.advice(lines[: layout.preamble])
         fix += f" ({above})" if above else ""
-        found.append(Doubt(what=f"no column is a time in a format that is known; the columns are {names}", fix=fix))
+        what = f"no column is a time in a format that is known; {unread.events(layout)}the columns are {names}"
+        found.append(Doubt(what=what, fix=fix))
     elif time.doubt is not None and time.fix is not None:
         offered = f"; {offered_columns.offer(layout, time, winds)}" if time.counts else ""
         found.append(Doubt(what=time.doubt, fix=f"{time.fix}{offered}"))
@@ -377,6 +340,9 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         if layout.header
         else f"no line names the {layout.number_of_columns()} columns"
     )
+    if layout.header and layout.named:
+        named = f"line {layout.preamble + 1} names {layout.named} columns, of which rows fill the first "
+        named += f"{layout.number_of_columns()}"
     units = f", line {_units_line(layout)} their units" if any(layout.units) else ""
     decimal = ", numbers have decimal commas" if layout.decimal == "," else ""
     found = [f"cells are divided by {delimiter_name(layout.delimiter)!r}{decimal}; {named}{units}"]

@@ -16,16 +16,19 @@ from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARD
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds import bow, own_motion
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
 from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.words import headings
+from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import fits, understand
 from flagdata.schema import CHANNELS
 
 _COUNT_AND_WIND, _ROWS, _UNEVEN = 2, 4, 0.01
 """Columns and steps from which a count is told, and the share of a step by which others may differ."""
+_SECONDS, _SMALL, _FINE = "elapsed-s", 1.0, 0.5
+"""How a count is likely written that grows by less than 1, with a fraction of three digits in most rows."""
 _WIDE = 12
 """Columns up to which an offer lists all of them."""
 
@@ -55,6 +58,10 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     ]  # fmt: skip
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
+    if time is None and f"time[{_SECONDS}]" in known.values():
+        further = (
+            f"; column 1 grows in small steps, as a count of seconds since a start does: add --start TIME{further}"
+        )
     steady = _steady(layout) if time is None and "time[?]" in known.values() else None
     if steady is not None:
         units = ", ".join(counted.UNITS[:-1]) + f" or {counted.UNITS[-1]}"
@@ -73,6 +80,16 @@ def _steady(layout: Layout) -> int | None:
         return None
     usual = float(np.median(step))
     return 0 if usual > 0 and bool(np.all(np.abs(step - usual) <= _UNEVEN * usual)) else None
+
+
+def _grows(layout: Layout) -> bool:
+    """Whether the first column has no heading, and grows from row to row by parts of one, as seconds do."""
+    if layout.names[0] or layout.number_of_columns() < _COUNT_AND_WIND:
+        return False
+    cells = layout.column(0)
+    step = np.diff(numbers(cells, decimal=layout.decimal).value)
+    fine = sum(re.fullmatch(r"\d+[.,]\d{3,}", cell) is not None for cell in cells) > _FINE * len(cells)
+    return fine and len(step) >= _ROWS and bool(np.all((step > 0) & (step < _SMALL)))
 
 
 def _of_wind_or_time(entry: str) -> bool:
@@ -124,23 +141,29 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
     return "; ".join([*said, "else export the log with the time of each row"])
 
 
-def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> str:
+def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None) -> str:
     """The option that reads another column as the wind's speed, by the time and the direction of the one understood.
 
     A direction whose unit is in doubt is given in the one that its numbers speak for; the heading's stands beside.
+
+    Args:
+        speed: its column; `None` where only the user knows it, who writes its number in place of the "?".
     """
-    known = wind.columns.get("wind_speed")
-    stated_unit = understand(layout.names[speed], layout.units[speed]).unit or (known.unit if known else None)
+    known = wind.columns.get("wind_speed") or wind.columns.get("wind_x")
+    heading = understand(layout.names[speed], layout.units[speed]) if speed is not None else None
+    stated_unit = heading.unit if heading is not None and heading.unit else known.unit if known else None
     others = {
         name: column for name, column in wind.columns.items()
         if not name.startswith(("apparent", "theoretical")) and name not in ("wind_speed", *COMPONENTS)
     }  # fmt: skip
-    entries = _understood(layout, time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
+    entry = f"wind_speed[{stated_unit or '?'}]"
+    entries = _understood(layout, time, (replace(wind, columns=others),)) | ({} if speed is None else {speed: entry})
+    open_one = [f"?={entry}"] if speed is None else []
     direction = others.get("wind_direction")
     ways = _ways(layout, direction) if direction is not None else ()
     if direction is None or not ways:
-        return f'--columns "{",".join(_numbered(entries))}"'
-    line = ",".join(_numbered(entries | {direction.index: ways[0]}))
+        return f'--columns "{",".join([*_numbered(entries), *open_one])}"'
+    line = ",".join([*_numbered(entries | {direction.index: ways[0]}), *open_one])
     return f'--columns "{line}", or with {" or ".join(ways[1:])} for the direction, which is in doubt'
 
 
@@ -185,7 +208,9 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
             found |= {at: _part(form, parts) for at, form in zip(time.columns, forms, strict=True)}
         elif len(time.columns) == 1:
             elapsed = time.form is not None and counted.is_elapsed(time.form)
-            found[time.columns[0]] = f"time[{time.form}]" if elapsed else "time[?]" if time.counts else "time"
+            found[time.columns[0]] = (
+                f"time[{time.form}]" if elapsed else f"time[{time.likely or '?'}]" if time.counts else "time"
+            )
         else:
             found |= dict(zip(time.columns, ("date", *["time"] * len(time.columns)), strict=False))
     for wind in winds[:1]:
@@ -206,11 +231,13 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     stamped = _stamped(layout)
     if steady is not None:
         found[steady] = "time[?]"
-    for at, name in enumerate(layout.names):
+    elif not timed and _grows(layout):
+        found[0], timed = f"time[{_SECONDS}]", True
+    for at in range(len(layout.names)):
         if at in found:
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
-        heading = understand(name, layout.units[at])
+        heading = bow.heading_of(layout, at)
         if not timed and at == stamped and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
         elif at in own:
@@ -230,7 +257,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         elif heading.quantity:
             continue
         elif may_be_direction(layout, at) and not any("wind_direction" in entry for entry in found.values()):
-            found[at] = "wind_direction" if compass_unit(layout, at) else "wind_direction[deg]"
+            channel = "apparent_wind_direction" if bow.to_bow(layout, at) else "wind_direction"
+            found[at] = channel if compass_unit(layout, at) else f"{channel}[deg]"
         elif (not winds and {"number", "stamp"} & set(kinds)) or (
             not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
         ):
@@ -240,7 +268,10 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
 
 def _stamped(layout: Layout) -> int | None:
     """The first column of stamps, or else the first whose heading is a time above words with digits."""
-    columns = [[cell for cell in layout.column(at) if cell_kind(cell) != "missing"] for at in range(len(layout.names))]
+    columns = [
+        [] if of_event(name) else [cell for cell in layout.column(at) if cell_kind(cell) != "missing"]
+        for at, name in enumerate(layout.names)
+    ]
     stamps = (at for at, cells in enumerate(columns) if cells and cell_kind(cells[0]) == "stamp")
     worded = (
         at for at, cells in enumerate(columns)

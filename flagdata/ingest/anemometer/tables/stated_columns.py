@@ -6,7 +6,8 @@
 An entry is the name of a channel with its unit in brackets, `wind_direction_to` for a direction that the wind blows to,
 `site` for the column that tells sites apart, or a part of the time: `time`, `date`, `year`, `month`, `day`,
 `day_of_year`, `hour`, `minute`, `second`. Behind `time` and `date` the format may stand in brackets, as a recipe's
-[time] format has it. The line makes the recipe that a draft would make, by the same code.
+[time] format has it, or the unit of a count since a start, such as `time[s]`. The line makes the recipe that a draft
+would make, by the same code.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ PARTS = {
 """Parts of a date and the directives they are written with."""
 FREE = ("date", "time")
 SITE = "site"
+_COUNTS = {form.removeprefix("elapsed-"): form for form in counted.UNITS} | {"µs": "elapsed-us", "μs": "elapsed-us"}
+"""Units that stand for a count of them since a start, as in time[s]."""
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
 _ENTRY = re.compile(r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL)
 
@@ -180,7 +183,7 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
     """The time that columns make together; `None` where none is named."""
     if not entries:
         return None
-    forms = [entry.detail or PARTS.get(entry.name) for _, entry in entries]
+    forms = [_COUNTS.get(entry.detail, entry.detail) or PARTS.get(entry.name) for _, entry in entries]
     forms = [_short_year(layout, index, form) for (index, _), form in zip(entries, forms, strict=True)]
     columns = tuple(index for index, _ in entries)
     said = f"{' and '.join(named(layout, index) for index in columns)} as the time"
@@ -197,7 +200,7 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
             fix = f"correct the format of {_WHERE}; the first is {first!r}, of the row {shown(layout)}"
             raise InputError(f"{said} cannot be read as {form}", where=where, fix=fix)
         return choice
-    choice = find_time(_only(layout, entries), order=order)
+    choice = find_time(_only(layout, entries), order=order, told=True)
     choice = choice if choice is not None and set(choice.columns) == set(columns) else None
     if choice is not None and choice.form is None and any(entry.detail for _, entry in entries):
         choice = None  # what the columns alone leave open, the formats in brackets tell

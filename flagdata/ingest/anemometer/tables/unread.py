@@ -8,14 +8,14 @@ from flagdata.ingest.anemometer.tables import offered_columns, stated_columns
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.times.timecolumns import event_stamps
+from flagdata.ingest.anemometer.winds import bow
 from flagdata.ingest.anemometer.winds.angles import compass_unit, may_be_direction, may_be_two
 from flagdata.ingest.anemometer.winds.directions import judge
 from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, Wind
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import COURSES
 
-_RELATIVE = frozenset({"rel", "relative", "apparent", "bow", "awa"})
-"""Words of a direction from its platform's bow or mark."""
 _FROM_NORTH = frozenset({"twd", "gwd"})
 """Directions that instruments of boats compute, from whichever north their compass is set to."""
 
@@ -32,6 +32,38 @@ def from_either_north(layout: Layout, time: TimeChoice | None, winds: Sequence[W
             what += f'; if from true north: --columns "{line}", else with wind_direction_magnetic for wind_direction'
         found.append(what)
     return tuple(found)
+
+
+def times(layout: Layout, time: TimeChoice, remarks: Sequence[str]) -> tuple[str, ...]:
+    """A remark for the columns of other stamps than the time's, and one for those of special events.
+
+    Args:
+        remarks: what was said of columns already.
+    """
+    said = (*remarks, time.remark or "")
+    others = [repr(layout.names[at]) for at in time.others]
+    others = [name for name in others if not any(name in remark for remark in said)]
+    events = [at for at in event_stamps(layout) if at not in time.columns]
+    events = [at for at in events if not any(repr(layout.names[at]) in remark for remark in said)]
+    found: list[str] = []
+    if others:
+        what = f"columns {', '.join(others)} are times" if len(others) > 1 else f"column {others[0]} is a time"
+        found.append(f"{what} as well: left out; to take another time, name it as time in --columns")
+    if events:
+        found.append(f"{_of_events(layout, events)}: left out")
+    return tuple(found)
+
+
+def events(layout: Layout) -> str:
+    """Which columns of stamps are of special events, with "; " behind it; "" where none is."""
+    columns = event_stamps(layout)
+    return f"{_of_events(layout, columns)}; " if columns else ""
+
+
+def _of_events(layout: Layout, columns: Sequence[int]) -> str:
+    names = ", ".join(repr(layout.names[at]) for at in columns)
+    what = f"columns {names} are times" if len(columns) > 1 else f"column {names} is the time"
+    return f"{what} of a special event, not of the rows"
 
 
 def directions(
@@ -63,7 +95,7 @@ def directions(
             continue
         if any(repr(name) in remark for remark in remarks) or not may_be_direction(layout, index):
             continue
-        if set(words_of(name)) & _RELATIVE:
+        if bow.to_bow(layout, index):
             line = offered_columns.read_also(layout, time, wind, index, channel="apparent_wind_direction")
             what = "is a direction from its platform's bow or mark, not from north"
             found.append(f'column {called} {what}: left out; to keep it as such: --columns "{line}"')
@@ -112,7 +144,7 @@ def relative(layout: Layout, winds: Sequence[Wind]) -> tuple[str, ...]:
     return tuple(
         f"column {name!r} is relative to its platform: left out beside {layout.names[north[0]]!r}, which is from north"
         for index, name in enumerate(layout.names)
-        if north and index not in taken and set(words_of(name)) & _RELATIVE and may_be_direction(layout, index)
+        if north and index not in taken and bow.to_bow(layout, index) and may_be_direction(layout, index)
     )
 
 

@@ -80,6 +80,7 @@ class Layout:
         unit_columns: of the columns, the index of the next one where that spells their unit in every row; else `None`.
         strange: what of the heading is not understood.
         short: how many columns the heading names, where rows have more and it is taken for the first of them; else 0.
+        named: how many columns the heading names, where rows hold fewer, whose cells beyond are empty; else 0.
         site: index of the column that tells sites apart, once it is known.
     """
 
@@ -96,6 +97,7 @@ class Layout:
     unit_columns: tuple[int | None, ...] = ()
     strange: tuple[str, ...] = ()
     short: int = 0
+    named: int = 0
     site: int | None = None
 
     def column(self, index: int) -> list[str]:
@@ -172,7 +174,7 @@ def _lay_out(
         delimiter=delimiter, decimal=decimal, preamble=start if at is None else at,
         header=0 if at is None else start - at, names=names, units=units, by_name=by_name, rows=rows,
         lines=tuple(number + 1 for number, _ in kept), suffixes=suffixes, unit_columns=beside, strange=strange,
-        short=short,
+        short=short, named=0 if at is None or delimiter == " " else _beyond(lines[at], delimiter, width),
     )  # fmt: skip
 
 
@@ -191,6 +193,12 @@ def _short(lines: Sequence[str], at: int | None, delimiter: str, width: int) -> 
         return 0
     found = len(cut(lines[at].lstrip("\ufeff"), delimiter))
     return found if 1 < found < width - 1 else 0  # one less is a heading of R, which leaves out that of the row names
+
+
+def _beyond(heading: str, delimiter: str, width: int) -> int:
+    """How many columns a heading names that are more than the cells of a row; 0 where there are none."""
+    names = cut(heading, delimiter)
+    return next((at for at in range(len(names), width, -1) if names[at - 1]), 0)
 
 
 def _leaves_out_the_last(names: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:

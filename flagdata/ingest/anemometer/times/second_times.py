@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.ingest.anemometer.instants import counted
 from flagdata.ingest.anemometer.instants.midnight import parse_as
 from flagdata.ingest.anemometer.instants.stamps import Stamps, is_date_alone
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, whole_numbers
-from flagdata.ingest.anemometer.words.headings import words_of
+from flagdata.ingest.anemometer.words.headings import names_time, words_of
 from flagdata.timebase import NANOSECONDS
 
 _PARTS: tuple[tuple[str, int, frozenset[str]], ...] = (
@@ -24,6 +25,8 @@ _PARTS: tuple[tuple[str, int, frozenset[str]], ...] = (
 _IN_WORDS = {"%L": "milliseconds", "%U": "microseconds", "%N": "nanoseconds"}
 _ALIKE = 0.7
 """Scores of two times within this are those of times that their headings do not tell apart."""
+_STAMP, _ABOUT_SURE = 2, 2.0
+"""Columns that hold a stamp at most, and the score from which a choice is of a date and a time."""
 _EVENER = 0.5
 """A clock is steadier than another where its steps deviate by less than this share of the other's."""
 
@@ -93,6 +96,19 @@ def settle(layout: Layout, best: TimeChoice, others: Sequence[TimeChoice]) -> Ti
         )
         return replace(taken, remark=remark)
     return best
+
+
+def left_out(layout: Layout, best: TimeChoice, choices: Sequence[TimeChoice]) -> tuple[int, ...]:
+    """The columns of other stamps of a date and a time, by their headings and cells, beside the time that is taken."""
+    found: set[int] = set()
+    for choice in choices:
+        form = choice.form or ""
+        alone = is_date_alone(form) or counted.is_elapsed(form) or counted.needs_date(form)
+        if choice.counts or alone or len(choice.columns) > _STAMP or choice.score < _ABOUT_SURE:
+            continue
+        if not set(choice.columns) & set(best.columns) and all(names_time(layout.names[at]) for at in choice.columns):
+            found |= set(choice.columns)
+    return tuple(sorted(found))
 
 
 def _whole(choice: TimeChoice) -> bool:

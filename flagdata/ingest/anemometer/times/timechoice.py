@@ -33,8 +33,10 @@ class TimeChoice:
         fix: what the user can say.
         score: how well it fits, for the choice among several.
         counts: whether it counts from a start, by a unit that may not be known.
+        likely: the format that a count is likely written in; "" where nothing tells.
         remark: what was taken for granted, and may be otherwise; `None` where nothing was.
         unnamed: whether it is told by its numbers alone, since no line names the columns.
+        others: indices of the columns of other stamps of the same rows, which are not read.
         zone_advice: what other columns tell of its zone, as a sentence for the user who is to name it; "" for nothing.
     """
 
@@ -46,9 +48,11 @@ class TimeChoice:
     doubt: str | None = None
     fix: str | None = None
     counts: bool = False
+    likely: str = ""
     unnamed: bool = False
     zone_advice: str = ""
     remark: str | None = None
+    others: tuple[int, ...] = ()
 
 
 def share(shape: re.Pattern[str], texts: Sequence[str]) -> bool:

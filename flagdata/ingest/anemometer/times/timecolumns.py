@@ -21,7 +21,7 @@ from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times import dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
 from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, share, time_choice
-from flagdata.ingest.anemometer.words.extremes import of_extreme
+from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of, zone_of
 
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
@@ -50,15 +50,18 @@ _MILLISECONDS = "%H:%M:%S:%L"
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
 
 
-def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | None:
+def find_time(layout: Layout, *, order: Order | None = None, told: bool = False) -> TimeChoice | None:
     """The columns that are the time; `None` where there are none.
+
+    A column whose heading is of a special event, such as the last lightning, is none.
 
     Args:
         order: of dates written with numbers only, as the user says.
+        told: whether the user says that the columns of the table are its time.
     """
     best: TimeChoice | None = None
-    extremes = {index for index, name in enumerate(layout.names) if of_extreme(name)}
-    choices = [choice for choice in _choices(layout, order) if not extremes & set(choice.columns)]
+    events = set[int]() if told else {index for index, name in enumerate(layout.names) if of_event(name)}
+    choices = [choice for choice in _choices(layout, order, events) if not events & set(choice.columns)]
     choices = [choice for choice in choices if not _hundredths(layout, choice)]
     choices = [
         replace(choice, score=choice.score - 2.0 * (1.0 - _filled(layout, choice)))
@@ -67,9 +70,21 @@ def find_time(layout: Layout, *, order: Order | None = None) -> TimeChoice | Non
     for choice in choices:
         if best is None or choice.score > best.score + 1e-9:
             best = choice
-    if best is None or best.form is None:
-        return best
-    return second_times.with_part_of_second(layout, second_times.settle(layout, best, choices), time_as)
+    if best is None:
+        return None
+    if best.form is not None:
+        best = second_times.with_part_of_second(layout, second_times.settle(layout, best, choices), time_as)
+    return replace(best, others=second_times.left_out(layout, best, choices))
+
+
+def event_stamps(layout: Layout) -> tuple[int, ...]:
+    """The columns of stamps whose heading is of a special event, so that they are not the time of a row."""
+    found: list[int] = []
+    for index, name in enumerate(layout.names):
+        texts = [cell for cell in layout.column(index) if cell and cell_kind(cell) != "missing"]
+        stamps = _whole(layout, (index,), texts, "dmy") if texts and of_event(name) else None
+        found += [] if stamps is None else [index]
+    return tuple(found)
 
 
 def _hundredths(layout: Layout, choice: TimeChoice) -> bool:
@@ -121,7 +136,7 @@ def _texts(layout: Layout, choice: TimeChoice) -> list[str]:
     return [" ".join(cells) for cells in zip(*(layout.column(index) for index in choice.columns), strict=True)]
 
 
-def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
+def _choices(layout: Layout, order: Order | None, events: Collection[int]) -> Iterator[TimeChoice]:
     columns = [layout.column(index) for index in range(layout.number_of_columns())]
     if layout.decimal == ",":
         columns = [[re.sub(r"^(\d+),(\d+)$", r"\1.\2", cell) for cell in column] for column in columns]
@@ -130,7 +145,7 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
               and share(_HALF, texts)}  # fmt: skip
     for index, cells in enumerate(columns):
         texts = [cell for cell in cells if cell]
-        if not texts or of_extreme(layout.names[index]):
+        if not texts or index in events:
             continue
         if share(_DATE, texts):
             dates.append(index)
@@ -164,8 +179,9 @@ def _choices(layout: Layout, order: Order | None) -> Iterator[TimeChoice]:
         clock = _with_half((index,), halves)
         texts = _joined(columns, clock)
         for form in (*CLOCKS[:4], "%H.%M.%S%f", _MILLISECONDS):
-            if fits(counted.parse(texts, form)):
-                yield time_choice(layout, clock, form, counted.parse(texts, form), 1.0)
+            found, _ = parse_as(texts, form)
+            if fits(found):
+                yield time_choice(layout, clock, form, found, 1.0)
                 break
     for index, cells in enumerate(columns):
         if not any(index in choice.columns for choice in days):
@@ -371,6 +387,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         likely = f"likely {unit}" if usual < _SLOW else "ms of a slow logger, or us of a fast one"
         yield TimeChoice(
             columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
+            likely=f"elapsed-{unit}" if usual < _SLOW else "",
             doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely})",
             fix=f"say what it counts, {', '.join(counted.UNITS)} ({likely}), and --start TIME",
         )  # fmt: skip

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.winds import codes, own_motion, unitcheck
+from flagdata.ingest.anemometer.winds import bow, codes, own_motion, unitcheck
 from flagdata.ingest.anemometer.winds.angles import compass_unit, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
@@ -28,7 +28,6 @@ _WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pr
 _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
 _POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
-_VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 _UNREADABLE = 0.1
 
 
@@ -116,7 +115,7 @@ def find_winds(
 
 def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
     """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
-    headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
+    headings = [bow.heading_of(layout, index) for index in range(len(layout.names))]
     headings, of_earth = along_axes(layout, headings)
     found = _Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):
@@ -169,12 +168,11 @@ def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
             found.warnings.append(
                 f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind"
             )
-        afloat = [name for name, said in zip(found.layout.names, words, strict=True) if said & _VESSEL]
-        afloat = afloat or list(filter(None, [own_motion.carried(found.layout)]))
+        afloat = own_motion.vessel(found.layout)
         relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
         if speed is not None and afloat and not relative:
             found.warnings.append(
-                f"{afloat[0]!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over "
+                f"{afloat!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over "
                 "ground or apparent wind: taken as over ground"
             )
 
@@ -344,8 +342,7 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
         ]
         if own and not speeds:
             names = ", ".join(repr(found.name(at)) for at in own)
-            fix = "to read it and the speed of its own column, say what the columns are (--columns)"
-            found.remarks.append(f"the direction {names} is left out beside the components; {fix}")
+            found.remarks.append(f"the direction {names} is left out beside the components")
         if found.of_earth:
             found.warnings.append(
                 "the headings name components of north and east: taken as towards which the wind blows"

@@ -30,6 +30,8 @@ _ALONG = re.compile(
     rf"(?P<stem>.*?)(?:(?<![a-z])(?:{_SPEED})[\s._-]*(?P<axis>{_AXIS})|(?<![a-z])(?P<first>[xyz])[\s._-]*(?:vel|velocity|speed))"
 )
 """A velocity along an axis, without its unit, lower-case."""
+_VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog", "cog"})
+"""Words of how fast a vessel moves, and where to."""
 _PAIRS = (("x", "y"), ("n", "e"))
 _OF_AIR = WIND | {"sonic", "csat", "csat3", "sat", "anemometer", "anem", "air", "gill", "metek", "young", "usa"}
 """Words of headings whose velocity is the wind's."""
@@ -81,6 +83,12 @@ def carried(layout: Layout) -> str:
         return layout.names[own[0]]
     places = _LATITUDE | _LONGITUDE
     return _turned(layout) if any(set(words_of(name)) & places for name in layout.names) else ""
+
+
+def vessel(layout: Layout) -> str:
+    """The first column that shows that the platform moves: of a vessel's speed or course, or see `carried`."""
+    named = (name for name in layout.names if set(words_of(name)) & _VESSEL)
+    return next(named, "") or carried(layout)
 
 
 def _named(layout: Layout, indices: Collection[int]) -> str:

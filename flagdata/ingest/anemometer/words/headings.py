@@ -49,6 +49,10 @@ _ABBREVIATED = {
     "aws": "apparent_wind_speed", "awa": "apparent_wind_direction", "awd": "apparent_wind_direction",
     "tws": "theoretical_wind_speed", "twa": "theoretical_wind_direction",
 }  # fmt: skip
+_VESSEL_WIND = {
+    "angle": "a", "ang": "a", "speed": "s", "spd": "s", "velocity": "s", "dir": "d", "direction": "d",
+}  # fmt: skip
+"""The last letter of what instruments of boats call AWA, AWS, AWD, TWA, TWS, TWD and GWD, by its word."""
 _NO_AIR = frozenset(
     {
         "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger",
@@ -263,6 +267,7 @@ def words_of(name: str) -> list[str]:
 
 def _words(text: str) -> list[str]:
     found: list[str] = []
+    text = re.sub(r"(?<![^\W_])([ATG]W)(?=(?:angle|speed|spd|dir))", r"\1 ", text)
     for word in _WORD.findall(text.replace("µ", "u")):
         if word[0].isdigit():
             found.append(word)
@@ -271,6 +276,18 @@ def _words(text: str) -> list[str]:
             found.extend(joined.groups() if joined is not None else parted(word.lower()))
         else:
             found.extend(part for cut in _CAMEL.findall(word) for part in parted(cut.lower()))
+    return _abbreviations(found)
+
+
+def _abbreviations(words: list[str]) -> list[str]:
+    """Words of which those of a vessel's wind in two parts are one, as "AW_angle" is AWA and "TW_Dir" is TWD."""
+    found: list[str] = []
+    for word in words:
+        letter = _VESSEL_WIND.get(word)
+        if letter is not None and found and found[-1] in ("aw", "tw", "gw"):
+            found[-1] += letter
+        else:
+            found.append(word)
     return found
 
 

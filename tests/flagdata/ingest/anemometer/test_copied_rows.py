@@ -70,3 +70,21 @@ def test_rows_of_one_stamp_with_other_values_are_still_spread(read: Read) -> Non
     found = read("time,wind speed (m/s),wind dir (deg)\n" + "".join(lines), zone="UTC")
     assert len(found.series) == 100
     assert "held-stamps" in {finding.kind for finding in found.findings}
+
+
+def test_rows_that_differ_in_a_cell_that_is_not_read_are_no_copies(read: Read) -> None:
+    seconds = [0, 1, 2, 3, 5, 5, 6, 7]
+    lines = [
+        f"2026-05-01T12:00:0{second}Z,{310 + at},{[3, 4, 5, 6, 7, 7, 8, 9][at]}.5\n"
+        for at, second in enumerate(seconds)
+    ]
+    found = read("time,count,wind speed (m/s)\n" + "".join(lines))
+    assert len(found.series) == 8
+    assert "duplicate-rows" not in {finding.kind for finding in found.findings}
+
+
+def test_rows_alike_in_all_cells_are_copies_whatever_is_read(read: Read) -> None:
+    lines = [f"2026-05-01T12:00:0{at}Z,{310 + at},{3 + at}.5\n" * (2 if at == 4 else 1) for at in range(7)]
+    found = read("time,count,wind speed (m/s)\n" + "".join(lines))
+    assert len(found.series) == 7
+    assert "duplicate-rows" in {finding.kind for finding in found.findings}

@@ -197,6 +197,21 @@ def test_the_unit_of_a_weatherlink_text_shows_in_whole_miles_per_hour(
     assert {"unit-from-resolution", "compass-points"} <= set(kinds(log))
 
 
+def test_a_weatherlink_direction_is_the_one_beside_the_speed_and_gusts_are_offered(read: Read) -> None:
+    text = weatherlink(MPH["mph"], delimiter=" ")
+    upper, rest = text.split("\n", 1)
+    places = [match.start() for match in re.finditer("Wind", upper)]
+    moved = f"{upper[: places[1]]}    {upper[places[1] + 4 :]}"  # the second "Wind" is not above Dir
+    log = read(f"{moved}\n{rest}", zone="UTC")
+    assert log.format == "davis"
+    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(22.5))
+    told = " ".join(finding.what for finding in log.findings if finding.kind == "columns-not-read")
+    (line,) = re.findall(r'--columns "([^"]*)"', told)
+    gusts = read(f"{moved}\n{rest}", zone="UTC", columns=line)
+    assert gusts.series.channels["wind_speed"].tolist() == pytest.approx([9 * 0.44704] * 6)
+    assert gusts.series.channels["wind_direction"][0] == pytest.approx(0.0)
+
+
 def test_weatherlink_speeds_that_show_no_unit_are_refused(read: Read) -> None:
     with pytest.raises(InputError, match="carries no units") as caught:
         read(weatherlink((0, 0, 0.4, 0, 0, 0)), zone="UTC")

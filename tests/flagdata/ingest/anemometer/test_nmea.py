@@ -242,3 +242,44 @@ def test_one_time_of_a_long_stream_is_not_enough(read: Callable[..., WindLog]) -
     rows = [f"WIMWV,0{at}.5,R,1{at % 9}.0,N,A" for at in range(10, 40)]
     with pytest.raises(TimeError, match="only one time"):
         read(_signed(*rows, "GPZDA,120000,01,05,2026,00,00"))
+
+
+BURST = ["GPRMC,{clock},A,,,,,0.1,,230526,,", "WIMWV,{angle},R,5.0,M,A", "WIMWV,{angle},T,4.0,M,A", "GPHDT,1,T"]
+
+
+def bursts(order: tuple[int, ...], *, skipped: int = 0, step: int = 75, count: int = 8) -> str:
+    """Sentences of a burst in this order, the bursts `step` seconds apart; the first lacks its first lines."""
+    bodies: list[str] = []
+    for at in range(count):
+        seconds = at * step
+        clock = f"11{seconds // 60:02d}{seconds % 60:02d}"
+        bodies += [BURST[index].format(clock=clock, angle=f"{at:03d}") for index in order]
+    return stream(*bodies[skipped:])
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (1, 2, 3, 0), (3, 1, 0, 2)])
+def test_a_sentence_of_a_burst_has_the_time_of_its_burst(read: Read, order: tuple[int, ...]) -> None:
+    log = read(bursts(order))
+    known = np.isfinite(log.series.channels["apparent_wind_speed"])
+    seconds = (log.series.time - log.series.time[0]) / 1e9
+    angle = np.degrees(log.series.channels["apparent_wind_direction"][known])
+    assert seconds[known].tolist() == pytest.approx((75 * angle).tolist(), abs=0.01)
+    (said,) = [finding.what for finding in log.findings if finding.kind == "time-of-burst"]
+    assert "bursts 75 s apart" in said
+    assert iso(int(log.series.time[0]))[11:19] == "11:00:00"
+    assert (log.series.flags & SampleFlag.TIME_UNSURE).all()
+
+
+def test_a_stream_that_begins_within_a_burst_is_told_by_its_end(read: Read) -> None:
+    log = read(bursts((0, 1, 2, 3), skipped=2))
+    known = np.isfinite(log.series.channels["apparent_wind_speed"])
+    assert iso(int(log.series.time[known][0]))[11:19] == "11:01:15"
+
+
+@pytest.mark.parametrize("bodies", [1, 6])
+def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolated(read: Read, bodies: int) -> None:
+    wind = ["WIMWV,010,R,5.0,M,A"] * bodies
+    step = 1 if bodies == 1 else 60
+    clocks = [f"12{at * step // 60:02d}{at * step % 60:02d}" for at in range(6)]
+    log = read(stream(*(s for clock in clocks for s in (f"GPRMC,{clock},A,,,,,0.1,,010526,,", *wind))))
+    assert "time-interpolated" in {finding.kind for finding in log.findings}

@@ -16,6 +16,7 @@ import pytest
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
 from flagdata.signals import WindLog
+from flagdata.timebase import iso
 
 Read = Callable[..., WindLog]
 Write = Callable[..., Path]
@@ -136,6 +137,16 @@ def test_asos_of_five_minutes_is_a_report_of_the_next_day_in_utc(read: Read) -> 
 def test_cumulus_realtime_names_its_unit_in_each_line(read: Read, name: str, factor: float) -> None:
     form = "{t:%d/%m/%y %H:%M:%S} 14.1 71 8.9 {s}.0 {s}.9 {d} 0.0 0.2 1013.4 SW 3 {u} C hPa mm 88.1 -0.2 30.4 211.7 2.3"
     check(read("\n".join(form.format(t=t, s=s, d=d, u=name) for t, s, d in rows()), zone="UTC"), factor)
+
+
+@pytest.mark.parametrize("sign", ["/", "-", "."])
+def test_cumulus_realtime_writes_the_day_first(read: Read, sign: str) -> None:
+    rest = "09:15:30 9.3 81 6.2 4.0 5.9 205 0.0 0.2 1009.8 SSW 2 m/s C hPa mm 40.1 -0.1 12.4 80.9 1.1\n"
+    line = f"03{sign}02{sign}26 {rest}"
+    assert iso(int(read(line, zone="UTC").series.time[0])) == "2026-02-03T09:15:30Z"
+    assert iso(int(read(line, zone="UTC", date_order="mdy").series.time[0])) == "2026-03-02T09:15:30Z"
+    shown = f"02{sign}23{sign}26 {rest}"
+    assert iso(int(read(shown, zone="UTC").series.time[0])) == "2026-02-23T09:15:30Z"
 
 
 def test_lines_of_clientraw_are_in_knots(read: Read) -> None:

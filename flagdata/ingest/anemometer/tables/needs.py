@@ -1,0 +1,58 @@
+"""What the stamps of a table do not tell and no recipe can: their start, their day, their zone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from flagdata.ingest.anemometer.instants import counted, yearless, zones
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.tables import stated_rate
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+
+
+@dataclass(frozen=True, kw_only=True)
+class Need:
+    """What a table's stamps do not tell and no recipe can: what, how to say it, and the option that says it."""
+
+    what: str
+    fix: str
+    option: Literal["zone", "date", "start"]
+
+    def without(self, options: WindOptions) -> bool:
+        """Whether the user has not said it yet."""
+        return getattr(options, self.option) is None
+
+
+def needs_of(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> tuple[Need, ...]:
+    """What the stamps of a time leave open: its start, its day, its zone."""
+    if time is None or time.counts:
+        return ()
+    if time.form is not None and counted.is_elapsed(time.form):
+        fix = "give the instant of the first: --start TIME"
+        above = stated_rate.advice(lines[: layout.preamble + max(1, layout.header)] if layout.header else ())
+        fix += f" ({above})" if above else ""
+        return (Need(what="its rows count from a start", fix=fix, option="start"),)
+    found: list[Need] = []
+    if time.form is not None and counted.is_time_of_day(time.form):
+        fix = "give the day of the first row: --date DATE"
+        found.append(Need(what="its stamps have no date", fix=fix, option="date"))
+    if time.form is not None and yearless.is_yearless(time.form):
+        texts = stamps_of(layout, time.columns)
+        read = counted.parse([text for text in texts if text.strip()], time.form)
+        what, fix = yearless.missing(time.form, int(read.ns[read.valid].flat[0]))
+        found.append(Need(what=what, fix=fix, option="date"))
+    if not time.zoned and time.zone is None:
+        statement = zones.stated(lines)
+        fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
+        fix = f"{fix}; {statement.advice()}" if statement is not None else fix
+        fix = f"{fix}; {time.zone_advice}" if time.zone_advice else fix
+        found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
+    return tuple(found)
+
+
+def stamps_of(layout: Layout, columns: Sequence[int]) -> list[str]:
+    """The stamps of the rows, as the cells of their columns with a blank between."""
+    return [" ".join(row[index].strip() for index in columns) for row in layout.rows]

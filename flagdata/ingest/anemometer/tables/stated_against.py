@@ -1,0 +1,26 @@
+"""What a table says against its columns as its user states them: it is read as stated, and told."""
+
+from __future__ import annotations
+
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds import bow, own_motion
+from flagdata.ingest.anemometer.winds.instruments import Wind
+
+
+def warnings(layout: Layout, wind: Wind) -> tuple[str, ...]:
+    """A warning where the platform moves below a wind over ground, and where its direction is one to the bow."""
+    found: list[str] = []
+    speed, direction = wind.columns.get("wind_speed"), wind.columns.get("wind_direction")
+    stated = {layout.names[column.index] for column in wind.columns.values()}
+    vessel = own_motion.vessel(layout)
+    if speed is not None and vessel and vessel not in stated:
+        found.append(
+            f"{vessel!r} shows that the platform moves: {wind.label!r} is taken as wind over ground, as you said; what "
+            "a moving platform measures is apparent_wind_speed and apparent_wind_direction"
+        )
+    if direction is not None and bow.to_bow(layout, direction.index):
+        found.append(
+            f"column {layout.names[direction.index]!r} is an angle to the bow by its heading: taken as a direction "
+            "from north, as you said; an angle to the bow is apparent_wind_direction or theoretical_wind_direction"
+        )
+    return tuple(found)
