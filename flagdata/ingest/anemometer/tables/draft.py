@@ -37,10 +37,10 @@ from flagdata.ingest.anemometer.winds.instruments import (
     Column,
     Wind,
     find_winds,
-    mixed_units,
     named_wind,
 )
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts
+from flagdata.ingest.anemometer.winds.row_units import mixed_units
 from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
 from flagdata.ingest.anemometer.words.headings import interest, understand
 
@@ -162,6 +162,7 @@ def draft(
     labels = tuple(one.label for one in winds)
     of_all = mixed is not None and wind in parts
     chosen = next((one for one in winds if one.label == wind or (of_all and one.label.endswith(f":{wind}"))), None)
+    chosen = chosen if chosen is None else replace(chosen, sure=True)
     doubts = list(_doubts(lines, layout, time, winds, chosen))
     doubts += _below_zero(layout, time, winds) if columns is None and wind is None else []
     if wind is not None and chosen is None and mixed is not None and winds:

@@ -19,7 +19,7 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import own_motion
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Column, Wind
+from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, WEATHER, Column, Wind
 from flagdata.ingest.anemometer.words import headings
 from flagdata.ingest.anemometer.words.headings import fits, understand
 from flagdata.schema import CHANNELS
@@ -215,6 +215,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[at] = "time[?]"
         elif at in own:
             found |= {} if winds else {at: "?"}
+        elif winds and heading.channel in WEATHER:
+            continue  # which of the columns is the weather of this wind was told already
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel

@@ -41,6 +41,8 @@ _QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:
 _BEHIND = frozenset({"m/s", "rad", "K", "Pa", "1"})
 """SI units of quantities that tables write with their unit in every cell ("4.3 mph", "210°")."""
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
+_LISTS = re.compile(r"^(?:fields|columns|column[ _]names|names|units|column[ _]units)\s*[:=]\s*", re.IGNORECASE)
+"""What stands before the names or units in a line of comment that lists them ("# fields = timestamp,VW")."""
 _MISSING = frozenset({*MISSING, "nan.", "inf", "-inf"})
 _UNITS_OF_OTHERS = frozenset(
     {
@@ -444,12 +446,14 @@ def _heading(
 
 def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] | None, bool]:
     """Cells of a line of names that fit `width`, and whether a recipe would cut it like this."""
-    plain = _trimmed(cut(line, delimiter), width)
+    plain, marked = _trimmed(cut(line, delimiter), width), bool(_MARK.match(line))
     if len(plain) == full > width:
-        return plain[:width], not _MARK.match(line)
-    if len(plain) == width and not _MARK.match(line):
+        first = _LISTS.sub("", _MARK.sub("", plain[0])) if marked else plain[0]
+        return [first, *plain[1:width]], not marked
+    if len(plain) == width and not marked:
         return plain, True
     bare = _MARK.sub("", line.strip())
+    bare = _LISTS.sub("", bare) if marked else bare
     ways = [cut(bare, delimiter), re.split(r"\t+|\s{2,}", bare), *(cut(bare, other) for other in (",", ";", "\t", " "))]
     # A heading that is divided as the rows are is not divided by anything else, such as the blanks in its names.
     alike = delimiter != " " and len(cut(bare, delimiter)) > (2 if delimiter == "," else 1)
