@@ -21,11 +21,11 @@ from flagdata.ingest.anemometer.tables import (
     quality_columns,
     stated_columns,
     stated_rate,
+    stated_unit,
     unread,
     unread_winds,
 )
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
-from flagdata.ingest.anemometer.tables.stated_unit import stated_unit
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, lay_out
 from flagdata.ingest.anemometer.times import bare_dates
@@ -43,9 +43,8 @@ from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts
 from flagdata.ingest.anemometer.winds.row_units import mixed_units
 from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
 from flagdata.ingest.anemometer.words.headings import interest, understand
+from flagdata.units import canonical
 
-_COMMENT = ("#", ";", "%", "!")
-"""How lines begin that are no rows."""
 _BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
 """Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
@@ -132,7 +131,7 @@ def draft(
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
-    named = False
+    named, unit = False, None if unit is None else canonical(unit)
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
         time, winds, remarks, warnings = known.time, (known.wind,), (), ()
@@ -177,6 +176,8 @@ def draft(
     if layout.short:
         shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
         warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
+    if unit is not None and columns is None and not any("as you said" in text for text in warnings):
+        warnings = (*warnings, *stated_unit.contradiction(lines, layout.preamble, unit))
     above = rows_above(lines, layout)
     warnings = (*warnings, above) if above else warnings
     if time is not None and time.unnamed:
@@ -340,9 +341,7 @@ def _directions(layout: Layout) -> list[str]:
 def _unit_doubt(
     lines: Sequence[str], layout: Layout, time: TimeChoice | None, wind: Wind, missing: Sequence[str]
 ) -> Doubt:
-    above = stated_unit(
-        [line if at < layout.preamble or line.lstrip()[:1] in _COMMENT else "" for at, line in enumerate(lines)]
-    )
+    above = stated_unit.above(lines, layout.preamble)
     if above is not None:
         name, number, words = above
         heading = layout.names[wind.columns[missing[0]].index]
@@ -361,7 +360,8 @@ def _unit_doubt(
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]
     if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
-        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), --unit km/h or another"
+        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), "
+        fix += f"--unit {evidence.unit} or another"
         return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
     likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
     name = layout.names[column] or f"number {column + 1}"
