@@ -53,6 +53,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         and ("wind_speed" if _alone(layout, at) else understand(name, layout.units[at]).channel)
         in {entry.split("[")[0] for entry in speeds}
     ]  # fmt: skip
+    serial = _serial(layout) if time is None else None
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
     steady = _steady(layout) if time is None and "time[?]" in known.values() else None
@@ -60,7 +61,15 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         units = ", ".join(counted.UNITS[:-1]) + f" or {counted.UNITS[-1]}"
         counts = f"; where column {steady + 1} is the time since a start, write {units} in time[?] and add --start TIME"
         further = counts + further
+    if serial is not None and f"time[{serial}]" in known.values():
+        since = "1899-12-30, as Excel counts them" if serial == "excel-days" else "year 0, as MATLAB counts them"
+        further = f"; column 1 rises as days since {since}: write another format in its place where it is none{further}"
     return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
+
+
+def _serial(layout: Layout) -> str | None:
+    """The format of serial days that the first column is likely in, where it has no heading."""
+    return None if layout.names[0] else counted.serial_days(numbers(layout.column(0), decimal=layout.decimal).value)
 
 
 def _steady(layout: Layout) -> int | None:
@@ -206,6 +215,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     stamped = _stamped(layout)
     if steady is not None:
         found[steady] = "time[?]"
+    if not timed and (serial := _serial(layout)) is not None:
+        found[0] = f"time[{serial}]"
     for at, name in enumerate(layout.names):
         if at in found:
             continue
