@@ -27,7 +27,6 @@ _DIRECTION_OF = {name: name.replace("speed", "direction") for name in SPEEDS}
 WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
 _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
-_POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
 _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog"})
 _UNREADABLE = 0.1
 
@@ -238,7 +237,7 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
     for index in found.of(*SPEEDS):
         groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, []).append(index)
     named = [i for i in found.of(*SPEEDS) if found.headings[i].sure]
-    moving = {word for name in found.layout.names for word in words_of(name)} & _POSITIONS
+    moving = own_motion.may_have_speed(found.layout)
     winds: list[Wind] = []
     for by_channel in groups.values():
         if named and not any(found.headings[i].sure for indices in by_channel.values() for i in indices):
