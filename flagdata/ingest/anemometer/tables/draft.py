@@ -42,6 +42,7 @@ from flagdata.ingest.anemometer.winds.instruments import (
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts
 from flagdata.ingest.anemometer.winds.row_units import mixed_units
 from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
+from flagdata.ingest.anemometer.words import ghcn
 from flagdata.ingest.anemometer.words.headings import interest, understand
 from flagdata.units import canonical
 
@@ -357,6 +358,8 @@ def _unit_doubt(
         what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {cumulated.WHAT}"
         fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"
         return Doubt(what=what, fix=fix)
+    if layout.names[column] in ghcn.ELEMENTS:
+        return Doubt(what=f"the unit of {layout.names[column]!r} is not stated", fix=f"give it: {ghcn.UNITS}")
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]
     if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):

@@ -16,11 +16,11 @@ from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARD
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds import beside, own_motion
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
 from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, WEATHER, Column, Wind
-from flagdata.ingest.anemometer.words import headings
+from flagdata.ingest.anemometer.words import headings, series
 from flagdata.ingest.anemometer.words.headings import fits, understand
 from flagdata.schema import CHANNELS
 
@@ -136,6 +136,7 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
 def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> str:
     """The option that reads another column as the wind's speed, by the time and the direction of the one understood.
 
+    A direction that is called after that column goes before the other.
     A direction whose unit is in doubt is given in the one that its numbers speak for; the heading's stands beside.
     """
     known = wind.columns.get("wind_speed")
@@ -146,6 +147,10 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int) -> st
     }  # fmt: skip
     entries = _understood(layout, time, (replace(wind, columns=others),)) | {speed: f"wind_speed[{stated_unit or '?'}]"}
     direction = others.get("wind_direction")
+    own = beside.direction_of(layout, speed, apart=(*time.columns, *([direction.index] if direction else [])))
+    if own is not None:
+        entries = {at: entry for at, entry in entries.items() if "wind_direction" not in entry}
+        return f'--columns "{",".join(_numbered(entries | {own: f"wind_direction[{unit_of(layout, own)}]"}))}"'
     ways = _ways(layout, direction) if direction is not None else ()
     if direction is None or not ways:
         return f'--columns "{",".join(_numbered(entries))}"'
@@ -212,7 +217,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[column.index] = "wind_direction[?]"
     timed = time is not None
     steady, own = None if timed else _steady(layout), own_motion.columns(layout)
-    stamped = _stamped(layout)
+    stamped, apart = _stamped(layout), series.members(layout.names, layout.units)
     if steady is not None:
         found[steady] = "time[?]"
     if not timed and (serial := _serial(layout)) is not None:
@@ -222,6 +227,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = understand(name, layout.units[at])
+        if at in apart or (not kinds and "wind" not in heading.channel):
+            continue  # the name of a station may read as that of a quantity; an empty column is none
         if not timed and at == stamped and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
         elif at in own:
