@@ -46,7 +46,8 @@ def direction_of(layout: Layout, speed: int, *, apart: Collection[int] = ()) -> 
 
 def as_direction(heading: Heading, *, of: Heading) -> Heading:
     """The heading of a column as that of the direction of the speed below another heading."""
-    return replace(heading, channel="wind_direction", quantity="wind_direction", label=of.label, height=of.height)
+    channel = "wind_direction"
+    return replace(heading, channel=channel, quantity=channel, spread=False, label=of.label, height=of.height)
 
 
 def _plain(name: str) -> str:

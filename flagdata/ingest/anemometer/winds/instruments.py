@@ -124,7 +124,7 @@ def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) 
     headings, of_earth = along_axes(layout, headings)
     for index in [at for at, heading in enumerate(headings) if at == speed or heading.channel == "wind_speed"]:
         own = beside.direction_of(layout, index, apart=time)
-        if own is not None and not headings[own].quantity:
+        if own is not None and (not headings[own].quantity or index == speed):
             headings[own] = beside.as_direction(headings[own], of=headings[index])
     found = _Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):

@@ -25,6 +25,8 @@ CHANCE = 1e-4
 """Probability by chance below which a grid is evidence."""
 WINDY = 12.0
 """Median of a day or more [m/s] above which a unit is doubted."""
+STORMY = 30.0
+"""Median [m/s] above which a unit that is guessed is none either."""
 FASTEST = 60.0
 """Speed [m/s] above which a value, other than a gust, is doubted; hurricanes of category 4 begin at 58 m/s."""
 IMPOSSIBLE = 75.0
@@ -100,7 +102,7 @@ def likely(values: NDArray[np.float64]) -> Evidence | None:
         return None
     median, high = float(np.median(known)), float(np.quantile(known, 0.99))
     if high > FASTEST or median > WINDY:
-        slower = median * unit("km/h").scale > 2 * WINDY
+        slower = median * unit("km/h").scale > STORMY
         return Evidence(unit="km/day" if slower else "km/h", reason=_too_fast(median, high, "m/s"))
     return None
 
@@ -131,7 +133,7 @@ def contradiction(
     others += ["km/day"] if high > FASTEST else []
     if not others:
         return None
-    ordinary = (name for name in others if median * unit(name).scale / scale <= 2 * WINDY)
+    ordinary = (name for name in others if median * unit(name).scale / scale <= STORMY)
     other = next(ordinary, others[0])
     reason = _too_fast(median / scale, high / scale, stated)
     if tenths:
