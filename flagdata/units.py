@@ -52,6 +52,7 @@ UNITS: dict[str, Unit] = _Table(
     {
         "m/s": Unit(si="m/s", scale=1.0),
         "km/h": Unit(si="m/s", scale=1 / 3.6),
+        "km/day": Unit(si="m/s", scale=1 / 86.4),
         "kn": Unit(si="m/s", scale=1852 / 3600),
         "mph": Unit(si="m/s", scale=0.44704),
         "dm/s": Unit(si="m/s", scale=0.1),
@@ -94,6 +95,9 @@ SPELLINGS: dict[str, str] = {
     "m+1s-1": "m/s", "meterspersecond": "m/s",
     "kmh": "km/h", "kph": "km/h", "km/hr": "km/h", "kmph": "km/h", "km/hour": "km/h", "kmh-1": "km/h", "km.h-1": "km/h",
     "kilometers/hour": "km/h", "kilometres/hour": "km/h",
+    "km/d": "km/day", "kmd-1": "km/day", "km.d-1": "km/day", "kmday-1": "km/day", "km.day-1": "km/day",
+    "kmd": "km/day", "kilometers/day": "km/day", "kilometres/day": "km/day", "km/24h": "km/day", "km/tag": "km/day",
+    "km/jour": "km/day", "km/día": "km/day", "km/dia": "km/day",
     "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn", "nauticalmiles/hour": "kn",
     "mi/h": "mph", "mi/hr": "mph", "miles/hour": "mph", "mile/hour": "mph", "milesperhour": "mph",
     "fps": "ft/s", "fpm": "ft/min", "ft/sec": "ft/s", "feet/second": "ft/s", "feet/minute": "ft/min",

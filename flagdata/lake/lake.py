@@ -155,18 +155,21 @@ class Lake:
         return table.select(list(columns))
 
     def artifact(self, artifact: str, *, at: str | None = None) -> Artifact:
-        """The artifact of that id, or of an id that begins so if only one does.
+        """The artifact of that id, of an id that begins so if only one does, or else of that name if only one has it.
 
         Raises:
             NotFoundError: none, or several.
         """
         table = self.table(self.view(at))
-        matches = [
-            row for row, known in enumerate(table["artifact"].to_pylist()) if artifact and known.startswith(artifact)
-        ]
+        ids, names = table["artifact"].to_pylist(), table["name"].to_pylist()
+        matches = [row for row, known in enumerate(ids) if artifact and known.startswith(artifact)]
+        how = "begin with"
+        if not matches:
+            matches, how = [row for row, name in enumerate(names) if artifact and name == artifact], "are named"
         if len(matches) != 1:
-            what = f"{len(matches)} artifacts begin with {artifact!r}" if matches else f"no artifact {artifact!r}"
-            raise NotFoundError(what, where=str(self.path), fix="flagdata ls lists them")
+            what = f"{len(matches)} artifacts {how} {artifact!r}" if matches else f"no artifact {artifact!r}"
+            fix = "give the id of one: flagdata ls lists them" if matches else "flagdata ls lists them"
+            raise NotFoundError(what, where=str(self.path), fix=fix)
         return Artifact.from_row(table.slice(matches[0], 1).to_pylist()[0])
 
     def object_path(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it

@@ -122,6 +122,9 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     what = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
     if not others:
         fix = "check the sensor and the recipe's columns; if calm air reads below zero, give --zero-offset"
+        doubt = next((finding for finding in reading.findings if finding.kind == "unit-doubtful"), None)
+        if doubt is not None:
+            what, fix = f"{what}; {doubt.what}", doubt.fix or fix
         raise NothingMeasuredError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
     text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
     return (

@@ -30,6 +30,8 @@ from flagdata.timebase import NANOSECONDS, iso
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}
 """Number of the day 1970-01-01."""
+WORDS = {"excel": "excel-days", "excel-day": "excel-days", "matlab": "datenum"}
+"""Other words for formats of this module."""
 _ELAPSED = {
     "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": 60 * NANOSECONDS,
     "elapsed-h": 3600 * NANOSECONDS, "elapsed-d": DAY,
@@ -41,6 +43,21 @@ UNITS = tuple(_ELAPSED)
 """Formats of counts since a start."""
 FORMS = (*_EPOCH, *_SERIAL, *_ELAPSED)
 """Formats of this module that are names."""
+
+
+def serial_days(value: NDArray[np.float64]) -> str | None:
+    """The format of serial days that numbers are likely in: they rise by fractions of a day; `None` for no such.
+
+    Args:
+        value: (n,) of the rows.
+    """
+    steps = np.diff(value)
+    if len(steps) < 2 or not np.all(np.isfinite(steps)) or bool((steps < 0).any()) or not np.any(value % 1 != 0):
+        return None
+    if float(np.median(steps)) > 0.5:  # seconds of the day rise by one
+        return None
+    bounds = ((form, day + 7_305, day + 47_482) for form, day in _SERIAL.items())
+    return next((form for form, low, high in bounds if bool(np.all((value > low) & (value < high)))), None)
 
 
 def is_elapsed(form: str) -> bool:
@@ -107,7 +124,11 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
         # Days have no round seconds: noise of the last digits below a millisecond is rounding.
         near = np.abs(ns - np.round(ns / 1e6) * 1e6) < 100_000
         ns = np.where(near, np.round(ns / 1e6).astype(np.int64) * 1_000_000, ns)
-        return Stamps(ns=ns, utc=none, valid=valid, distant=none.copy(), step=max(1_000, round(DAY / 10**digits)))
+        step = max(1_000, round(DAY / 10**digits))
+        minute = np.round(ns / (60 * NANOSECONDS)).astype(np.int64) * 60 * NANOSECONDS
+        if step > 1_000_000 and bool(np.all(np.abs(ns - minute) <= step)):
+            ns = minute  # minutes and hours are no decimal fractions of a day
+        return Stamps(ns=ns, utc=none, valid=valid, distant=none.copy(), step=step)
     scale = _ELAPSED[form]
     valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)  # ten years
     ns = np.round(np.where(valid, value, 0.0) * scale).astype(np.int64)

@@ -156,7 +156,7 @@ def pattern(form: str) -> str:
 
 def _dated(used: frozenset[str]) -> bool:
     """Whether directives make a date: a day of a month or of the year, a count, or a month that stands by itself."""
-    if "s" in used or ("Y" in used and used & {"j", "J", "E", "D"}):
+    if "s" in used or ("Y" in used and used & {"j", "J", "E", "D"}) or {"y", "j"} <= used:
         return True
     month = bool(used & {"Y", "y"} and used & {"m", "b"})
     return month and ("d" in used or len(used) == 2)

@@ -53,6 +53,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.bracketed",
     "flagdata.ingest.anemometer.restating.before_cells",
     "flagdata.ingest.anemometer.restating.listed_fields",
+    "flagdata.ingest.anemometer.restating.counted_fields",
     "flagdata.ingest.anemometer.restating.headings_anew",
 )
 LOOKED_AT = 60

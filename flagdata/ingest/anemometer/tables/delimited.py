@@ -182,12 +182,20 @@ def _not_read(remarks: Sequence[str]) -> tuple[Finding, ...]:
 
 def _read(source: TextFile, recipe: Recipe, options: WindOptions, where: str) -> Reading:
     rows = RowReader(source, recipe.file)
-    given = Given(start=options.start, date=options.date, clock=options.clock)
+    given = Given(start=options.start, date=options.date, clock=options.clock, heading=_of_wind(recipe, rows))
     columns = platform.position_columns(rows.header or ())
     table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns or (), given=given)
     reading = with_horizontal(table.reading, options.azimuth, where=where)
     positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns or (), strict=False)}
     return platform.settle(reading, options.platform, positions=positions, where=where)
+
+
+def _of_wind(recipe: Recipe, rows: RowReader) -> str:
+    """The heading of the first column of wind that a recipe reads; the name of its sensor where no line names it."""
+    column = next((layout.column for name, layout in recipe.channels.items() if name in WIND_CHANNELS), "")
+    if isinstance(column, str):
+        return column
+    return rows.header[column - 1] if rows.header and column <= len(rows.header) else recipe.sensor.name
 
 
 def _states_its_unit(recipe: Recipe) -> bool:

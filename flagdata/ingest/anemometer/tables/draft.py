@@ -23,12 +23,12 @@ from flagdata.ingest.anemometer.tables import (
     stated_against,
     stated_columns,
     stated_rate,
+    stated_unit,
     unread,
     unread_winds,
 )
 from flagdata.ingest.anemometer.tables.needs import Need, needs_of, stamps_of
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
-from flagdata.ingest.anemometer.tables.stated_unit import stated_unit
 from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, lay_out
@@ -41,15 +41,15 @@ from flagdata.ingest.anemometer.winds.instruments import (
     Column,
     Wind,
     find_winds,
-    mixed_units,
     named_wind,
 )
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts
+from flagdata.ingest.anemometer.winds.row_units import mixed_units
 from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
+from flagdata.ingest.anemometer.words import ghcn
 from flagdata.ingest.anemometer.words.headings import interest, understand
+from flagdata.units import canonical
 
-_COMMENT = ("#", ";", "%", "!")
-"""How lines begin that are no rows."""
 _BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
 """Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
@@ -124,6 +124,7 @@ def draft(
     if layout is None:
         return None
     layout, named = with_letters(layout), False
+    unit = None if unit is None else canonical(unit)
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
         time, winds, remarks = known.time, (known.wind,), ()
@@ -155,6 +156,7 @@ def draft(
     labels = tuple(one.label for one in winds)
     of_all = mixed is not None and wind in parts
     chosen = next((one for one in winds if one.label == wind or (of_all and one.label.endswith(f":{wind}"))), None)
+    chosen = chosen if chosen is None else replace(chosen, sure=True)
     doubts = list(_doubts(lines, layout, time, winds, chosen))
     doubts += _below_zero(layout, time, winds) if columns is None and wind is None else []
     if wind is not None and chosen is None and mixed is not None and winds:
@@ -169,6 +171,8 @@ def draft(
     if layout.short:
         shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
         warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
+    if unit is not None and columns is None and not any("as you said" in text for text in warnings):
+        warnings = (*warnings, *stated_unit.contradiction(lines, layout.preamble, unit))
     above = rows_above(lines, layout)
     warnings = (*warnings, above) if above else warnings
     if time is not None and time.unnamed:
@@ -302,9 +306,7 @@ def _directions(layout: Layout) -> list[str]:
 def _unit_doubt(
     lines: Sequence[str], layout: Layout, time: TimeChoice | None, wind: Wind, missing: Sequence[str]
 ) -> Doubt:
-    above = stated_unit(
-        [line if at < layout.preamble or line.lstrip()[:1] in _COMMENT else "" for at, line in enumerate(lines)]
-    )
+    above = stated_unit.above(lines, layout.preamble)
     if above is not None:
         name, number, words = above
         heading = layout.names[wind.columns[missing[0]].index]
@@ -320,10 +322,13 @@ def _unit_doubt(
         what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {cumulated.WHAT}"
         fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"
         return Doubt(what=what, fix=fix)
+    if layout.names[column] in ghcn.ELEMENTS:
+        return Doubt(what=f"the unit of {layout.names[column]!r} is not stated", fix=f"give it: {ghcn.UNITS}")
     evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]
     if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
-        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), --unit km/h or another"
+        fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), "
+        fix += f"--unit {evidence.unit} or another"
         return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
     likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
     name = layout.names[column] or f"number {column + 1}"

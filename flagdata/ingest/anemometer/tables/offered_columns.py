@@ -16,11 +16,11 @@ from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARD
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.winds import bow, own_motion
+from flagdata.ingest.anemometer.winds import beside, bow, own_motion
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Column, Wind
-from flagdata.ingest.anemometer.words import headings
+from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, WEATHER, Column, Wind
+from flagdata.ingest.anemometer.words import headings, series
 from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import fits, understand
 from flagdata.schema import CHANNELS
@@ -56,6 +56,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         and ("wind_speed" if _alone(layout, at) else understand(name, layout.units[at]).channel)
         in {entry.split("[")[0] for entry in speeds}
     ]  # fmt: skip
+    serial = _serial(layout) if time is None else None
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
     if time is None and f"time[{_SECONDS}]" in known.values():
@@ -67,7 +68,15 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         units = ", ".join(counted.UNITS[:-1]) + f" or {counted.UNITS[-1]}"
         counts = f"; where column {steady + 1} is the time since a start, write {units} in time[?] and add --start TIME"
         further = counts + further
+    if serial is not None and f"time[{serial}]" in known.values():
+        since = "1899-12-30, as Excel counts them" if serial == "excel-days" else "year 0, as MATLAB counts them"
+        further = f"; column 1 rises as days since {since}: write another format in its place where it is none{further}"
     return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
+
+
+def _serial(layout: Layout) -> str | None:
+    """The format of serial days that the first column is likely in, where it has no heading."""
+    return None if layout.names[0] else counted.serial_days(numbers(layout.column(0), decimal=layout.decimal).value)
 
 
 def _steady(layout: Layout) -> int | None:
@@ -144,6 +153,7 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
 def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None) -> str:
     """The option that reads another column as the wind's speed, by the time and the direction of the one understood.
 
+    A direction that is called after that column goes before the other.
     A direction whose unit is in doubt is given in the one that its numbers speak for; the heading's stands beside.
 
     Args:
@@ -160,6 +170,11 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None
     entries = _understood(layout, time, (replace(wind, columns=others),)) | ({} if speed is None else {speed: entry})
     open_one = [f"?={entry}"] if speed is None else []
     direction = others.get("wind_direction")
+    apart = (*time.columns, *([direction.index] if direction else []))
+    own = None if speed is None else beside.direction_of(layout, speed, apart=apart)
+    if own is not None:
+        entries = {at: entry for at, entry in entries.items() if "wind_direction" not in entry}
+        return f'--columns "{",".join(_numbered(entries | {own: f"wind_direction[{unit_of(layout, own)}]"}))}"'
     ways = _ways(layout, direction) if direction is not None else ()
     if direction is None or not ways:
         return f'--columns "{",".join([*_numbered(entries), *open_one])}"'
@@ -228,8 +243,10 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[column.index] = "wind_direction[?]"
     timed = time is not None
     steady, own = None if timed else _steady(layout), own_motion.columns(layout)
-    stamped = _stamped(layout)
-    if steady is not None:
+    stamped, apart = _stamped(layout), series.members(layout.names, layout.units)
+    if not timed and (serial := _serial(layout)) is not None:
+        found[0], timed = f"time[{serial}]", True
+    elif steady is not None:
         found[steady] = "time[?]"
     elif not timed and _grows(layout):
         found[0], timed = f"time[{_SECONDS}]", True
@@ -238,10 +255,14 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = bow.heading_of(layout, at)
+        if at in apart or (not kinds and "wind" not in heading.channel):
+            continue  # the name of a station may read as that of a quantity; an empty column is none
         if not timed and at == stamped and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
         elif at in own:
             found |= {} if winds else {at: "?"}
+        elif winds and heading.channel in WEATHER:
+            continue  # which of the columns is the weather of this wind was told already
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel

@@ -23,6 +23,7 @@ from flagdata.ingest.anemometer.instants.midnight import parse_as
 from flagdata.ingest.anemometer.instants.stamps import EPOCH, Stamps, is_date_alone
 from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.instants.wall import offset_at, to_utc, zone_advice
+from flagdata.ingest.anemometer.tables import daily
 from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.ingest.anemometer.text.growing import Growing
 from flagdata.signals import Instants
@@ -39,17 +40,19 @@ Order: TypeAlias = slice | NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """What the user says about time beside the zone.
+    """What the user says about time beside the zone, and the heading of the wind.
 
     Attributes:
         start: the first row's instant [UTC ns].
         date: its day.
         clock: whose stamps are right where they run back.
+        heading: of the wind, which may give the time of day of rows that are stamped by their date alone.
     """
 
     start: int | None = None
     date: dt.date | None = None
     clock: ClockChoice | None = None
+    heading: str = ""
 
 
 @dataclass
@@ -156,13 +159,8 @@ class RowClock:
         elif given.start is not None or given.date is not None:
             option = "--start" if given.start is not None else "--date"
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
-        if is_date_alone(self.form):
-            what = "the stamps are dates without a time of day: each row stands for a whole day, put at its midnight"
-            fix = "a mean of a day is no wind at a flag: export the log with the times of its readings"
-            found = (
-                *found,
-                Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),
-            )
+        wall, whole_days = daily.placed(wall, dates=is_date_alone(self.form), heading=given.heading)
+        found = (*found, *whole_days)
         if self.bare_dates:
             what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
             bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)

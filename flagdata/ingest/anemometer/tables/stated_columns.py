@@ -100,7 +100,9 @@ def parse(text: str) -> tuple[Entry, ...]:
             known = [*FREE, *PARTS, SITE, TOWARDS, *_NAMES]
             raise UnknownNameError.of("name of a column", match["name"], known, where=_WHERE)
         column = match["column"].strip() if by_name else number - 1
-        entries.append(Entry(column=column, name=match["name"], detail=(match["detail"] or "").strip()))
+        detail = (match["detail"] or "").strip()
+        detail = counted.WORDS.get(detail.lower(), detail) if match["name"] in FREE else detail
+        entries.append(Entry(column=column, name=match["name"], detail=detail))
     names = [entry.name for entry in entries if entry.name not in FREE]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

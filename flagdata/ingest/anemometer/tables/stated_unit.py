@@ -13,11 +13,34 @@ _STATED = re.compile(
 )
 """How lines above a heading state a unit."""
 _UNIT_WORD = re.compile(
-    r"(?<![\w/])(?:km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
+    r"(?<![\w/])(?:km/d(?:ay)?|km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
     r"(?:kilomet|met)(?:er|re)s? per (?:hour|second)|miles per hour)(?![\w/])",
     re.IGNORECASE,
 )
 """Units of speed as a title names them."""
+
+
+_COMMENT = ("#", ";", "%", "!")
+"""How lines begin that are no rows."""
+
+
+def above(lines: Sequence[str], preamble: int) -> tuple[str, int, str] | None:
+    """The unit that lines above a table, and comments in it, state; see `stated_unit`.
+
+    Args:
+        preamble: lines above the one that names the columns.
+    """
+    return stated_unit(
+        [line if at < preamble or line.lstrip()[:1] in _COMMENT else "" for at, line in enumerate(lines)]
+    )
+
+
+def contradiction(lines: Sequence[str], preamble: int, told: str) -> tuple[str, ...]:
+    """A warning where lines above a table state another unit than the user says; none where they do not."""
+    stated = above(lines, preamble)
+    if stated is None or stated[0] == told:
+        return ()
+    return (f"line {stated[1]} says {stated[2]!r}; taken as {told}, as you said",)
 
 
 def stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:

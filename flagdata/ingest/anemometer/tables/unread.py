@@ -102,7 +102,21 @@ def directions(
             continue
         line = offered_columns.read_also(layout, time, wind, index)
         found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
-    return tuple(found) or _unnamed_direction(layout, time, wind, taken)
+    return tuple(found) or _of_another(layout, time, wind, winds) or _unnamed_direction(layout, time, wind, taken)
+
+
+def _of_another(layout: Layout, time: TimeChoice, wind: Wind, winds: Sequence[Wind]) -> tuple[str, ...]:
+    """A remark with the line that reads the one direction of the table, where it is that of another speed."""
+    speed = wind.columns.get("wind_speed")
+    known = {column.index: (one.label, column) for one in winds if (column := one.columns.get("wind_direction"))}
+    if speed is None or len(known) != 1:
+        return ()
+    label, column = next(iter(known.values()))
+    unit = column.unit or "deg"
+    channel = stated_columns.TOWARDS if column.towards else "wind_direction"
+    line = offered_columns.read_also(layout, time, wind, column.index, unit_name=unit, channel=channel)
+    what = f"the direction {layout.names[column.index]!r} is that of {label!r}"
+    return (f'{what}; to read it beside this speed: --columns "{line}"',)
 
 
 def _unnamed_direction(layout: Layout, time: TimeChoice, wind: Wind, taken: Collection[int]) -> tuple[str, ...]:

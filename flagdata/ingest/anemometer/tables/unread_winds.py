@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from flagdata.ingest.anemometer.tables import offered_columns
 from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds import beside, own_motion
 from flagdata.ingest.anemometer.winds.instruments import Wind
 from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
@@ -72,7 +72,11 @@ def remark(
         return (what,)
     option = offered_columns.read_instead(layout, time, wind, speed)
     read = f"to read {layout.names[speed]!r} as a wind of its own, ingest the file once more with"
-    return (f"{what}; {read} {option}",)
+    others = [at for at in speeds if at != speed and beside.direction_of(layout, at, apart=time.columns) is not None]
+    further = (
+        f"{layout.names[at]!r} likewise with {offered_columns.read_instead(layout, time, wind, at)}" for at in others
+    )
+    return ("; ".join([what, f"{read} {option}", *further]),)
 
 
 def _speaks_of_wind(layout: Layout, index: int) -> bool:

@@ -41,6 +41,8 @@ _QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:
 _BEHIND = frozenset({"m/s", "rad", "K", "Pa", "1"})
 """SI units of quantities that tables write with their unit in every cell ("4.3 mph", "210°")."""
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
+_NAMING = re.compile(r"^\s*@\s*")
+"""How the line of names begins in tables of crop models (DSSAT), which are divided by blanks."""
 _MISSING = frozenset({*MISSING, "nan.", "inf", "-inf"})
 _UNITS_OF_OTHERS = frozenset(
     {
@@ -146,6 +148,7 @@ def _lay_out(
             at for at in range(len(table))
             if fits[at] and _mostly(fits[at : at + 20])
             and not _names_follow(table[at + 1 : at + 3], fits[at + 1 : at + 3], interest)
+            and not (delimiter == " " and any(_NAMING.match(line) for _, line in filled[at : at + _HEADING_LINES]))
         ),
         None,
     )  # fmt: skip
@@ -436,13 +439,17 @@ def _heading(
         return nothing, nothing, None, False, tuple(strange)
     # A line that says what units there are ("Units: wind (m/s), dir (deg)") is none of names, however well it fits.
     named = [item for item in worded if not _SAYS_UNITS.match(lines[item[1]])] or worded
-    _, at, names, plain = max(named, key=lambda item: (item[0], item[3], -item[1]))
+    said = [item for item in named if delimiter == " " and _NAMING.match(lines[item[1]])]
+    _, at, names, plain = said[0] if said else max(named, key=lambda item: (item[0], item[3], -item[1]))
     units_at, units = next(
         ((number, cells) for number, cells, _ in candidates if number > at and _are_units(cells)), (at, None)
     )
     if units is not None and names[0] and len(cut(_MARK.sub("", lines[units_at].strip()), delimiter)) == width - 1:
         odd = f"line {units_at + 1} has {width - 1} units for {width} columns: taken as those of all but the first"
         return tuple(names), tuple(units), at, plain and len(lines[at]) > 0, (odd,)
+    if units is None:
+        commented = (own for number, own, _ in candidates if number == at - 1 and _MARK.match(lines[number]))
+        units = next((own for own in commented if _are_units(own)), None)
     if units is None:
         units = next((own for number, cells, _ in candidates if number != at and (own := _in_brackets(cells))), nothing)
     # The heading of an index column is empty when a table was written by pandas: still a name, only not a useful one.
@@ -452,12 +459,16 @@ def _heading(
 
 def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] | None, bool]:
     """Cells of a line of names that fit `width`, and whether a recipe would cut it like this."""
-    plain = _trimmed(cut(line, delimiter), width)
+    if delimiter == " " and _NAMING.match(line):
+        return (cells if len(cells := cut(_NAMING.sub("", line), delimiter)) == width else None), False
+    plain, marked = _trimmed(cut(line, delimiter), width), bool(_MARK.match(line))
     if len(plain) == full > width:
-        return plain[:width], not _MARK.match(line)
-    if len(plain) == width and not _MARK.match(line):
+        first = settings.listed(_MARK.sub("", plain[0])) if marked else plain[0]
+        return [first, *plain[1:width]], not marked
+    if len(plain) == width and not marked:
         return plain, True
     bare = _MARK.sub("", line.strip())
+    bare = settings.listed(bare) if marked else bare
     ways = [cut(bare, delimiter), re.split(r"\t+|\s{2,}", bare), *(cut(bare, other) for other in (",", ";", "\t", " "))]
     # A heading that is divided as the rows are is not divided by anything else, such as the blanks in its names.
     alike = delimiter != " " and len(cut(bare, delimiter)) > (2 if delimiter == "," else 1)

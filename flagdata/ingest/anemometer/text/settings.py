@@ -12,6 +12,14 @@ _ASSIGNED = re.compile(
 )
 """A name and its value, which name no column."""
 
+_LISTS = re.compile(r"^(?:fields|columns|column[ _]names|names|units|column[ _]units)\s*[:=]\s*", re.IGNORECASE)
+"""What stands before the names or units in a line of comment that lists them."""
+
+
+def listed(text: str) -> str:
+    """A comment without the word before its list: "fields = timestamp,VW" is "timestamp,VW"."""
+    return _LISTS.sub("", text)
+
 
 def sets_values(text: str, cells: Sequence[str]) -> bool:
     """Whether a line, a comment or not, sets values: it begins a namelist, or is mostly of names with their values.

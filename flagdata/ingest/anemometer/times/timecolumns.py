@@ -349,7 +349,7 @@ def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[
 
 
 def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice]:
-    """Serial days, and counts since a start."""
+    """Serial days, days of years of two digits, and counts since a start."""
     name = layout.names[index]
     parsed = numbers(texts)
     if not texts or float((parsed.state == Cell.NUMBER).mean()) < SHARE:
@@ -359,6 +359,9 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if len(value) < 2 or float((steps >= 0).mean()) < 0.9 or not np.any(steps > 0):
         return
     words = words_of(name)
+    if set(words) & _YEAR_AND_DAY and (days := time_as(layout, (index,), "%y%j")) is not None:
+        yield replace(days, score=0.9)
+        return
     heading = understand(name, layout.units[index])
     if "wind" in heading.quantity and (heading.sure or not names_time(name)):
         return  # the s of m/s is none of seconds
@@ -413,6 +416,8 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
     ("elapsed-s", frozenset({"s", "sec", "secs", "second", "seconds"})),
     ("elapsed-h", frozenset({"h", "hr", "hrs", "hour", "hours"})),
 )
+_YEAR_AND_DAY = frozenset({"date", "yyddd", "yrdoy", "yydoy"})
+"""Words above a year of two digits and the day of it in one number, as tables of crop models have them (DSSAT)."""
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
 _HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
 _SLOW = 5000.0

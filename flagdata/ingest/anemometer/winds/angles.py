@@ -11,8 +11,10 @@ from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _DIRECTIONS = frozenset(
-    {"dir", "direction", "degrees", "degree", "deg", "bearing", "angle", "wd", "dd", "azimuth", "wa"}
+    {"dir", "direction", "degrees", "degree", "deg", "bearing", "angle", "wd", "dd", "azimuth", "wa", "dw", "drct"}
 )
+_ENDS = ("dir", "direction", "richtung")
+"""Ends of words that are made of another and of that of a direction, such as "udir"."""
 _OTHERS = frozenset(
     {
         "lat", "latitude", "lon", "lng", "long", "longitude", "heading", "hdg", "course", "cog", "roll", "pitch", "yaw",
@@ -35,7 +37,8 @@ def may_be_direction(layout: Layout, index: int) -> bool:
         return False
     if compass_unit(layout, index) is not None:
         return True
-    if not (words & _DIRECTIONS or heading.unit == "deg" or layout.units[index].strip().lower() in _NORTHS):
+    named = words & _DIRECTIONS or any(word.endswith(_ENDS) for word in words)
+    if not (named or heading.unit == "deg" or layout.units[index].strip().lower() in _NORTHS):
         return False
     value = numbers(layout.column(index), decimal=layout.decimal).value
     known = value[np.isfinite(value)]
@@ -84,3 +87,12 @@ def degrees(layout: Layout, index: int, unit_name: str) -> NDArray[np.float64]:
 def may_be_points(heading: Heading) -> bool:
     """Whether words below a heading may be points of the compass: of a direction, or of a wind in words."""
     return heading.quantity.endswith(("wind_direction", "wind_speed"))
+
+
+def day_of_month(layout: Layout, index: int) -> bool:
+    """Whether a column DD stands in a date written in parts, so that it is no direction."""
+    names = [name.strip().upper() for name in layout.names]
+    if names[index] not in ("DD", "D"):
+        return False
+    before, after = names[index - 1] if index else "", names[index + 1] if index + 1 < len(names) else ""
+    return before in ("MM", "MO", "M", "MONTH") or after.startswith("HH")

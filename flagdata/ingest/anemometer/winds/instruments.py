@@ -11,23 +11,22 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.winds import bow, codes, own_motion, unitcheck
-from flagdata.ingest.anemometer.winds.angles import compass_unit, degrees, may_be_points, may_be_two
+from flagdata.ingest.anemometer.winds import beside, bow, codes, own_motion, unitcheck
+from flagdata.ingest.anemometer.winds.angles import compass_unit, day_of_month, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort
 from flagdata.ingest.anemometer.winds.vanes import number, vanes
 from flagdata.ingest.anemometer.words.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import WIND
-from flagdata.units import spelled, unit
+from flagdata.units import unit
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 COMPONENTS = ("wind_x", "wind_y", "wind_z")
 _DIRECTION_OF = {name: name.replace("speed", "direction") for name in SPEEDS}
-_WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
+WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
 _PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
 """Ranges of the air pressure by unit [in it]; they do not overlap."""
-_POSITIONS = frozenset({"lat", "latitude", "lon", "lng", "longitude", "sog", "cog", "gps", "altitude", "course"})
 _UNREADABLE = 0.1
 
 
@@ -113,13 +112,22 @@ def find_winds(
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
 
 
-def _gathered(layout: Layout, time: Sequence[int]) -> _Found:
-    """The columns whose heading names a quantity, and their values; `time` are columns that are the time."""
+def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) -> _Found:
+    """The columns whose heading names a quantity, and their values.
+
+    Args:
+        time: columns that are the time.
+        speed: a column that is a speed of the wind by the user's word.
+    """
     headings = [bow.heading_of(layout, index) for index in range(len(layout.names))]
     headings, of_earth = along_axes(layout, headings)
+    for index in [at for at, heading in enumerate(headings) if at == speed or heading.channel == "wind_speed"]:
+        own = beside.direction_of(layout, index, apart=time)
+        if own is not None and (not headings[own].quantity or index == speed):
+            headings[own] = beside.as_direction(headings[own], of=headings[index])
     found = _Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):
-        if index in time or not heading.quantity or _day_of_month(layout, index):
+        if index in time or not heading.quantity or day_of_month(layout, index):
             continue
         calm = compass.STILL if heading.quantity.endswith("wind_speed") else ()
         parsed = numbers(layout.column(index), decimal=layout.decimal, zeros=calm, below=bool(calm))
@@ -177,30 +185,13 @@ def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
             )
 
 
-def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
-    """The units that the column next to a column of numbers spells, where they change from row to row."""
-    if index + 1 >= layout.number_of_columns():
-        return ()
-    cells = sorted({cell for cell in layout.column(index + 1) if cell})
-    names = {spelled(cell) for cell in cells[:50]}
-    return tuple(cells) if len(names) > 1 and None not in names else ()
-
-
-def _day_of_month(layout: Layout, index: int) -> bool:
-    """Whether a column DD stands in a date written in parts, so that it is no direction."""
-    names = [name.strip().upper() for name in layout.names]
-    if names[index] not in ("DD", "D"):
-        return False
-    before, after = names[index - 1] if index else "", names[index + 1] if index + 1 < len(names) else ""
-    return before in ("MM", "MO", "M", "MONTH") or after.startswith("HH")
-
-
 def named_wind(
     layout: Layout, column: str, *, time: Sequence[int], told: str | None
 ) -> tuple[tuple[Wind, ...], tuple[str, ...]]:
     """The anemometer whose speed is in the column that the user names by heading or number, if any, and what is odd.
 
-    Its direction is the one that the table holds, where no other speed may be that direction's.
+    Its direction is the one that is called after it, else the one that the table holds, where no other speed may be
+    that direction's.
     """
     indices = [index for index, name in enumerate(layout.names) if name == column]
     if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
@@ -213,11 +204,13 @@ def named_wind(
     odd = (_otherwise(name, known, told),) if told is not None and known is not None and told != known else ()
     how = f"in {told}, as you said" if told else f"in {known} by its heading" if known else ""
     speed = Column(index=indices[0], unit=told or known, told=how)
-    found = _gathered(layout, time)
-    columns = {"wind_speed": speed}
-    if len(found.of("wind_direction")) == 1 and not [at for at in found.of(*SPEEDS) if at != indices[0]]:
-        beside = _direction(found, indices[0], "wind_direction")
-        columns |= {} if beside is None else {beside[0]: beside[1]}
+    found = _gathered(layout, time, speed=indices[0])
+    columns, towards = {"wind_speed": speed}, None
+    if (own := beside.direction_of(layout, indices[0], apart=time)) in found.of("wind_direction"):
+        towards = _as_direction(found, own, "wind_direction")
+    elif len(found.of("wind_direction")) == 1 and not [at for at in found.of(*SPEEDS) if at != indices[0]]:
+        towards = _direction(found, indices[0], "wind_direction")
+    columns |= {} if towards is None else {towards[0]: towards[1]}
     return (Wind(label=column, height=stated.height, columns=columns, sure=True),), odd
 
 
@@ -242,7 +235,7 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
     for index in found.of(*SPEEDS):
         groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, []).append(index)
     named = [i for i in found.of(*SPEEDS) if found.headings[i].sure]
-    moving = {word for name in found.layout.names for word in words_of(name)} & _POSITIONS
+    moving = own_motion.may_have_speed(found.layout)
     winds: list[Wind] = []
     for by_channel in groups.values():
         if named and not any(found.headings[i].sure for indices in by_channel.values() for i in indices):
@@ -387,6 +380,11 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     angles = [i for i in candidates if not _points(found.headings[i]) and not found.headings[i].magnetic]
     if _points(found.headings[index]) and len(angles) == 1:
         index = angles[0]  # the same in degrees
+    return _as_direction(found, index, channel)
+
+
+def _as_direction(found: _Found, index: int, channel: str) -> tuple[str, Column] | None:
+    """A column as a direction, by its heading and numbers; `None` where they are none."""
     heading, value = found.headings[index], found.values[index]
     judged = judge(heading, value, channel)
     if judged.left_out:
@@ -428,7 +426,7 @@ def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
     """The anemometer with temperature, humidity and pressure, each where one column is surely it."""
     columns = dict(wind.columns)
     first = next(iter(columns.values())).index
-    for channel in _WEATHER:
+    for channel in WEATHER:
         candidates = found.of(channel)
         if channel == "sonic_temperature" and "wind_x" not in columns:
             candidates = [i for i in candidates if found.headings[i].sure]

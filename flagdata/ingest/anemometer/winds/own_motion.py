@@ -18,6 +18,8 @@ from flagdata.ingest.anemometer.words.headings import understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import WIND
 
 _LATITUDE, _LONGITUDE = frozenset({"lat", "latitude"}), frozenset({"lon", "lng", "long", "longitude"})
+_PLACED = _LATITUDE | _LONGITUDE - {"long"}
+"""Words of a position; "long" is as well of waves and of times."""
 _STILL = 1e-4
 """Change of a coordinate [deg] below which a receiver at rest may show it: some 10 m."""
 _HEIGHTS = frozenset({"alt", "altitude", "height", "elevation"})
@@ -35,6 +37,16 @@ _VESSEL = frozenset({"stw", "bsp", "boat", "vessel", "vehicle", "ship", "sog", "
 _PAIRS = (("x", "y"), ("n", "e"))
 _OF_AIR = WIND | {"sonic", "csat", "csat3", "sat", "anemometer", "anem", "air", "gill", "metek", "young", "usa"}
 """Words of headings whose velocity is the wind's."""
+_CARRIED = frozenset(
+    {
+        "sog", "cog", "gps", "course", "heading", "hdg", "stw", "bsp", "boat", "vessel", "ship", "car", "vehicle",
+        "bike", "drone", "rotor", "rpm", "wheel", "truck", "aircraft", "airspeed", "groundspeed",
+    }
+)  # fmt: skip
+"""Words of what has a speed of its own."""
+_WEATHER = frozenset({"air_temperature", "relative_humidity", "air_pressure"})
+_ROWS = 3
+"""Rows from which a position that does not change is a station's."""
 _UNIT = re.compile(r"\s*[\[(<{].*$|[\s_,]+(?:m[/_ ]?s|mps|km[/_ ]?h|kph|mph|kn|kts?|knots)$", re.IGNORECASE)
 
 
@@ -51,6 +63,21 @@ def components(layout: Layout) -> Mapping[int, str]:
     """The columns that may be the wind beside the platform's own velocity, as channels by their index."""
     own = columns(layout)
     return _others(layout, own) if own and not _windy(layout, own) else {}
+
+
+def may_have_speed(layout: Layout) -> bool:
+    """Whether a speed whose heading says no more may be the platform's own: beside a position, but for a station's.
+
+    A station's does not change, and beside the speed stand a direction and the weather, and nothing that moves.
+    """
+    words = {word for name in layout.names for word in words_of(name)}
+    if not words & (_PLACED | {"sog", "cog", "gps", "altitude", "course"}):
+        return False
+    if words & _CARRIED or len(layout.rows) < _ROWS or not _stands_still(layout):
+        return True
+    headings = [understand(name, stated) for name, stated in zip(layout.names, layout.units, strict=True)]
+    channels = {heading.channel for heading in headings}
+    return "wind_direction" not in channels or not (channels & _WEATHER or "cloud" in words)
 
 
 def doubt(layout: Layout) -> str:

@@ -25,8 +25,12 @@ CHANCE = 1e-4
 """Probability by chance below which a grid is evidence."""
 WINDY = 12.0
 """Median of a day or more [m/s] above which a unit is doubted."""
+STORMY = 30.0
+"""Median [m/s] above which a unit that is guessed is none either."""
 FASTEST = 60.0
 """Speed [m/s] above which a value, other than a gust, is doubted; hurricanes of category 4 begin at 58 m/s."""
+IMPOSSIBLE = 75.0
+"""Median [m/s] that no wind has, by which a unit is doubted of however few rows."""
 DAY = 86_400.0
 _STEPS: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("mph", (1.0, 0.5, 0.1)), ("kn", (1.0, 0.5, 0.1)), ("km/h", (1.0, 0.1)), ("m/s", (1.0, 0.5, 0.1)),
@@ -98,7 +102,8 @@ def likely(values: NDArray[np.float64]) -> Evidence | None:
         return None
     median, high = float(np.median(known)), float(np.quantile(known, 0.99))
     if high > FASTEST or median > WINDY:
-        return Evidence(unit="km/h", reason=_too_fast(median, high, "m/s"))
+        slower = median * unit("km/h").scale > STORMY
+        return Evidence(unit="km/day" if slower else "km/h", reason=_too_fast(median, high, "m/s"))
     return None
 
 
@@ -117,7 +122,7 @@ def contradiction(
     if found is not None and abs(unit(found.unit).scale / scale - 1) > 1e-9:
         return _finding(channel, stated, found)
     known = np.abs(values[np.isfinite(values)]) * scale
-    if len(known) < 10 or scale < unit("km/h").scale:
+    if not len(known) or scale < unit("km/h").scale or (len(known) < 10 and float(np.median(known)) < IMPOSSIBLE):
         return None
     median, high = float(np.median(known)), float(np.quantile(known, 0.99))
     tenths = scale == 1.0 and bool(np.all(known % 1 == 0)) and median > WINDY
@@ -125,13 +130,16 @@ def contradiction(
         return None
     # Of the units that are smaller, the first in which the wind is an ordinary one.
     others = [name for name in ("km/h", "mph", "kn") if unit(name).scale < 0.9 * scale]
+    others += ["km/day"] if high > FASTEST else []
     if not others:
         return None
+    ordinary = (name for name in others if median * unit(name).scale / scale <= STORMY)
+    other = next(ordinary, others[0])
     reason = _too_fast(median / scale, high / scale, stated)
     if tenths:
         smaller = "0.1 m/s" if median < 10 * FASTEST / 3 else "0.01 m/s"
         reason += f"; whole numbers may also be in {smaller} (--unit '{smaller}')"
-    return _finding(channel, stated, Evidence(unit=others[0], reason=reason))
+    return _finding(channel, stated, Evidence(unit=other, reason=reason))
 
 
 def gust_factor(mean: NDArray[np.float64], gust: NDArray[np.float64]) -> float | None:

@@ -62,7 +62,7 @@ _NO_AIR = frozenset(
         "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
         "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",
         "gyro", "mpu", "w", "wt",
-        "wtemp", "watertemp", "therm", "thermistor",
+        "wtemp", "watertemp", "therm", "thermistor", "bottom", "seabed", "seafloor", "ocean", "ice", "snow",
     }
 )  # fmt: skip
 _TEMPERATURE = frozenset(

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import re
 
+from flagdata.ingest.anemometer.words.ghcn import ELEMENTS
+
 _GUST = (
     r"最大|极大|瞬[間时]|阵风|陣風|突風|최대|순간|돌풍|порыв\w*|пориви?|макс|\bporyw\w*|\bmaks|\bnáraz|puuska|puhang|vindby|"
     r"vindkast|széllökés|rafal[ăa]|ριπή|משב|sunek|udar"
@@ -63,7 +65,9 @@ _WIDE = str.maketrans("（）［］／：，％", "()[]/:,%")
 
 
 def in_english(name: str) -> str:
-    """A heading with the words of other languages that are known replaced; one of ASCII letters as it is."""
+    """A heading with the words of other languages that are known replaced, and those that NOAA's elements stand for."""
+    if name in ELEMENTS:
+        return ELEMENTS[name]
     if name.isascii() and not _ASCII.search(name):
         return name
     name = name.translate(_WIDE)

@@ -60,6 +60,27 @@ def test_a_tunnel_that_is_turned_up_step_by_step_does_not_only_grow() -> None:
     assert not cumulated.grows(levels)
 
 
+def test_a_sum_that_begins_anew_with_each_direction_is_told(read: Read) -> None:
+    sums = [2.5, 4.0, 8.5, 11.0, 15.5, 17.0, 21.5, 24.0, 1.5, 3.0, 1.5, 4.0, 2.5, 5.0, 9.5, 11.0, 13.5, 1.5, 4.0, 5.5]
+    log = read(rows([*sums, *sums], "Xws"), wind="Xws", unit="m/s")
+    assert [finding.where for finding in log.findings if finding.kind == "speed-may-be-sum"] == ["line 2"]
+
+
+def test_a_wind_is_no_sum() -> None:
+    draws = stream(1, "winds of every memory")
+    for trial, memory in enumerate(np.repeat([0.0, 0.5, 0.9, 0.99], 100)):
+        wandering = np.zeros(25 + trial % 300)
+        for at in range(1, len(wandering)):
+            wandering[at] = memory * wandering[at - 1] + np.sqrt(1 - memory**2) * draws.normal()
+        for mean in (0.5, 2.0, 6.0):
+            assert not cumulated.sums(np.round(np.abs(mean * (1 + wandering)), 1)), (trial, mean)
+
+
+def test_a_breeze_of_every_day_is_no_sum() -> None:
+    hours = np.arange(24 * 5)
+    assert not cumulated.sums(np.round(3 + 2.9 * np.sin(hours * np.pi / 12), 1))
+
+
 @pytest.mark.parametrize(
     ("name", "channel", "height"),
     [("Cup116m_Mean", "wind_speed", 116), ("Cup_40m", "wind_speed", 40), ("Vane113m_Mean", "wind_direction", 113)],

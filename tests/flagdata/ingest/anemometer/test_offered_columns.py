@@ -81,3 +81,14 @@ def test_a_second_direction_is_offered_in_the_place_of_the_first(read: Read) -> 
     (line,) = lines(read(f"time,wind speed (m/s),wind dir (deg),TWD\n{rows}"))
     found = read(f"time,wind speed (m/s),wind dir (deg),TWD\n{rows}", columns=line)
     assert np.degrees(found.series.channels["wind_direction"]) == pytest.approx(np.arange(100, 130))
+
+
+def test_names_of_stations_and_empty_columns_are_not_offered_as_weather(read: Read) -> None:
+    stations = [*(f"{letter}QXI1" for letter in "ABCDEFGHKL"), "TS903", "TA417"]
+    cells = ",".join(["3.5"] * 11)
+    rows = "".join(f"2026-05-01T{at:02d}:00:00Z,{at % 4}.25,{cells},\n" for at in range(24))
+    empty = "".join(f"2026-05-01T{at:02d}:00:00Z,{at % 4}.25,{at % 3}.5,\n" for at in range(24))
+    for text in (f"time,{','.join(stations)},END\n{rows}", f"time,Q7,R8,TS\n{empty}"):
+        with pytest.raises(InputError) as caught:
+            read(text)
+        assert "temperature" not in (caught.value.fix or "")

@@ -271,7 +271,13 @@ def test_cumulus_momentary_readings_are_named_beside_its_averages(read: Read, fi
     columns = "time=time,wind speed of latest samples=wind_speed[km/h]"
     latest = read(text, zone="UTC", columns=columns).series
     np.testing.assert_allclose(latest.channels["wind_speed"], [(s + 1) / 3.6 for _, s, _ in rows()])
-    (line,) = re.findall(r'--columns "([^"]*)"', told)
+    line, *more = re.findall(r'--columns "([^"]*)"', told)
+    assert len(more) == (fields == 27)
+    for own in more:  # the speed of the latest samples has a direction that is called after it
+        both = read(text, zone="UTC", columns=own).series.channels
+        np.testing.assert_allclose(both["wind_speed"], latest.channels["wind_speed"])
+        turned = [(d + 90 + at) % 360 for at, (_, _, d) in enumerate(rows())]
+        np.testing.assert_allclose(np.rad2deg(both["wind_direction"]), turned)
     gust = read(text, zone="UTC", columns=line.replace("[?]", "[km/h]")).series
     np.testing.assert_allclose(gust.channels["wind_speed"], [(s + 2) / 3.6 for _, s, _ in rows()])
 

@@ -88,3 +88,8 @@ def test_a_mean_wind_in_one_word_is_asked_for_its_unit_and_its_maximum_is_named(
     (line,) = re.findall(r'--columns "([^"]*)"', told)
     gust = read(text, zone="UTC", columns=line, date_order="dmy")
     assert gust.series.channels["wind_speed"][:2].tolist() == [8.5, 9.5]
+
+
+@pytest.mark.parametrize("name", ["Bottom Temp (degC)", "Water Temp", "SST (degC)", "Ice temperature (°C)"])
+def test_a_temperature_of_water_or_ice_is_not_that_of_the_air(name: str) -> None:
+    assert understand(name).channel == ""

@@ -1,0 +1,64 @@
+"""Directions that are called after the speed beside them, which no heading tells alone: U and Udir, VW1 and DW1."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from flagdata.ingest.anemometer.text.cells import numbers
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds.angles import compass_unit
+from flagdata.ingest.anemometer.words.headings import Heading
+
+_DIRECTIONS = ("dir", "direction", "wd")
+"""What stands before or behind the name of a speed in that of its direction."""
+_INSTEAD = (
+    ("speed", "direction"), ("speed", "dir"), ("spd", "dir"), ("vel", "dir"), ("wsp", "wd"), ("wsp", "wdir"),
+    ("ws", "wd"), ("vw", "dw"), ("wv", "wd"), ("ff", "dd"),
+)  # fmt: skip
+"""What stands in the name of a speed, and in its place in that of its direction."""
+_UNIT = re.compile(r"[\[(<{][^\])>}]*[\])>}]")
+_TURN, _MOST = 361.0, 0.9
+"""Largest angle [deg], and the share of a column that must be angles; the rest are codes of no value."""
+
+
+def direction_of(layout: Layout, speed: int, *, apart: Collection[int] = ()) -> int | None:
+    """The column of angles or points of the compass that is called after the speed in another; `None` for no such.
+
+    Args:
+        speed: its column.
+        apart: columns that are none.
+    """
+    own = _plain(layout.names[speed])
+    if not own:
+        return None
+    named = {f"{own}{word}" for word in _DIRECTIONS} | {f"{word}{own}" for word in _DIRECTIONS}
+    named |= {own.replace(said, word, 1) for said, word in _INSTEAD if said in own}
+    found = [
+        index for index, name in enumerate(layout.names)
+        if index not in {speed, *apart} and _plain(name) in named and _turns(layout, index)
+    ]  # fmt: skip
+    return found[0] if len(found) == 1 else None
+
+
+def as_direction(heading: Heading, *, of: Heading) -> Heading:
+    """The heading of a column as that of the direction of the speed below another heading."""
+    channel = "wind_direction"
+    return replace(heading, channel=channel, quantity=channel, spread=False, label=of.label, height=of.height)
+
+
+def _plain(name: str) -> str:
+    """A heading without its unit, in lower case, without blanks and signs."""
+    return re.sub(r"[\W_]", "", _UNIT.sub("", name)).lower()
+
+
+def _turns(layout: Layout, index: int) -> bool:
+    """Whether a column holds points of the compass, or numbers from 0 to 360 but for codes of no value."""
+    if compass_unit(layout, index) is not None:
+        return True
+    value = numbers(layout.column(index), decimal=layout.decimal).value
+    known = value[np.isfinite(value)]
+    return len(known) > 0 and float(((known >= 0) & (known <= _TURN)).mean()) >= _MOST
