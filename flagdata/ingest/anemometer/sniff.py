@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, unti
 from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind
 from flagdata.ingest.anemometer.tables.draft import skeleton
-from flagdata.ingest.anemometer.text.layout import cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TextFile
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}

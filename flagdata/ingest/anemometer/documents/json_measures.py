@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from flagdata.ingest.anemometer.text.layout import cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.words.headings import words_of
 from flagdata.units import spelled
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from flagdata.ingest.anemometer.documents import coverage_json
 from flagdata.ingest.anemometer.documents.places import Place, heading, rows
-from flagdata.ingest.anemometer.text.layout import cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 
 _DEEPEST = 6

@@ -23,7 +23,7 @@ from typing import Any
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.documents import coverage_json, json_measures, json_series
-from flagdata.ingest.anemometer.text.layout import cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of
 

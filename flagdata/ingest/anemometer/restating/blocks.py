@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from flagdata.ingest.anemometer.restating.restate import LOOKED_AT, table
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
-from flagdata.ingest.anemometer.text.layout import cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import understand
 

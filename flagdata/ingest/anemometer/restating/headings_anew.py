@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating.restate import table
-from flagdata.ingest.anemometer.text.layout import cell_kind, cut
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import cut
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import interest, names_time, understand
 

@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.restating.restate import table
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, cut, lay_out
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as

@@ -31,7 +31,8 @@ from flagdata.ingest.anemometer.tables.needs import Need, needs_of, stamps_of
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, lay_out
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout, lay_out
 from flagdata.ingest.anemometer.times import bare_dates
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time

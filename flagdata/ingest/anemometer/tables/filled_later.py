@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, cut, lay_out
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.winds.missing_codes import CODES
 from flagdata.ingest.anemometer.words.headings import interest, understand

@@ -14,7 +14,8 @@ import numpy as np
 from flagdata.ingest.anemometer.instants import counted
 from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARDS, shown
 from flagdata.ingest.anemometer.text.cells import numbers
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import beside, bow, own_motion
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of

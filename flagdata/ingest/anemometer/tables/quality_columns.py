@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import words_of
 
 _MARKS = frozenset(

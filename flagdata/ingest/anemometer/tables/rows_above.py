@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind, cut
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout, cut
 
 
 def rows_above(lines: Sequence[str], layout: Layout) -> str:

@@ -6,7 +6,8 @@ import re
 from collections.abc import Collection, Sequence
 
 from flagdata.ingest.anemometer.tables import offered_columns
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import beside, own_motion
 from flagdata.ingest.anemometer.winds.instruments import Wind

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flagdata.compass import CALM
-from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.text import settings
-from flagdata.ingest.anemometer.text.cells import BELOW
+from flagdata.ingest.anemometer.text.kinds import OF_LOGS, CellKind, cell_kind, is_unit, unit_behind
 from flagdata.ingest.anemometer.text.rows import blank_cells
 from flagdata.ingest.anemometer.words.headings import names_time
 from flagdata.units import UNITS, spelled
@@ -25,43 +24,14 @@ _CANDIDATES = (";", "\t", ",", "|", " ")
 _STRONG = (";", "\t", "|")
 _CELLS = 4
 """Cells of a line that these signs divide, from which on they do and no other."""
-_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
-_STAMP = re.compile(
-    r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,_-]+\d{1,2}([:-]\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
-    r"\s*(Z|UTC|GMT|[-+]\d{2}(:?\d{2})?|(?<=\d) [A-Z]{3,4})?"
-    r"|(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}(?::\d{2}(?::\d{2})?)?"
-)
-_DAY_OF_WEEK = r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]{0,6}\.?,?\s+"
-_MONTH_NAME = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]{0,6}\.?,?"
-_MONTH_STAMP = re.compile(
-    r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*"
-    rf"|(?:{_DAY_OF_WEEK})?(?:\d{{1,2}}[- ])?{_MONTH_NAME}\s+\d{{1,4}}\b.*"
-)
-_QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:;+-]\s?){{1,8}}(?:-1)?)")
-_BEHIND = frozenset({"m/s", "rad", "K", "Pa", "1"})
-"""SI units of quantities that tables write with their unit in every cell ("4.3 mph", "210°")."""
 _MARK = re.compile(r"^\s*[#%!]+\s*|^\s*//\s*")
 _NAMING = re.compile(r"^\s*@\s*")
 """How the line of names begins in tables of crop models (DSSAT), which are divided by blanks."""
-_MISSING = frozenset({*MISSING, "nan.", "inf", "-inf"})
-_UNITS_OF_OTHERS = frozenset(
-    {
-        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
-        "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
-        "degrees_north", "degrees_east", "degree_north", "degree_east", "degree_celsius", "celsius", "psu", "ph_t",
-    }
-)  # fmt: skip
-"""What stands in a line of units below times, counts and quantities that are not read; some are of UDUNITS."""
-_ONE = r"(?:[umnkcµμ]?(?:mol|m|g|l|w|j|s|pa)|h|d|k|sr|deg|degc)"
-_COMPOUND = re.compile(rf"{_ONE}(?:(?:[. ]{_ONE}\^?-[123])+|/{_ONE}[23]?)")
-"""Units of two parts that are not read, as mg.m-3, umol kg-1 or mg/L."""
 _BRACKETS = re.compile(r"[(\[（]([^()\[\]（）]{1,12})[)\]）]\s*$")
 _LEAST_UNITS = 2
 """In brackets that make a second line of names one that tells units."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
-
-CellKind = Literal["number", "stamp", "missing", "text"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,40 +215,12 @@ def cut(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in line.split(delimiter)]
 
 
-def cell_kind(cell: str) -> CellKind:
-    """What a cell seems to hold."""
-    text = cell.strip().strip('"').strip()
-    if text.lower() in _MISSING or re.match(MISSING_SIGNS, text):
-        return "missing"
-    if _NUMBER.fullmatch(text) or _unit_behind(text) or re.match(BELOW, text.replace(",", ".")):
-        return "number"
-    if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text):
-        return "stamp"
-    return "text"
-
-
-def is_unit(text: str) -> bool:
-    """Whether a cell of a line of units spells one; brackets are looked through."""
-    bare = text.strip().strip("[]()<>").strip()
-    known = bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
-    return known or _COMPOUND.fullmatch(bare.lower()) is not None
-
-
-def _unit_behind(text: str) -> str:
-    """The unit that is written behind a number, as written; "" where there is none."""
-    match = _QUANTITY.fullmatch(text[:60])
-    if match is None or (match["unit"].isalpha() and len(match["unit"]) == 1):
-        return ""
-    name = spelled(match["unit"])
-    return match["unit"].strip() if name is not None and UNITS[name].si in _BEHIND else ""
-
-
 def _suffix(cells: Sequence[str]) -> str:
     """The unit behind the numbers of a column; "" where nine of ten do not share one."""
     known = [cell.strip() for cell in cells if _kind(cell) != "missing"]
-    if not known or not _unit_behind(known[0]):
+    if not known or not unit_behind(known[0]):
         return ""
-    suffix, count = Counter(map(_unit_behind, known)).most_common(1)[0]
+    suffix, count = Counter(map(unit_behind, known)).most_common(1)[0]
     return suffix if count >= 0.9 * len(known) else ""
 
 
@@ -292,7 +234,7 @@ def _unit_column(rows: Sequence[Sequence[str]], index: int) -> int | None:
     name, beyond = _unit_of_all(rows, index + 1), _unit_of_all(rows, index + 2)
     if beyond is not None:
         return None
-    return index + 1 if name is not None and UNITS[name].si in _BEHIND and name != "1" else None
+    return index + 1 if name is not None and UNITS[name].si in OF_LOGS and name != "1" else None
 
 
 def _unit_of_all(rows: Sequence[Sequence[str]], index: int) -> str | None:

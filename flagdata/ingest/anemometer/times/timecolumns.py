@@ -17,7 +17,8 @@ from flagdata.ingest.anemometer.instants.dates import Order, decide
 from flagdata.ingest.anemometer.instants.midnight import parse_as, parse_with_bare_dates
 from flagdata.ingest.anemometer.instants.stamps import Stamps
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times import dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
 from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, share, time_choice

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import numbers
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _DIRECTIONS = frozenset(

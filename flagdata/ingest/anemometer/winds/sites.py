@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from flagdata.ingest.anemometer.text.layout import Layout, cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds.angles import compass_unit
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 
