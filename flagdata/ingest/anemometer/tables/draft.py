@@ -25,6 +25,7 @@ from flagdata.ingest.anemometer.tables import (
     stated_rate,
     stated_unit,
     unread,
+    unread_rest,
     unread_winds,
 )
 from flagdata.ingest.anemometer.tables.needs import Need, needs_of, stamps_of
@@ -189,6 +190,7 @@ def draft(
         remarks = (*remarks, *unread.otherwise(layout, time, chosen), *beside_components.remark(layout, time, chosen))
         remarks = (*remarks, *own_motion.remarks(layout), *(unread.times(layout, time, remarks) if time else ()))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
+    remarks = (*remarks, *unread_rest.remark(layout, time, winds, (*layout.strange, *remarks, *warnings)))
     toml = _toml(layout, time, chosen)
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),

@@ -60,8 +60,9 @@ def test_the_direction_of_a_gust_is_not_offered_as_its_speed(log_file: Write, an
     assert '4=wind_speed[m/s]"' in _note(log_file(_table(angle, "GustStrength")), unit="m/s")
 
 
-def test_columns_that_the_user_names_are_left_without_a_note(log_file: Write) -> None:
-    assert _note(log_file(_table("gust")), columns="time,wind_speed[m/s]") == ""
+def test_of_columns_that_the_user_does_not_name_the_note_says_no_more_than_their_names(log_file: Write) -> None:
+    note = _note(log_file(_table("gust")), columns="time,wind_speed[m/s]")
+    assert note == "column 'gust' is not read"
 
 
 @pytest.mark.parametrize("name", ["wind_heading", "Wind Course", "windHeading"])

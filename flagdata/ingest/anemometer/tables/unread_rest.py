@@ -1,0 +1,36 @@
+"""Columns that are read for nothing and that no other message speaks of: named, so that none is dropped unsaid."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.winds.instruments import Wind
+
+_MOST = 40
+"""Columns that are named; of more, the number."""
+
+
+def remark(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], said: Collection[str]) -> tuple[str, ...]:
+    """One remark with the names of the columns that are not read; none where all are read, told already or empty.
+
+    Args:
+        winds: all of the table, those that are not chosen too.
+        said: messages about columns; a column whose quoted name is in one of them is not named again.
+    """
+    taken = {column.index for one in winds for column in one.columns.values()}
+    taken |= set(time.columns) if time is not None else set()
+    taken |= {index for index in layout.unit_columns if index is not None}
+    taken |= {one.site[0] for one in winds if one.site is not None}
+    found: list[str] = []
+    for index, name in enumerate(layout.names):
+        called = repr(name) if name else f"number {index + 1}"
+        held = any(cell_kind(cell) != "missing" for cell in layout.column(index))
+        if index not in taken and held and not any(called in message for message in said):
+            found.append(called)
+    if not found:
+        return ()
+    names = ", ".join(found[:_MOST]) + (f" and {len(found) - _MOST} more" if len(found) > _MOST else "")
+    return (f"columns {names} are not read" if len(found) > 1 else f"column {names} is not read",)
