@@ -92,6 +92,18 @@ def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake:
     assert "did you mean 'wind'?" in misspelt.err
 
 
+def test_show_finds_an_artifact_by_its_name_where_only_one_has_it(run: Run, lake: Lake, put_text: Put) -> None:
+    first, second = put_text(lake, "cup"), put_text(lake, "sonic")
+    assert run("show", "sonic", "--json").document["artifact"]["artifact"] == second.id
+    with lake.transaction("another of that name") as tx:
+        tx.add(Artifact(kind="wind", name="cup", object=second.object))
+    ended = run("show", "cup")
+    assert ended.code == 1
+    assert ended.err.splitlines()[0] == "flagdata: 2 artifacts are named 'cup'"
+    assert "give the id of one" in ended.err
+    assert run("show", first.id, "--json").document["artifact"]["name"] == "cup"
+
+
 def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_text: Put) -> None:
     recording = put_text(lake, "recording")
     with lake.transaction("clips") as tx:
