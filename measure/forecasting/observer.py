@@ -7,8 +7,8 @@ gets right costs no error, what it lacks returns in every e. The prediction-erro
 (Ljung, System Identification, 1999, chapter 7) then works on e and its sensitivities.
 
 Recordings are cut into segments that run side by side as members of a batch; a segment starts some frames early, so
-that its state has forgotten how it was started. Where a marker was not tracked there is no error e: nothing is
-corrected by it, and nothing is compared with it.
+that its state has forgotten how it was started. Where a marker was not tracked there is no error e and nothing is
+corrected by it; a prediction is compared where the marker was tracked in the two frames before, too.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class Forecaster:
 
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
         """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker
-        was not tracked.
+        was not tracked in the frame or in one of the two before.
 
         Args:
             system, state: a member for each of the segments, once or several times over.
@@ -162,7 +162,7 @@ class Forecaster:
         """The same of what advances a state by a period, frame by frame."""
         period, copies = segments.period, state.position.shape[-1] // len(segments)
         seen = self._real(segments.positions)
-        mask = None if segments.seen is None else self._real(segments.seen.astype(np.float64)).repeat(1, 1, copies)
+        mask, kept = self._shares(segments.seen, copies), self._shares(segments.counted, copies)
         x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1]).repeat(1, 1, copies)
         v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]).repeat(1, 1, copies) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
@@ -176,13 +176,17 @@ class Forecaster:
                 if mask is not None:
                     error = error * mask[k][:, None]
                 if k >= segments.first:
-                    errors.append(error)
+                    errors.append(error if kept is None else error * kept[k - segments.first][:, None])
                     predictions.append(predicted)
                 lifted = torch.einsum("vm,mcb->vcb", self._lifted, error)
                 state = replace(
                     state, position=state.position + lifted, velocity=state.velocity + lifted / period, time=k * period
                 )
         return errors, predictions
+
+    def _shares(self, mask: NDArray[np.bool_] | None, copies: int) -> Tensor | None:
+        """(frame, marker, batch) 1 where a mask (frame, marker, segment) is set, else 0; None where there is none."""
+        return None if mask is None else self._real(mask.astype(np.float64)).repeat(1, 1, copies)
 
     def sensitivity(
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor

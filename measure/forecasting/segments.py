@@ -185,14 +185,21 @@ class Segments:
         whole = np.ones(self.items[0].positions.shape[:2], dtype=bool)
         return np.stack([whole if item.seen is None else item.seen for item in self.items], axis=-1)
 
-    @property
+    @cached_property
     def counted(self) -> NDArray[np.bool_] | None:
-        """The same of the frames that count."""
-        return None if self.seen is None else self.seen[self.first :]
+        """(frame, marker, segment) whether a prediction is compared, in the frames that count; None where all are.
+
+        It is where the marker was tracked in that frame and in the two before, from which the model has its position
+        and velocity. Where it was not, the prediction reaches back farther than one horizon, to before the gap.
+        """
+        if self.seen is None:
+            return None
+        first = self.first
+        return self.seen[first:] & self.seen[first - 1 : -1] & self.seen[first - 2 : -2]
 
     @cached_property
     def tracked(self) -> Floats:
-        """(segment,) share of the positions that were tracked, in the frames that count."""
+        """(segment,) share of the predictions that are compared."""
         return np.ones(len(self)) if self.counted is None else self.counted.mean(axis=(0, 1))
 
     @property

@@ -16,9 +16,20 @@ from measure.observe.trajectory import Floats, Specimen, Trajectory
 
 
 def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
-    """(held, 3) where points (held, 2) of the cloth are on the average of all frames [m], recordings counting alike."""
-    means = [onto(r.markers, seats) @ r.positions.mean(axis=0) for r in recordings]
+    """(held, 3) where points (held, 2) of the cloth are on the average [m], recordings counting alike.
+
+    Each marker counts by the frames in which it was tracked.
+    """
+    means = [onto(r.markers, seats) @ _tracked_mean(r) for r in recordings]
     return np.mean(means, axis=0)
+
+
+def _tracked_mean(recording: Trajectory) -> Floats:
+    """(marker, 3) mean over the frames in which each was tracked [m]; over all frames where none was."""
+    if recording.seen is None:
+        return recording.positions.mean(axis=0)
+    weight = np.where(recording.seen.any(axis=0), recording.seen, 1.0)
+    return np.einsum("fm,fmc->mc", weight, recording.positions) / weight.sum(axis=0)[:, None]
 
 
 def as_seen(specimen: Specimen, recordings: Sequence[Trajectory]) -> Specimen:

@@ -1,13 +1,15 @@
 """Frames in which markers were not tracked: their positions are filled in, and a mask says which were.
 
 What is filled in starts a prediction and shows where a marker about is; it is never compared with a prediction. Short
-gaps are filled by the marker's own motion, longer ones by that of its neighbours.
+gaps are filled by the marker's own motion, longer ones by that of its neighbours or, of a marker that hardly moves, by
+its places before and after.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +74,8 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     that was tracked in fewer than half of the frames is left out. A gap of up to `LONGEST`, or one with frames in which
     hardly a marker was tracked, is filled by the cubic spline through the marker's other frames. In a longer one, or
     one at an end, the marker is where the quadratic map of its tracked neighbours takes it, less what that is off by at
-    the ends of the gap.
+    the ends of the gap; or evenly between its places at the ends, where that is closer in gaps of this length that are
+    made where the marker was tracked, as it is of markers beside an attachment.
 
     Args:
         markers: (marker, 2) rest coordinates [m].
@@ -132,29 +135,78 @@ def _filled(positions: Floats, there: NDArray[np.bool_], markers: Floats, longes
     for marker in np.flatnonzero(~there.all(axis=0)).tolist():
         seen = there[:, marker]
         spline = CubicSpline(index[seen], positions[seen, marker])
+        carried = _Carried(positions=positions, there=there, markers=markers, near=near[marker], marker=marker)
         for begin, end in _gaps(seen):
             inner = begin > 0 and end < len(seen)
             if (inner and end - begin <= longest) or there[begin:end].sum(axis=1).min() < _NEIGHBOURS:
                 whole[begin:end, marker] = spline(index[begin:end])
                 continue
-            ends = [frame for frame, real in ((begin - 1, begin > 0), (end, end < len(seen))) if real]
-            span = index[max(begin - 1, 0) : min(end, len(seen) - 1) + 1]
-            guess = np.stack([_carried(positions[k], there[k], markers, near[marker], marker) for k in span])
-            off = np.stack([positions[k, marker] - guess[k - span[0]] for k in ends])
-            # The offset at the ends changes evenly in between; beyond a single end it stays.
-            share = np.stack([np.interp(index[begin:end], ends, off[:, axis]) for axis in range(3)], axis=-1)
-            whole[begin:end, marker] = guess[index[begin:end] - span[0]] + share
+            gap = index[begin:end]
+            held = _across(positions[:, marker], seen, gap)
+            moved = _across(positions[:, marker] - carried.all, seen, gap) + carried.all[gap]
+            half = max(1, (end - begin + 1) // 2)
+            own = _swing(positions[:, marker], seen, half)
+            whole[gap, marker] = held if own <= _swing(positions[:, marker] - carried.all, seen, half) else moved
     return whole
 
 
-def _carried(frame: Floats, there: NDArray[np.bool_], markers: Floats, near: NDArray[np.int64], marker: int) -> Floats:
-    """(3,) where the quadratic map of the nearest tracked markers takes a marker [m]."""
-    chosen = near[there[near]][:_NEIGHBOURS]
-    arms = markers[chosen] - markers[marker]
-    u, v = (arms / np.abs(arms).max()).T
-    basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)
-    solved, *_ = np.linalg.lstsq(basis, frame[chosen], rcond=1e-3)
-    return solved[0]
+def _across(series: Floats, seen: NDArray[np.bool_], gap: NDArray[np.int64]) -> Floats:
+    """(gap, 3) of a series (frame, 3) in a gap: it changes evenly between its ends, and stays beyond a single one."""
+    ends = [frame for frame in (gap[0] - 1, gap[-1] + 1) if 0 <= frame < len(seen)]
+    return np.stack([np.interp(gap, ends, series[ends, axis]) for axis in range(3)], axis=-1)
+
+
+def _swing(series: Floats, seen: NDArray[np.bool_], half: int) -> float:
+    """Mean square by which a series (frame, 3) is off the mean of itself so many frames before and after.
+
+    It is what filling a gap of twice as many frames from its ends costs where the series is known; infinite where it
+    is known nowhere.
+    """
+    there = seen[: -2 * half] & seen[half:-half] & seen[2 * half :]
+    off = series[half:-half] - (series[: -2 * half] + series[2 * half :]) / 2
+    return float((off[there] ** 2).sum(axis=1).mean()) if there.any() else np.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Carried:
+    """Where the quadratic map of its nearest tracked neighbours takes a marker.
+
+    Attributes:
+        positions: (frame, marker, 3), NaN where not tracked [m].
+        there: (frame, marker) whether they were tracked.
+        markers: (marker, 2) rest coordinates [m].
+        near: the other markers, the nearest first.
+        marker: which.
+    """
+
+    positions: Floats
+    there: NDArray[np.bool_]
+    markers: Floats
+    near: NDArray[np.int64]
+    marker: int
+
+    @cached_property
+    def all(self) -> Floats:
+        """(frame, 3) [m]; not finite where hardly a marker was tracked."""
+        found = np.full((len(self.positions), 3), np.nan)
+        chosen = np.stack([self._chosen(frame) for frame in self.there])
+        for own in np.unique(chosen, axis=0):
+            if (own >= 0).all():
+                frames = (chosen == own).all(axis=1)
+                found[frames] = np.einsum("n,fnc->fc", self._weights(own), self.positions[frames][:, own])
+        return found
+
+    def _chosen(self, there: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """(neighbour,) those that tell where it is in a frame; −1 where too few were tracked."""
+        tracked = self.near[there[self.near]][:_NEIGHBOURS]
+        return tracked if len(tracked) == _NEIGHBOURS else np.full(_NEIGHBOURS, -1)
+
+    def _weights(self, chosen: NDArray[np.int64]) -> Floats:
+        """(neighbour,) by which their positions add up to the marker's."""
+        arms = self.markers[chosen] - self.markers[self.marker]
+        u, v = (arms / np.abs(arms).max()).T
+        basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)
+        return np.linalg.pinv(basis, rcond=1e-3)[0]
 
 
 def _gaps(seen: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -32,6 +32,28 @@ def test_a_recording_of_the_same_model_and_steps_is_predicted_without_error(
     assert float(errors.norm(dim=2).max()) < 2e-4
 
 
+def test_behind_a_gap_a_prediction_is_compared_from_the_third_tracked_frame_on(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
+    whole = Segments.of([own_recording])
+    marker, gap = len(own_recording.markers) - 1, slice(whole.first + 8, whole.first + 15)
+    seen = np.ones(own_recording.positions.shape[:2], dtype=bool)
+    seen[gap, marker] = False
+    filled = own_recording.positions.copy()
+    filled[gap, marker] += 0.05
+    segments = Segments.of([replace(own_recording, positions=filled, seen=seen)])
+    calibrations = [NOMINAL] * len(segments)
+    errors = forecaster.errors(*forecaster.system(segments, calibrations), segments)[..., 0]
+    counted = segments.counted
+    assert counted is not None
+    np.testing.assert_array_equal(np.flatnonzero(~counted[:, marker, 0]), np.arange(8, 17))
+    assert float(errors[8:17, marker].abs().max()) == 0.0
+    complete = forecaster.errors(*forecaster.system(whole, calibrations), whole)[..., 0]
+    # The free corner drifts off in the gap, by the velocity that it had; on its return nothing of that is compared.
+    assert float((errors - complete)[:8].abs().max()) < 1e-6
+    assert float(errors[17:, marker].norm(dim=-1).max()) < 5e-3
+
+
 def test_errors_are_observed_less_predicted(forecaster: Forecaster, own_recording: Trajectory) -> None:
     segments = Segments.of([own_recording])
     errors, predicted = forecaster.run(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)

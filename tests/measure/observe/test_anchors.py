@@ -29,6 +29,22 @@ def test_recordings_count_alike_whatever_their_length(specimen: Specimen) -> Non
     np.testing.assert_allclose(anchors_of(recordings, seats), expected, atol=1e-12)
 
 
+def test_what_was_filled_in_does_not_move_an_anchor(specimen: Specimen) -> None:
+    whole = flat(specimen, "a", np.zeros(3), 40)
+    corner = specimen.held[0]
+    seen = np.ones(whole.positions.shape[:2], dtype=bool)
+    seen[:20, corner] = False
+    # A swing of 40 frames: over the last half, in which the corner was tracked, it is −2/π cm on the average.
+    filled = whole.positions.copy()
+    filled[:20, corner] += 0.08
+    seats = specimen.mesh.rest[list(specimen.held)]
+    found = anchors_of([replace(whole, positions=filled, seen=seen)], seats)
+    plain = anchors_of([whole], seats)
+    np.testing.assert_allclose(
+        found - plain, [[0.0, whole.positions[20:, corner, 1].mean(), 0.0], [0.0, 0.0, 0.0]], atol=1e-12
+    )
+
+
 @pytest.mark.parametrize("told", [True, False])
 def test_what_is_told_stays(specimen: Specimen, told: bool) -> None:
     known = replace(specimen, anchors_told=told)

@@ -54,6 +54,19 @@ def test_what_is_filled_in_is_near_where_the_marker_was() -> None:
     assert np.linalg.norm(filled.positions[gone] - truth[gone], axis=1).max() < 0.03
 
 
+def test_a_marker_that_hardly_moves_is_held_through_a_long_gap() -> None:
+    times = np.arange(105) / 25.0
+    truth = flutter(REST, times)
+    still = 55  # held amid others that swing
+    truth[:, still] = truth[0, still] + 1e-3 * np.random.default_rng(3).standard_normal((len(times), 3))
+    positions = truth.copy()
+    positions[20:35, still] = np.nan
+    positions[95:, still] = np.nan
+    filled = fill_positions(positions, REST, period=0.04, where="here")
+    assert np.ptp(truth[:, [54, 56]], axis=0).max() > 0.1
+    assert np.linalg.norm(filled.positions[:, still] - truth[:, still], axis=1).max() < 8e-3
+
+
 @pytest.mark.parametrize(("rate", "frames"), [(10.0, 1), (25.0, 3), (100.0, 12), (500.0, 60)])
 def test_the_longest_gap_that_a_markers_own_motion_fills_is_of_seconds(rate: float, frames: int) -> None:
     assert frames_of(LONGEST, 1 / rate) == frames
