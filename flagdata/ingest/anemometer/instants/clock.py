@@ -140,13 +140,15 @@ def _length(steady: NDArray[np.bool_]) -> int:
 def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
     """Intervals by which the clock may have been set on: whole hours that chance does not explain, or years.
 
+    Of rows a day or more apart none is told: they keep whole days between them whatever the clock does.
+
     Args:
         time: (n,) instants in the order of the rows.
         returns: jumps back; an interval of the same size as one of them undoes it, however many others there are.
     """
     step = usual(time)
     steps = np.diff(time)
-    if step == 0:
+    if step == 0 or step >= 24 * HOUR:
         return ()
     undone = {-jump.size for jump in returns}
     wide = np.flatnonzero(steps > 1.5 * step)

@@ -59,3 +59,12 @@ def test_daily_values_of_a_weather_service_are_told_as_days(read: Read) -> None:
     log = read(f"# YYYYMMDD = Date\n# FG = Daily mean windspeed (in 0.1 m/s)\n#\n{names}{rows}")
     assert "published-table" in _kinds(log)
     assert "dates-alone" in _kinds(log)
+
+
+def test_days_at_uneven_intervals_are_no_clock_that_was_set(read: Read) -> None:
+    days = (4, 7, 12, 14, 18, 21, 25)  # three and a half days apart in the median
+    rows = "".join(f"6/{day}/18,{3 + day % 5}\n" for day in days)
+    log = read(f"date,avg wind\n{rows}", unit="mph", zone="UTC", date_order="mdy")
+    assert len(log.series.time) == len(days)
+    assert "dates-alone" in _kinds(log)
+    assert not {kind for kind in _kinds(log) if kind.startswith("clock-set")}
