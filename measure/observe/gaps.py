@@ -141,12 +141,11 @@ def _filled(positions: Floats, there: NDArray[np.bool_], markers: Floats, longes
             if (inner and end - begin <= longest) or there[begin:end].sum(axis=1).min() < _NEIGHBOURS:
                 whole[begin:end, marker] = spline(index[begin:end])
                 continue
-            gap = index[begin:end]
+            gap, half = index[begin:end], max(1, (end - begin + 1) // 2)
             held = _across(positions[:, marker], seen, gap)
             moved = _across(positions[:, marker] - carried.all, seen, gap) + carried.all[gap]
-            half = max(1, (end - begin + 1) // 2)
-            own = _swing(positions[:, marker], seen, half)
-            whole[gap, marker] = held if own <= _swing(positions[:, marker] - carried.all, seen, half) else moved
+            closer = _swing(positions[:, marker] - carried.all, half) < _swing(positions[:, marker], half)
+            whole[gap, marker] = moved if closer and np.isfinite(moved).all() else held
     return whole
 
 
@@ -156,15 +155,15 @@ def _across(series: Floats, seen: NDArray[np.bool_], gap: NDArray[np.int64]) -> 
     return np.stack([np.interp(gap, ends, series[ends, axis]) for axis in range(3)], axis=-1)
 
 
-def _swing(series: Floats, seen: NDArray[np.bool_], half: int) -> float:
+def _swing(series: Floats, half: int) -> float:
     """Mean square by which a series (frame, 3) is off the mean of itself so many frames before and after.
 
     It is what filling a gap of twice as many frames from its ends costs where the series is known; infinite where it
     is known nowhere.
     """
-    there = seen[: -2 * half] & seen[half:-half] & seen[2 * half :]
     off = series[half:-half] - (series[: -2 * half] + series[2 * half :]) / 2
-    return float((off[there] ** 2).sum(axis=1).mean()) if there.any() else np.inf
+    known = off[np.isfinite(off).all(axis=1)]
+    return float((known**2).sum(axis=1).mean()) if len(known) else np.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

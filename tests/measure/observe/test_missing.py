@@ -67,6 +67,18 @@ def test_a_marker_that_hardly_moves_is_held_through_a_long_gap() -> None:
     assert np.linalg.norm(filled.positions[:, still] - truth[:, still], axis=1).max() < 8e-3
 
 
+def test_a_long_gap_that_ends_among_hardly_a_marker_is_filled_all_the_same() -> None:
+    times = np.arange(105) / 25.0
+    truth = flutter(REST, times)
+    positions = truth.copy()
+    positions[20:35, 40] = np.nan
+    positions[[19, 35], 8:40] = np.nan
+    positions[[19, 35], 41:] = np.nan
+    filled = fill_positions(positions, REST, period=0.04, where="here")
+    assert np.isfinite(filled.positions).all()
+    np.testing.assert_array_equal(filled.positions[np.isfinite(positions)], truth[np.isfinite(positions)])
+
+
 @pytest.mark.parametrize(("rate", "frames"), [(10.0, 1), (25.0, 3), (100.0, 12), (500.0, 60)])
 def test_the_longest_gap_that_a_markers_own_motion_fills_is_of_seconds(rate: float, frames: int) -> None:
     assert frames_of(LONGEST, 1 / rate) == frames
