@@ -34,8 +34,8 @@ from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS, iso
 
-FEW = 10
-"""Rows, or a thousandth of all if that is more, that may be left out for wild stamps."""
+FEW, SHARE = 10, 4
+"""Rows, or a thousandth of all if that is more, that may be left out for wild stamps; no more than one in four."""
 SMALL = 60 * NANOSECONDS
 """A clock may be set back by any constant up to this where nothing else speaks for it."""
 AGAIN = 0.9
@@ -102,7 +102,7 @@ def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading
     lag = np.maximum.accumulate(reading.time) - reading.time
     if len(lag) == 0 or int(lag.max()) <= JITTER:
         return _late_rows_sorted(_steady(reading, choice))
-    few = max(FEW, len(reading.time) // 1000)
+    few = max(min(FEW, len(reading.time) // SHARE), len(reading.time) // 1000)
     jumps = clock.set_back(reading.time)
     wild = clock.excursions(reading.time, most=few) if len(jumps) <= few else np.zeros(len(lag), dtype=bool)
     settled = reading.take(~wild)

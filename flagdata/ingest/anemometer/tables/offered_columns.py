@@ -268,6 +268,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
                 continue
+            if kinds and kinds.count("text") > len(kinds) / 2:
+                continue  # it is headed as a quantity and holds words: the names may be shifted against the rows
             if heading.channel in COMPONENTS and _alone(layout, at):
                 # v_wind may be a speed (v, velocity), or the component towards the north
                 found |= {} if winds else {at: "?"}

@@ -197,3 +197,15 @@ def test_sorting_is_not_offered_for_a_stamp_far_from_all_others(read: Read) -> N
     minutes = [minute if row != 150 else -600_000 for row, minute in enumerate(UNEVEN)]
     finding = told(read(at_minutes(minutes, range(N)), zone="UTC"), "time-backwards")
     assert finding.fix is None
+
+
+def test_many_of_few_rows_out_of_order_are_not_left_out_but_the_way_to_sort_them_is_told(read: Read) -> None:
+    seconds = (100, 140, 180, 330, 370, 540, 550, 570, 220, 260, 410, 450, 490, 530, 590, 780, 30, 830, 70, 110)
+    rows = "".join(f"2026-05-01 11:{s // 60:02d}:{s % 60:02d},{3 + at % 5}.5\n" for at, s in enumerate(seconds))
+    text = f"time,wind speed (m/s)\n{rows}"
+    with pytest.raises(TimeError, match="8 rows would have to go") as caught:
+        read(text, zone="UTC")
+    assert "--clock sort" in caught.value.fix
+    found = read(text, zone="UTC", clock="sort")
+    assert len(found.series.time) == len(seconds)
+    assert bool((np.diff(found.series.time) > 0).all())

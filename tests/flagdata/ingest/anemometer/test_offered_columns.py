@@ -92,3 +92,14 @@ def test_names_of_stations_and_empty_columns_are_not_offered_as_weather(read: Re
         with pytest.raises(InputError) as caught:
             read(text)
         assert "temperature" not in (caught.value.fix or "")
+
+
+def test_a_column_that_is_headed_as_a_wind_and_holds_words_is_not_offered(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,OP,{9 + at % 4}.5,{7 + at % 3}.8\n" for at in range(12))
+    text = f"time,Wind Speed (m/s),Max Wind Speed (m/s),Min Wind Speed (m/s)\n{rows}"
+    with pytest.raises(InputError) as caught:
+        read(text)
+    (line,) = re.findall(r'--columns "([^"]*)"', caught.value.fix)
+    assert "2=wind_speed" not in line
+    found = read(text, columns="1=time,3=wind_speed[m/s]")
+    assert found.series.channels["wind_speed"][:2].tolist() == pytest.approx([9.5, 10.5])
