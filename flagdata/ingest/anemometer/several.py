@@ -32,8 +32,8 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
         if not guesses or guesses[0].format != "delimited" or guesses[0].recipe is not None:
             return ()
     proposal = drafted(source, options)
-    if proposal is None or proposal.unsure:
-        return ()  # which of them is a wind is the user's to say
+    if proposal is None or proposal.unsure or proposal.stretches:
+        return ()  # which of them is a wind, or when each began, is the user's to say
     labels = sites(source, proposal)
     if options.wind is not None:
         labels = site_labels.of_column(labels, options.wind)

@@ -34,7 +34,7 @@ from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout, lay_out
-from flagdata.ingest.anemometer.times import bare_dates
+from flagdata.ingest.anemometer.times import bare_dates, stretches
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
@@ -82,6 +82,7 @@ class Draft:
         parts: labels of the anemometers of one row, "" for one alone (see `site_labels.columns`).
         delimiter: of the cells.
         of_earth: whether the components of the wind are towards east (x) and north (y).
+        stretches: whether its sites follow one another, each with a count of time and a start of its own.
     """
 
     toml: str
@@ -96,6 +97,7 @@ class Draft:
     parts: tuple[str, ...] = ("",)
     delimiter: str = ","
     of_earth: bool = False
+    stretches: bool = False
 
 
 @lru_cache(maxsize=4)
@@ -170,6 +172,10 @@ def draft(
         known = ", ".join(labels) or "none"
         doubts.append(Doubt(what=f"no anemometer {wind!r} in the file", fix=f"name one of: {known}"))
     chosen = chosen or (winds[0] if winds else None)
+    anew: list[Doubt] = []
+    if time is not None and chosen is not None and (columns is None if mixed is None else wind is None):
+        anew = _stretches(layout, time, chosen)
+        doubts += anew
     if layout.short:
         shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
         warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
@@ -198,7 +204,7 @@ def draft(
         doubts=tuple(doubts), needs=needs_of(lines, layout, time),
         unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
-        of_earth=chosen is not None and chosen.of_earth,
+        of_earth=chosen is not None and chosen.of_earth, stretches=bool(anew),
     )  # fmt: skip
 
 
@@ -264,6 +270,18 @@ def _doubts(
         what += f"; {own}" if own else ""
         found.append(Doubt(what=what, fix=fix))
     return found
+
+
+def _stretches(layout: Layout, time: TimeChoice, wind: Wind) -> list[Doubt]:
+    """A doubt where a count of time starts again with each value of another column."""
+    if time.form is None or not counted.is_elapsed(time.form):
+        return []
+    site = stretches.column(layout, time.columns)
+    if site is None:
+        return []
+    what = f"the count of time starts again wherever {stated_columns.named(layout, site)} changes"
+    line = offered_columns.of_stretches(layout, time, wind, site)
+    return [Doubt(what=what, fix=f"read each stretch by itself, with its own start: {line}")]
 
 
 def _bare_dates(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.options import in_shell
 from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARDS, shown
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
@@ -212,6 +213,12 @@ def calibrated(layout: Layout, time: TimeChoice | None, column: int) -> str:
         f'--columns "{line}" with what one of them is in m/s in place of the ?, as wind_speed[0.765 m/s]; '
         "a calibration with an offset is a recipe's gain and offset"
     )
+
+
+def of_stretches(layout: Layout, time: TimeChoice, wind: Wind, site: int) -> str:
+    """The option that reads one of several stretches, which a column tells apart and each of which counts anew."""
+    entries = _understood(replace(layout, site=site), time, (wind,))
+    return f'--columns "{",".join(_numbered(entries))}" --wind {in_shell(layout.rows[0][site])} --start TIME'
 
 
 def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
