@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,23 +134,28 @@ def _filled(positions: Floats, there: NDArray[np.bool_], markers: Floats, longes
     for marker in np.flatnonzero(~there.all(axis=0)).tolist():
         seen = there[:, marker]
         spline = CubicSpline(index[seen], positions[seen, marker])
-        carried = _Carried(positions=positions, there=there, markers=markers, near=near[marker], marker=marker)
+        carried: Floats | None = None
         for begin, end in _gaps(seen):
             inner = begin > 0 and end < len(seen)
             if (inner and end - begin <= longest) or there[begin:end].sum(axis=1).min() < _NEIGHBOURS:
                 whole[begin:end, marker] = spline(index[begin:end])
                 continue
-            gap, half = index[begin:end], max(1, (end - begin + 1) // 2)
-            held = _across(positions[:, marker], seen, gap)
-            moved = _across(positions[:, marker] - carried.all, seen, gap) + carried.all[gap]
-            closer = _swing(positions[:, marker] - carried.all, half) < _swing(positions[:, marker], half)
-            whole[gap, marker] = moved if closer and np.isfinite(moved).all() else held
+            if carried is None:
+                carried = _carried(positions, there, markers, near[marker], marker)
+            whole[begin:end, marker] = _long_gap(positions[:, marker], carried, index[begin:end])
     return whole
 
 
-def _across(series: Floats, seen: NDArray[np.bool_], gap: NDArray[np.int64]) -> Floats:
+def _long_gap(own: Floats, carried: Floats, gap: NDArray[np.int64]) -> Floats:
+    """(gap, 3) of a marker (frame, 3), by its own places at the gap's ends or by where its neighbours take it."""
+    off, half = own - carried, max(1, (len(gap) + 1) // 2)
+    moved = _across(off, gap) + carried[gap]
+    return moved if _swing(off, half) < _swing(own, half) and np.isfinite(moved).all() else _across(own, gap)
+
+
+def _across(series: Floats, gap: NDArray[np.int64]) -> Floats:
     """(gap, 3) of a series (frame, 3) in a gap: it changes evenly between its ends, and stays beyond a single one."""
-    ends = [frame for frame in (gap[0] - 1, gap[-1] + 1) if 0 <= frame < len(seen)]
+    ends = [frame for frame in (gap[0] - 1, gap[-1] + 1) if 0 <= frame < len(series)]
     return np.stack([np.interp(gap, ends, series[ends, axis]) for axis in range(3)], axis=-1)
 
 
@@ -166,46 +170,34 @@ def _swing(series: Floats, half: int) -> float:
     return float((known**2).sum(axis=1).mean()) if len(known) else np.inf
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Carried:
-    """Where the quadratic map of its nearest tracked neighbours takes a marker.
+def _carried(
+    positions: Floats, there: NDArray[np.bool_], markers: Floats, near: NDArray[np.int64], marker: int
+) -> Floats:
+    """(frame, 3) where the quadratic map of its nearest tracked neighbours takes a marker [m].
 
-    Attributes:
-        positions: (frame, marker, 3), NaN where not tracked [m].
-        there: (frame, marker) whether they were tracked.
-        markers: (marker, 2) rest coordinates [m].
+    It is not finite in frames in which hardly a marker was tracked.
+
+    Args:
         near: the other markers, the nearest first.
-        marker: which.
     """
-
-    positions: Floats
-    there: NDArray[np.bool_]
-    markers: Floats
-    near: NDArray[np.int64]
-    marker: int
-
-    @cached_property
-    def all(self) -> Floats:
-        """(frame, 3) [m]; not finite where hardly a marker was tracked."""
-        found = np.full((len(self.positions), 3), np.nan)
-        chosen = np.stack([self._chosen(frame) for frame in self.there])
-        for own in np.unique(chosen, axis=0):
-            if (own >= 0).all():
-                frames = (chosen == own).all(axis=1)
-                found[frames] = np.einsum("n,fnc->fc", self._weights(own), self.positions[frames][:, own])
+    found = np.full((len(positions), 3), np.nan)
+    nearest = [near[seen[near]][:_NEIGHBOURS] for seen in there]
+    told = np.flatnonzero([len(own) == _NEIGHBOURS for own in nearest])
+    if not len(told):
         return found
+    kinds, kind = np.unique(np.stack([nearest[frame] for frame in told]), axis=0, return_inverse=True)
+    for place, own in enumerate(kinds):
+        frames = told[kind.ravel() == place]
+        weights = _weights(markers[own] - markers[marker])
+        found[frames] = np.einsum("n,fnc->fc", weights, positions[np.ix_(frames, own)])
+    return found
 
-    def _chosen(self, there: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """(neighbour,) those that tell where it is in a frame; −1 where too few were tracked."""
-        tracked = self.near[there[self.near]][:_NEIGHBOURS]
-        return tracked if len(tracked) == _NEIGHBOURS else np.full(_NEIGHBOURS, -1)
 
-    def _weights(self, chosen: NDArray[np.int64]) -> Floats:
-        """(neighbour,) by which their positions add up to the marker's."""
-        arms = self.markers[chosen] - self.markers[self.marker]
-        u, v = (arms / np.abs(arms).max()).T
-        basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)
-        return np.linalg.pinv(basis, rcond=1e-3)[0]
+def _weights(arms: Floats) -> Floats:
+    """(neighbour,) by which places add up to that of a marker, arms (neighbour, 2) from it [m]."""
+    u, v = (arms / np.abs(arms).max()).T
+    basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)
+    return np.linalg.pinv(basis, rcond=1e-3)[0]
 
 
 def _gaps(seen: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

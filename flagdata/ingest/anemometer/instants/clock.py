@@ -148,7 +148,7 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
     """
     step = usual(time)
     steps = np.diff(time)
-    if step == 0 or step >= 24 * HOUR:
+    if step == 0 or step >= DAY:
         return ()
     undone = {-jump.size for jump in returns}
     wide = np.flatnonzero(steps > 1.5 * step)

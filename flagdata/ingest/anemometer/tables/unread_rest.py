@@ -20,17 +20,33 @@ def remark(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], said:
         winds: all of the table, those that are not chosen too.
         said: messages about columns; a column whose quoted name is in one of them is not named again.
     """
+    found = not_told(layout, time, winds, said)
+    if not found:
+        return ()
+    names = listed(layout, found, most=_MOST)
+    return (f"columns {names} are not read" if len(found) > 1 else f"column {names} is not read",)
+
+
+def not_told(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], said: Collection[str]) -> list[int]:
+    """The columns that hold something, are read for nothing, and whose quoted name no message has."""
     taken = {column.index for one in winds for column in one.columns.values()}
     taken |= set(time.columns) if time is not None else set()
     taken |= {index for index in layout.unit_columns if index is not None}
     taken |= {one.site[0] for one in winds if one.site is not None}
-    found: list[str] = []
-    for index, name in enumerate(layout.names):
-        called = repr(name) if name else f"number {index + 1}"
-        held = any(cell_kind(cell) != "missing" for cell in layout.column(index))
-        if index not in taken and held and not any(called in message for message in said):
-            found.append(called)
-    if not found:
-        return ()
-    names = ", ".join(found[:_MOST]) + (f" and {len(found) - _MOST} more" if len(found) > _MOST else "")
-    return (f"columns {names} are not read" if len(found) > 1 else f"column {names} is not read",)
+    return [
+        index
+        for index in range(len(layout.names))
+        if index not in taken
+        and not any(_quoted(layout, index) in message for message in said)
+        and any(cell_kind(cell) != "missing" for cell in layout.column(index))
+    ]
+
+
+def listed(layout: Layout, indices: Sequence[int], *, most: int) -> str:
+    """The names of columns, quoted, up to so many; of more, the number."""
+    names = ", ".join(_quoted(layout, index) for index in indices[:most])
+    return f"{names} and {len(indices) - most} more" if len(indices) > most else names
+
+
+def _quoted(layout: Layout, index: int) -> str:
+    return repr(layout.names[index]) if layout.names[index] else f"number {index + 1}"

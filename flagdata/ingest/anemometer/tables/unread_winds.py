@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from flagdata.ingest.anemometer.tables import offered_columns
+from flagdata.ingest.anemometer.tables import offered_columns, unread_rest
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
@@ -46,24 +46,16 @@ def remark(
         winds: all of the table.
         remarks: what was said of columns already; those are not named again.
     """
-    taken = {column.index for one in winds for column in one.columns.values()}
-    taken |= {column.index for column in wind.columns.values()} if wind is not None else set()
-    taken |= set(own_motion.columns(layout))
-    taken |= set(time.columns) if time is not None else set()
-    taken |= {index for index in layout.unit_columns if index is not None}
-    taken |= {one.site[0] for one in winds if one.site is not None}
+    own = own_motion.columns(layout)
+    every = winds if wind is None else (*winds, wind)
     found = [
         index
-        for index, name in enumerate(layout.names)
-        if index not in taken
-        and _speaks_of_wind(layout, index)
-        and not any(repr(name) in said for said in remarks)
-        and any(cell_kind(cell) != "missing" for cell in layout.column(index))
+        for index in unread_rest.not_told(layout, time, every, remarks)
+        if index not in own and _speaks_of_wind(layout, index)
     ]
     if not found:
         return ()
-    names = ", ".join(repr(layout.names[index]) for index in found[:_MOST])
-    names += f" and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    names = unread_rest.listed(layout, found, most=_MOST)
     many = len(found) > 1
     what = f"columns {names} speak of the wind and are not read" if many else f"column {names} speaks of the wind"
     what += "" if many else " and is not read"
