@@ -68,7 +68,10 @@ from flagdata.errors import UsageError
     "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
 )
 @click.option("--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: order in dates of numbers only.")
-@click.option("--platform", type=click.Choice(["fixed", "moving"]), help="Wind: a mast, or a boat or vehicle.")
+@click.option(
+    "--platform", type=click.Choice(["fixed", "moving", "corrected"]),
+    help="Wind: a mast, a boat or vehicle, or one whose log holds the wind over ground.",
+)  # fmt: skip
 @click.option("--talker", metavar="ID", help="Wind: NMEA 0183 talker to read, where several share a stream.")
 @click.option(
     "--azimuth", type=float, metavar="DEG", help="Wind: bearing of the sensor's north or bow, clockwise from north."

@@ -55,6 +55,13 @@ def test_help_loads_neither_torch_nor_arrow_nor_a_decoder() -> None:
     assert done.stdout.splitlines()[-1] == "LOADED []"
 
 
+def test_the_package_runs_as_a_module() -> None:
+    run = (sys.executable, "-m", "flagdata", "ingest", "--no-such-option")
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("Usage: flagdata ingest")
+
+
 def test_physics_creates_no_random_generator_and_chooses_no_device() -> None:
     """Named streams and devices are chosen at the command line and handed down (style 9 and 10)."""
     offenders = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.restating.restate import restate
-from flagdata.ingest.anemometer.samples import platform, possible, quality, zero
+from flagdata.ingest.anemometer.samples import future, platform, possible, quality, zero
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.sniff import unknown
 from flagdata.ingest.anemometer.sniffing import SURE
@@ -83,6 +84,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         reading = reading.with_findings(zones.contradiction(says, statement.name, options.zone, reading.time))
     if "platform" not in reader.uses:
         reading = platform.settle(reading, options.platform, where=str(path))
+    platform.check_corrected(reading, options.platform, where=str(path))
     reading = reading.with_findings(source.findings)
     if len(reading.time) == 0:
         raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
@@ -92,7 +94,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     reading = zero.settle(possible.impossible(ordered), choice)
     for check in (quality.faults, quality.negative, quality.dead_zone, quality.idle, quality.stale, quality.at_nyquist):
         reading = _apply(reading, check)
-    findings = (*reading.findings, *quality.gaps(reading))
+    findings = (*reading.findings, *quality.gaps(reading), *future.report(reading, now=time.time_ns()))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,

@@ -50,7 +50,8 @@ class WindOptions:
         date: of the first sentence, for streams that carry the time of day alone.
         date_order: "dmy", "mdy" or "ymd" for dates that are written with numbers only; `None` decides by evidence or
             refuses.
-        platform: "fixed" for a mast, "moving" for a boat or vehicle; `None` where the log shows it or does not need it.
+        platform: "fixed" for a mast, "moving" for a boat or vehicle, "corrected" for one whose log holds wind over
+            ground; `None` where the log shows it or does not need it.
         talker: NMEA talker whose wind is read, for streams with several instruments.
         azimuth: of the sensor's own north or bow [rad, clockwise from true north]; without it a sensor-relative
             direction stays sensor-relative.
@@ -71,7 +72,7 @@ class WindOptions:
     encoding: str | None = None
     date: dt.date | None = None
     date_order: Literal["dmy", "mdy", "ymd"] | None = None
-    platform: Literal["fixed", "moving"] | None = None
+    platform: Literal["fixed", "moving", "corrected"] | None = None
     talker: str | None = None
     azimuth: float | None = None
     clock: ClockChoice | None = None
@@ -86,8 +87,9 @@ class WindOptions:
     def __post_init__(self) -> None:
         if self.date_order not in (None, "dmy", "mdy", "ymd"):
             raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy, mdy or ymd")
-        if self.platform not in (None, "fixed", "moving"):
-            raise UsageError(f"platform {self.platform!r}", where="platform", fix="give fixed or moving")
+        if self.platform not in (None, "fixed", "moving", "corrected"):
+            fix = "give fixed, moving or corrected"
+            raise UsageError(f"platform {self.platform!r}", where="platform", fix=fix)
         if self.clock not in (None, "first", "last", "sort"):
             raise UsageError(f"clock {self.clock!r}", where="clock", fix="give first or last, or sort")
         if self.azimuth is not None and not -7.0 < self.azimuth < 7.0:

@@ -147,6 +147,12 @@ def as_table(source: TextFile) -> TableText | None:
     return TableText.of(source, lines, found)
 
 
+def members(text: str) -> dict[str, str] | None:
+    """The members of an object as JSON or Python prints it, by their joined keys; `None` where a text is none."""
+    found = _object(text.strip())
+    return None if found is None else _flat(found)
+
+
 def _of_all(whole: Any) -> dict[str, Any]:
     """The members of an object, or those that all objects of a list have in common."""
     if isinstance(whole, dict):

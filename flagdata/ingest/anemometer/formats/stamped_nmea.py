@@ -15,6 +15,7 @@ import numpy as np
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats import receiver_clock
 from flagdata.ingest.anemometer.formats.nmea import WINDS, Nmea
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, split
 from flagdata.ingest.anemometer.formats.serial_lines import split_stamp, stamps_of
@@ -51,12 +52,15 @@ class StampedNmea:
         where = str(source.path)
         line: list[int] = []
         texts: list[str] = []
+        marks: list[tuple[int, int]] = []
         for first, lines in source.blocks():
             for number, text in enumerate(lines, start=first):
                 stamp, raw = split_stamp(text)
                 if stamp and raw.startswith(("$", "!")):
                     line.append(number)
                     texts.append(stamp)
+                    said = receiver_clock.mark(raw)
+                    marks += [] if said is None else [(number, said)]
         if not line:
             raise InputError("no NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as")
         stamps = stamps_of(texts)
@@ -82,7 +86,7 @@ class StampedNmea:
             time=np.array([at[number] for number in reading.line.tolist()], dtype=np.int64),
             flags=reading.flags & ~np.uint16(SampleFlag.TIME_UNSURE),
             step=stamps.step,
-            findings=(*found, *kept),
+            findings=(*found, *kept, *receiver_clock.report(at, marks)),
         )
 
 

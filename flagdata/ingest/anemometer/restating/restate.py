@@ -44,6 +44,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.broken_headings",
     "flagdata.ingest.anemometer.restating.line_breaks",
     "flagdata.ingest.anemometer.restating.quoted_commas",
+    "flagdata.ingest.anemometer.restating.objects_in_cells",
     "flagdata.ingest.anemometer.restating.wrapped",
     "flagdata.ingest.anemometer.restating.two_in_a_cell",
     "flagdata.ingest.anemometer.restating.influx",

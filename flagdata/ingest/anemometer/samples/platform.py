@@ -1,7 +1,8 @@
 """What the anemometer stands on: on a mast the air past it is the wind, on a boat or vehicle it is not.
 
 Formats that know nothing of platforms deliver `wind_speed` for whatever the sensor read. Where the user says that the
-platform moves, or its own speed or position says so, that becomes `apparent_wind_speed`, which is no ground truth.
+platform moves, or its own speed or position says so, that becomes `apparent_wind_speed`, which is no ground truth,
+unless the user says that the platform's motion was taken out before the wind was logged ("corrected").
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.units import UNITS
 
-Platform: TypeAlias = Literal["fixed", "moving"]
+Platform: TypeAlias = Literal["fixed", "moving", "corrected"]
 MOVING = 0.5
 """Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
 RANGE = 100.0
@@ -107,9 +108,13 @@ def settle(
         if shown is not None:
             raise InputError(
                 f"the platform was said to be fixed, but {shown.text}", where=where,
-                fix="say --platform moving: its wind is then apparent wind",
+                fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
+                "computed from a moving platform: --platform corrected",
             )  # fmt: skip
         return _fixed(reading)
+    if told == "corrected":
+        text = "wind over ground was computed from a moving platform's motion before it was logged, as told"
+        return reading.with_findings((Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),))
     if told is None and shown is None:
         return _of_unknown(reading)
     if {"wind_speed", "apparent_wind_speed"} <= set(reading.channels):
@@ -125,10 +130,20 @@ def settle(
         text += ", its direction as one from the bow"
     finding = Finding(
         kind="apparent-wind-only", severity=Severity.WARNING, value=shown.speed if shown else None, what=text,
-        fix=None if told else "if the log's wind is over ground all the same, leave position and speed out of its file",
+        fix=None if told else "if the log's wind is over ground all the same, say so: --platform corrected",
     )  # fmt: skip
     channels = {_RENAMED[name] if name in names else name: values for name, values in reading.channels.items()}
     return replace(reading, channels=channels).with_findings((finding,))
+
+
+def check_corrected(reading: Reading, told: Platform | None, *, where: str) -> None:
+    """Raises InputError where the platform's motion is said to have been taken out, and no wind is over ground."""
+    if told != "corrected" or "wind_speed" in reading.channels or {"wind_x", "wind_y"} <= set(reading.channels):
+        return
+    raise InputError(
+        "no wind over ground in the log, which was said to be corrected for its platform's motion", where=where,
+        fix="say --platform moving: its wind is then apparent wind",
+    )  # fmt: skip
 
 
 def _fixed(reading: Reading) -> Reading:

@@ -17,6 +17,7 @@ from flagdata.ingest.anemometer.instants import counted, yearless
 from flagdata.ingest.anemometer.options import in_shell
 from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.tables import (
+    against_components,
     beside_components,
     offered_columns,
     quality_columns,
@@ -45,7 +46,7 @@ from flagdata.ingest.anemometer.winds.instruments import (
     find_winds,
     named_wind,
 )
-from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts
+from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts, of_no_mean
 from flagdata.ingest.anemometer.winds.row_units import mixed_units
 from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
 from flagdata.ingest.anemometer.words import ghcn
@@ -176,6 +177,9 @@ def draft(
     if time is not None and chosen is not None and (columns is None if mixed is None else wind is None):
         anew = _stretches(layout, time, chosen)
         doubts += anew
+    if columns is None and time is not None and chosen is not None:
+        turned = against_components.doubt(layout, time, chosen)
+        doubts += [] if turned is None else [Doubt(what=turned[0], fix=turned[1])]
     if layout.short:
         shown = f"line {layout.preamble + 1} names {layout.short} of {layout.number_of_columns()} columns"
         warnings = (*warnings, f"{shown}: taken as the first {layout.short}")
@@ -191,6 +195,7 @@ def draft(
     if columns is None and chosen is not None:
         taken = {*of_time, *(column.index for one in winds for column in one.columns.values())}
         warnings = (*warnings, *quality_columns.warnings(layout, taken=taken))
+        warnings += against_components.warnings(layout, chosen) if "wind_x" in chosen.columns else ()
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
         remarks = (*remarks, *unread.otherwise(layout, time, chosen), *beside_components.remark(layout, time, chosen))
@@ -248,8 +253,8 @@ def _doubts(
             fix = f"if column {only + 1}, the only one of numbers, is the wind's speed: --wind {name} --unit m/s"
             fix += " (or its unit)"
         fix += "" if time is None or time.counts else f"; or {offered_columns.offer(layout, time, winds)}"
-        own = own_motion.doubt(layout)
-        what = f"no column is surely a wind; {f'{own}; ' if own else ''}the columns are {names}"
+        beside = "".join(f"{said}; " for said in (own_motion.doubt(layout), of_no_mean(layout)) if said)
+        what = f"no column is surely a wind; {beside}the columns are {names}"
         found.append(Doubt(what=what, fix=fix))
     for wind in winds if chosen is None else (chosen,):
         changing = mixed_units(layout, next(iter(wind.columns.values())).index)
@@ -339,8 +344,8 @@ def _unit_doubt(
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
         return Doubt(what=what, fix=fix + offered_columns.calibrated(layout, time, column))
     value = numbers(layout.column(column), decimal=layout.decimal).value
-    if missing[0] == "wind_speed" and cumulated.grows(value):
-        what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {cumulated.WHAT}"
+    if missing[0] == "wind_speed" and (unlike := cumulated.unlike_speed(value)):
+        what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {unlike}"
         fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"
         return Doubt(what=what, fix=fix)
     if layout.names[column] in ghcn.ELEMENTS:

@@ -18,7 +18,7 @@ from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.winds import beside, bow, own_motion
+from flagdata.ingest.anemometer.winds import beside, bow, own_motion, vectors
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
 from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, WEATHER, Column, Wind
@@ -150,6 +150,11 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
     if layout.site is None and others:
         said.append("if the rows of a date are of several stations, name the column that tells them apart as site")
     return "; ".join([*said, "else export the log with the time of each row"])
+
+
+def read_as(layout: Layout, time: TimeChoice, wind: Wind) -> str:
+    """The option that reads a table as it was understood."""
+    return f'--columns "{",".join(_numbered(_understood(layout, time, (wind,))))}"'
 
 
 def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None) -> str:
@@ -289,12 +294,20 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             continue
         elif may_be_direction(layout, at) and not any("wind_direction" in entry for entry in found.values()):
             channel = "apparent_wind_direction" if bow.to_bow(layout, at) else "wind_direction"
+            channel = TOWARDS if channel == "wind_direction" and _blows_to(layout, at) else channel
             found[at] = channel if compass_unit(layout, at) else f"{channel}[deg]"
         elif (not winds and {"number", "stamp"} & set(kinds)) or (
             not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
         ):
             found[at] = "?"
     return found
+
+
+def _blows_to(layout: Layout, index: int) -> bool:
+    """Whether columns of a speed and its components say that a column of angles is where the wind blows to."""
+    speeds = [at for at in range(layout.number_of_columns()) if beside.direction_of(layout, at) == index]
+    found = [vectors.beside(layout, speed, index) for speed in speeds]
+    return any(one is not None and one.opposite for one in found)
 
 
 def _stamped(layout: Layout) -> int | None:

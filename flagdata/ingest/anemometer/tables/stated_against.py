@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from flagdata.ingest.anemometer.tables import against_components
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds import bow, own_motion
 from flagdata.ingest.anemometer.winds.instruments import Wind
+from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
+from flagdata.ingest.anemometer.words.headings import words_of
+
+_EXTREMES = GUSTS | MAXIMA | MINIMA | {"peak", "lull"}
 
 
 def warnings(layout: Layout, wind: Wind) -> tuple[str, ...]:
-    """A warning where the platform moves below a wind over ground, and where its direction is one to the bow."""
-    found: list[str] = []
+    """A warning where the platform moves below a wind over ground, and of a direction that others speak against."""
+    found: list[str] = [*against_components.warnings(layout, wind)]
     speed, direction = wind.columns.get("wind_speed"), wind.columns.get("wind_direction")
     stated = {layout.names[column.index] for column in wind.columns.values()}
+    if speed is not None and set(words_of(layout.names[speed.index])) & _EXTREMES:
+        found.append(
+            f"column {layout.names[speed.index]!r} holds gusts or extremes by its heading: stored as wind_speed, as "
+            "you said, though it is no mean"
+        )
     vessel = own_motion.vessel(layout)
     if speed is not None and vessel and vessel not in stated:
         found.append(

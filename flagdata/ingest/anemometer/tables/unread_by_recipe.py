@@ -1,4 +1,4 @@
-"""Columns of the wind that a recipe of the catalog does not read: told as of a table that is read without one."""
+"""Columns that a recipe of the catalog does not read: told as of a table that is read without one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
-from flagdata.ingest.anemometer.tables import unread, unread_winds
+from flagdata.ingest.anemometer.tables import unread, unread_rest, unread_winds
 from flagdata.ingest.anemometer.text.layout import Layout, lay_out
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.ingest.anemometer.times.timecolumns import find_time
@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer.words.headings import interest
 
 
 def remarks(source: TextFile, recipe: Recipe, *, devices_by: int | None = None) -> tuple[str, ...]:
-    """A remark for each kind of column that speaks of the wind, with the line that reads it; none where all are read.
+    """A remark for each kind of column of the wind that is not read, with the line that reads it, and one for the rest.
 
     Args:
         recipe: that the file was read by.
@@ -34,7 +34,8 @@ def remarks(source: TextFile, recipe: Recipe, *, devices_by: int | None = None) 
     time = find_time(layout)
     wind = Wind(label=recipe.name, height=None, columns=columns, sure=True)
     found = unread.directions(layout, time, wind, (wind,), ())
-    return (*found, *unread_winds.remark(layout, time, wind, (wind,), found))
+    found = (*found, *unread_winds.remark(layout, time, wind, (wind,), found))
+    return (*found, *unread_rest.remark(layout, time, (wind,), found))
 
 
 def _index(layout: Layout, column: str | int) -> int | None:

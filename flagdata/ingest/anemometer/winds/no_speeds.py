@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 
@@ -39,3 +41,25 @@ def counts(layout: Layout) -> tuple[int, ...]:
         ):
             found.append(index)
     return tuple(found)
+
+
+def of_no_mean(layout: Layout) -> str:
+    """Why columns with the heading of a wind's speed are not it: words, or gusts and statistics; "" for no such."""
+    words: list[str] = []
+    others: list[str] = []
+    for index, name in enumerate(layout.names):
+        heading = understand(name, layout.units[index])
+        kinds = {cell_kind(cell) for cell in layout.column(index)} - {"missing"}
+        if heading.quantity == "wind_speed" and heading.spread and "number" in kinds:
+            others.append(name)
+        elif heading.quantity == "wind_speed" and kinds == {"text"}:
+            words.append(name)
+    return "; ".join([
+        *([f"{_listed(words)} no numbers in the first rows"] if words else []),
+        *([f"{_listed(others)} gusts, extremes or another statistic by the heading"] if others else []),
+    ])  # fmt: skip
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(map(repr, names))
+    return f"columns {shown} hold" if len(names) > 1 else f"column {shown} holds"

@@ -146,3 +146,15 @@ def test_every_format_takes_a_platform(read: Read) -> None:
     found = read(TOA5 + rows, platform="moving", zone="UTC")
     assert found.format == "toa5"
     assert "apparent_wind_speed" in found.series.channels
+
+
+def test_wind_over_ground_from_a_platform_that_moves_is_taken_by_its_users_word(read: Read) -> None:
+    log = read(track(2000), platform="corrected")
+    assert "wind_speed" in log.series.channels
+    assert "computed-true-wind" in [finding.kind for finding in log.findings]
+
+
+@pytest.mark.parametrize("text", ["time,AWS (m/s),AWA (deg)\n2026-05-01T12:00:00Z,3,40\n2026-05-01T12:00:01Z,4,41\n"])
+def test_apparent_wind_alone_is_no_corrected_wind(read: Read, text: str) -> None:
+    with pytest.raises(InputError, match="no wind over ground in the log"):
+        read(text, platform="corrected")

@@ -38,6 +38,13 @@ def _told(log: WindLog) -> str:
     return "; ".join(finding.what for finding in log.findings if finding.kind == "columns-not-read")
 
 
+def test_columns_of_no_wind_that_a_recipe_leaves_are_named_too(log_file: Write) -> None:
+    names, *rows = _TABLE.splitlines()
+    table = "\n".join([f"{names},Battery,Note", *(f"{row},12.{at},ok" for at, row in enumerate(rows)), ""])
+    told = _told(read_log(log_file(table), WindOptions(zone="UTC")))
+    assert "columns 'Battery', 'Note' are not read" in told
+
+
 def test_columns_that_a_recipe_of_the_catalog_leaves_are_told_and_the_lines_read_them(log_file: Write) -> None:
     path = log_file(_TABLE)
     told = _told(read_log(path, WindOptions(zone="UTC")))
