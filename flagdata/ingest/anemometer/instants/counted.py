@@ -4,6 +4,7 @@ times of day whose date the user gives.
     epoch-us, epoch-ns          Unix time
     excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall clock
     datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
+    decimal-years               years with their passed share as a fraction, of the wall clock
     elapsed-s, -ms, -us, -min, -h, -d   since a start that the user gives; a counter of 32 bits in ms or us may run over
     %H:%M:%S and the like       of the day that the user gives, and those that follow
     %b %d %H:%M and the like    of the year of that day (see `yearless`)
@@ -30,7 +31,9 @@ from flagdata.timebase import NANOSECONDS, iso
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}
 """Number of the day 1970-01-01."""
-WORDS = {"excel": "excel-days", "excel-day": "excel-days", "matlab": "datenum"}
+_YEARS = "decimal-years"
+_FIRST_YEAR, _LAST_YEAR = 1990, 2100
+WORDS = {"years": _YEARS, "excel": "excel-days", "excel-day": "excel-days", "matlab": "datenum"}
 """Other words for formats of this module."""
 _ELAPSED = {
     "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": 60 * NANOSECONDS,
@@ -41,12 +44,14 @@ _LONG = ("elapsed-min", "elapsed-h", "elapsed-d")
 _OVERFLOW = {"elapsed-ms": 2**32 * 1_000_000, "elapsed-us": 2**32 * 1_000}
 UNITS = tuple(_ELAPSED)
 """Formats of counts since a start."""
-FORMS = (*_EPOCH, *_SERIAL, *_ELAPSED)
+FORMS = (*_EPOCH, *_SERIAL, _YEARS, *_ELAPSED)
 """Formats of this module that are names."""
 
 
 def serial_days(value: NDArray[np.float64]) -> str | None:
-    """The format of serial days that numbers are likely in: they rise by fractions of a day; `None` for no such.
+    """The format of serial days or decimal years that numbers are likely in, of which they rise by fractions.
+
+    `None` for no such.
 
     Args:
         value: (n,) of the rows.
@@ -56,8 +61,17 @@ def serial_days(value: NDArray[np.float64]) -> str | None:
         return None
     if float(np.median(steps)) > 0.5:  # seconds of the day rise by one
         return None
-    bounds = ((form, day + 7_305, day + 47_482) for form, day in _SERIAL.items())
+    bounds = [(form, day + 7_305, day + 47_482) for form, day in _SERIAL.items()]
+    bounds.append((_YEARS, _FIRST_YEAR - 1, _LAST_YEAR))
     return next((form for form, low, high in bounds if bool(np.all((value > low) & (value < high)))), None)
+
+
+def _of_years(value: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Nanoseconds since 1970 of decimal years, to the second: a double holds them to 15 us, tables to half a minute."""
+    year = np.floor(value).astype(np.int64)
+    begin = (year - 1970).astype("datetime64[Y]").astype("datetime64[s]").astype(np.int64)
+    end = (year - 1969).astype("datetime64[Y]").astype("datetime64[s]").astype(np.int64)
+    return (begin + np.round((value - year) * (end - begin)).astype(np.int64)) * NANOSECONDS
 
 
 def is_elapsed(form: str) -> bool:
@@ -129,6 +143,11 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
         if step > 1_000_000 and bool(np.all(np.abs(ns - minute) <= step)):
             ns = minute  # minutes and hours are no decimal fractions of a day
         return Stamps(ns=ns, utc=none, valid=valid, distant=none.copy(), step=step)
+    if form == _YEARS:
+        valid = valid & (value >= _FIRST_YEAR) & (value < _LAST_YEAR)
+        return Stamps(
+            ns=_of_years(np.where(valid, value, 1990.0)), utc=none, valid=valid, distant=none.copy(), step=NANOSECONDS
+        )
     scale = _ELAPSED[form]
     valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)  # ten years
     ns = np.round(np.where(valid, value, 0.0) * scale).astype(np.int64)

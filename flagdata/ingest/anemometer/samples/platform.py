@@ -114,6 +114,10 @@ def settle(
         return _fixed(reading)
     if told == "corrected":
         text = "wind over ground was computed from a moving platform's motion before it was logged, as told"
+        if "wind_speed" not in reading.channels and "theoretical_wind_speed" in reading.channels:
+            text += "; what the file calls true wind is kept as wind_speed"
+            names = {"theoretical_wind_speed": "wind_speed"}
+            reading = replace(reading, channels={names.get(n, n): v for n, v in reading.channels.items()})
         return reading.with_findings((Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),))
     if told is None and shown is None:
         return _of_unknown(reading)
@@ -158,7 +162,17 @@ def _fixed(reading: Reading) -> Reading:
 
 
 def _of_unknown(reading: Reading) -> Reading:
-    if "wind_speed" in reading.channels or "apparent_wind_speed" not in reading.channels:
+    if "wind_speed" in reading.channels:
+        return reading
+    if "theoretical_wind_speed" in reading.channels:
+        finding = Finding(
+            kind="apparent-wind-only", severity=Severity.WARNING,
+            what="wind that is computed as if its platform stood still (true wind, TWS): no ground truth",
+            fix="if it is wind over ground, computed with the platform's speed and heading, say so: "
+            "--platform corrected",
+        )  # fmt: skip
+        return reading.with_findings((finding,))
+    if "apparent_wind_speed" not in reading.channels:
         return reading
     finding = Finding(
         kind="apparent-wind-only", severity=Severity.WARNING,

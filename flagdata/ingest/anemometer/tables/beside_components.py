@@ -1,4 +1,4 @@
-"""A direction, and the speed that belongs to it, which are left out beside components: told with the line for them."""
+"""Components beside a speed and a direction: what is left out of the two ways to tell a wind, with the line for it."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from flagdata.ingest.anemometer.words.headings import understand
 
 _CLOSE, _LEAST = 0.05, 0.05
 """Share of a speed, and m/s or the like, within which the components of a row make it."""
+_UPWARD, _ROWS = 0.02, 5
+"""Share of a speed by which the vertical wind lengthens it, in so many rows at least, so that it is told."""
 _MOST = 0.8
 """Share of the rows in which they must."""
 
@@ -44,6 +46,43 @@ def remark(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str, ..
         f"column {layout.names[speed]!r} is the speed that {layout.names[x.index]!r} and {layout.names[y.index]!r} make"
     )
     return (f"{what}, and is left out too; to read it with {name!r} in place of the components: {line}",)
+
+
+def instead(layout: Layout, time: TimeChoice | None, wind: Wind) -> tuple[str, ...]:
+    """The line that reads the components of a speed in its place; none where they are read, or there are none."""
+    speed, parts = wind.columns.get("wind_speed"), _parts(layout)
+    if time is None or speed is None or "wind_x" not in parts or "wind_y" not in parts:
+        return ()
+    others = {name: column for name, column in wind.columns.items() if not name.startswith("wind_")}
+    columns = {name: Column(index=at, unit=speed.unit, told="") for name, at in parts.items()}
+    line = offered_columns.read_as(layout, time, replace(wind, columns={**columns, **others}))
+    names = ", ".join(repr(layout.names[at]) for at in parts.values())
+    return (f"to read the components {names} in place of {layout.names[speed.index]!r}: {line}",)
+
+
+def lengths(layout: Layout, wind: Wind) -> tuple[str, ...]:
+    """A warning where a speed is the length of three components, so that it is no horizontal one."""
+    speed, parts = wind.columns.get("wind_speed"), _parts(layout)
+    if speed is None or set(parts) != {"wind_x", "wind_y", "wind_z"}:
+        return ()
+    value, x, y, z = (numbers(layout.column(at), decimal=layout.decimal).value for at in (speed.index, *parts.values()))
+    flat, whole = np.hypot(x, y), np.sqrt(x**2 + y**2 + z**2)
+    known = np.isfinite(value) & np.isfinite(whole) & (whole - flat > _UPWARD * whole)
+    off = np.abs(np.stack([value - whole, value - flat]))[:, known]
+    if (
+        int(known.sum()) < _ROWS
+        or float((off[0] < off[1]).mean()) < _MOST
+        or float(np.median(off[0] / whole[known])) > 0.01
+    ):
+        return ()
+    names = ", ".join(repr(layout.names[at]) for at in parts.values())
+    return (f"column {layout.names[speed.index]!r} is the length of {names}: the vertical wind is in it",)
+
+
+def _parts(layout: Layout) -> dict[str, int]:
+    """The columns of components by channel, where one column is each."""
+    channels = [understand(name, unit).channel for name, unit in zip(layout.names, layout.units, strict=True)]
+    return {name: channels.index(name) for name in ("wind_x", "wind_y", "wind_z") if channels.count(name) == 1}
 
 
 def _is_direction(layout: Layout, index: int) -> bool:

@@ -199,6 +199,8 @@ def draft(
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
         remarks = (*remarks, *unread.otherwise(layout, time, chosen), *beside_components.remark(layout, time, chosen))
+        remarks = (*remarks, *beside_components.instead(layout, time, chosen))
+        warnings = (*warnings, *beside_components.lengths(layout, chosen))
         remarks = (*remarks, *own_motion.remarks(layout), *(unread.times(layout, time, remarks) if time else ()))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     remarks = (*remarks, *unread_rest.remark(layout, time, winds, (*layout.strange, *remarks, *warnings)))

@@ -71,8 +71,11 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         counts = f"; where column {steady + 1} is the time since a start, write {units} in time[?] and add --start TIME"
         further = counts + further
     if serial is not None and f"time[{serial}]" in known.values():
-        since = "1899-12-30, as Excel counts them" if serial == "excel-days" else "year 0, as MATLAB counts them"
-        further = f"; column 1 rises as days since {since}: write another format in its place where it is none{further}"
+        rises = {
+            "excel-days": "days since 1899-12-30, as Excel counts them,",
+            "datenum": "days since year 0, as MATLAB counts them,", "decimal-years": "years with a fraction",
+        }[serial]  # fmt: skip
+        further = f"; column 1 rises as {rises} do: write another format in its place where it is none{further}"
     return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
 
 

@@ -369,6 +369,10 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if _hours_of_a_day(words, name, texts, value):
         yield time_choice(layout, (index,), "elapsed-h", counted.parse(texts, "elapsed-h"), 0.1)
         return
+    serial = counted.serial_days(value)
+    if serial == "decimal-years" and (set(words) & _YEARS_AND_PARTS or names_time(name)):
+        yield time_choice(layout, (index,), serial, counted.parse(texts, serial), 1.5)
+        return
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
@@ -420,6 +424,7 @@ _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
 _YEAR_AND_DAY = frozenset({"date", "yyddd", "yrdoy", "yydoy"})
 """Words above a year of two digits and the day of it in one number, as tables of crop models have them (DSSAT)."""
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
+_YEARS_AND_PARTS = frozenset({"decimal", "decyear", "dyear", "decdate", "decimalyear", "decimaldate"})
 _HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
 _SLOW = 5000.0
 """Steps of a count from which it is as likely of microseconds as of milliseconds."""

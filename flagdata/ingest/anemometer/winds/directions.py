@@ -67,7 +67,7 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
     if heading.unit in (None, "deg") and low >= 0 and high <= 16 and whole and several:
         return Judged(
             left_out=f"holds sectors of the compass (0 to {high:g}), no angle; left out; they may be the sixteen from "
-            "north on, counted from 0, or tens of degrees",
+            "north on, counted from 0, or tens of degrees; where they begin elsewhere, a recipe's offset turns them",
             may_be=("sixteenths", "10 deg", "deg"),
         )
     if heading.misstated:

@@ -88,7 +88,7 @@ _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
 _RATE = re.compile(r"(?<![\d.])\d+(?:\.\d+)?\s?k?Hz(?![^\W_])", re.IGNORECASE)
 """The rate of samples in a heading ("u_20Hz"), which is no unit."""
 _OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
-_GLUED = re.compile(r"(?:speed|velocity|wind|gust)(?P<unit>km[/._]h|m[/._]s)$", re.IGNORECASE)
+_GLUED = re.compile(r"(?:speed|velocity|wind|gust)(?P<unit>km[/._]h|m[/._]s|km/?ph|miles)$", re.IGNORECASE)
 _U_SONIC = re.compile(r"\bu[- ]?sonic\b", re.IGNORECASE)  # an ultrasonic anemometer, as METOS writes; no component u
 """How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
 _TENFOLD = re.compile(r"(?:(?<=[\W_])|(?<=\d))[x×*]\s?(?P<factor>100?)\b", re.IGNORECASE)
@@ -319,8 +319,10 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
     if mangled is not None and (inside := _known(mangled[1].replace(".1", "-1").replace(".", "/"))) is not None:
         return text[: mangled.start()], inside
     glued = _GLUED.search(text)
-    if glued is not None and (inside := _known(re.sub(r"[._]", "/", glued["unit"]))) is not None:
-        return text[: glued.start("unit")], inside
+    if glued is not None:
+        spelt = re.sub(r"[._]", "/", glued["unit"]).lower().replace("miles", "mph").replace("km/ph", "km/h")
+        if (inside := _known(spelt)) is not None:
+            return text[: glued.start("unit")], inside
     pieces = re.split(r"(\s*,\s*|\s+|_|;|:|-(?=[a-zA-Z]))", text)
     for count in (5, 3, 1):
         # At the end ("wind_speed_km_h", "Wind Speed, m/s") and at the beginning ("m/s Wind Speed").

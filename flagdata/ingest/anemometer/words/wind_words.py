@@ -72,8 +72,8 @@ PLAIN = frozenset(
         "sensor", "value", "instant", "instantaneous", "inst", "current", "latest", "horizontal", "hor", "data",
         "measured", "raw", "the", "of", "in", "s", "wvt", "d", "u", "at", "ch", "channel", "sonic", "anemometer",
         "anem", "smp", "true", "mag", "magnetic", "outdoor", "out", "from", "north", "wind", "cup", "vane", "station",
-        "spd", "reading", "now", "degrees", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps", "kmh",
-        "do", "da", "dello", "della", "van", "het",
+        "spd", "reading", "now", "degrees", "degree", "deg", "air", "del", "du", "de", "der", "des", "w", "ms", "mps",
+        "kmh", "do", "da", "dello", "della", "van", "het",
     }
 )  # fmt: skip
 PLACES = frozenset(

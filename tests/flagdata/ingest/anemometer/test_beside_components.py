@@ -42,3 +42,24 @@ def test_a_direction_alone_beside_components_is_offered_with_a_question_for_its_
     said, line = offered(read(table(speed=False), unit="m/s"))
     assert line == "1=time,5=wind_direction[deg],?=wind_speed[m/s]"
     assert "with the number of the speed for the ?" in said
+
+
+def test_components_beside_a_speed_are_offered_in_its_place(read: Read) -> None:
+    rows = "".join(
+        f"2026-05-01 12:0{at}:00Z,{x},{y},{np.hypot(x, y):.3f}\n" for at, (x, y) in enumerate(zip(X, Y, strict=True))
+    )
+    log = read(f"datetime,u,v,ws\n{rows}", unit="m/s")
+    said, line = offered(log)
+    assert "in place of 'ws'" in said
+    assert "vertical" not in " ".join(finding.what for finding in log.findings)
+    found = read(f"datetime,u,v,ws\n{rows}", columns=line)
+    assert found.series.channels["wind_x"].tolist() == pytest.approx(X)
+
+
+def test_a_speed_with_the_vertical_wind_in_it_is_told(read: Read) -> None:
+    rows = "".join(
+        f"2026-05-01 12:0{at}:00Z,{x},{y},1.{at},{np.sqrt(x**2 + y**2 + (1 + at / 10) ** 2):.3f}\n"
+        for at, (x, y) in enumerate(zip(X, Y, strict=True))
+    )
+    told = [finding.what for finding in read(f"datetime,u,v,w,ws\n{rows}", unit="m/s").findings]
+    assert any("'ws' is the length of 'u', 'v', 'w': the vertical wind is in it" in what for what in told)
