@@ -18,7 +18,7 @@ from flagdata.ingest.anemometer.text.source import TableText, TextFile
 _LINE = re.compile(
     r"\s*(?P<stamp>(?:\d{4}[-/]\d{2}[-/]\d{2}[T ])?\d{2}:\d{2}:\d{2}(?:[.,]\d{1,9})?"
     r"(?:Z|[+-]\d{2}:?\d{2}| ?(?:UTC|GMT))?)"
-    r"(?!:\d{1,9}\s*[,;\t])(?P<gap>[\s>:|-]+)(?![A-Z]{3,4}\s*[,;\t])(?P<rest>[^\s$!].*)"
+    r"(?!:\d{1,9}\s*[,;\t]|:\d{2}:\d{2})(?P<gap>[\s>:|-]+)(?![A-Z]{3,4}\s*[,;\t])(?P<rest>[^\s$!].*)"
 )
 _SIGNS = ",;\t"
 _SHARE = 0.8

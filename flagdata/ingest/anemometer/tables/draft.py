@@ -35,7 +35,7 @@ from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout, lay_out
-from flagdata.ingest.anemometer.times import bare_dates, stretches
+from flagdata.ingest.anemometer.times import bare_dates, stretches, truncated
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
@@ -195,7 +195,7 @@ def draft(
     if columns is None and chosen is not None:
         taken = {*of_time, *(column.index for one in winds for column in one.columns.values())}
         warnings = (*warnings, *quality_columns.warnings(layout, taken=taken))
-        warnings += against_components.warnings(layout, chosen) if "wind_x" in chosen.columns else ()
+        warnings += against_components.warnings(layout, chosen, stated=False)
         remarks = (*remarks, *unread.from_either_north(layout, time, (chosen,)))
         remarks = (*remarks, *unread.directions(layout, time, chosen, winds, remarks), *unread.relative(layout, winds))
         remarks = (*remarks, *unread.otherwise(layout, time, chosen), *beside_components.remark(layout, time, chosen))
@@ -225,6 +225,8 @@ def _doubts(
         one = " and ".join(stated_columns.named(layout, at) for at in dates)
         what = f"{one} is a date without a time of day, rows share it, and no column is read as the time of day"
         found.append(Doubt(what=what, fix=offered_columns.of_bare_dates(layout, dates, [chosen or winds[0]])))
+    elif time is None and (cut_off := truncated.doubt(layout)) is not None:
+        found.append(Doubt(what=cut_off[0], fix=cut_off[1]))
     elif time is None:
         offered = offered_columns.offer(layout, time, winds)
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"

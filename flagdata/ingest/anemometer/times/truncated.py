@@ -1,0 +1,41 @@
+"""Stamps that a spreadsheet cut to minutes and seconds ("42:10.0"): their hour and day are lost from the file.
+
+A comma-separated file that was opened and saved in a spreadsheet holds what its cells showed, and a stamp with parts
+of a second is shown as mm:ss.0 unless the user formats the cell.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.words.headings import names_time
+
+_CUT = re.compile(r"(\d{1,2}):([0-5]\d)\.\d")
+_LEAST, _STEADY = 3, 0.06
+"""Rows that tell, and the difference from the middle step [s] that a clock of tenths leaves a steady rate."""
+
+
+def doubt(layout: Layout) -> tuple[str, str] | None:
+    """What a column of times lacks, and what its owner can do; `None` where no column was cut so."""
+    for at, name in enumerate(layout.names):
+        cells = [cell for cell in layout.column(at) if cell]
+        found = [_CUT.fullmatch(cell) for cell in cells]
+        parts = [(int(match[1]), float(match[0].split(":")[1])) for match in found if match is not None]
+        if len(parts) < _LEAST or len(parts) < len(cells) or not names_time(name) or max(parts)[0] > 59:
+            continue
+        what = f"column {name!r} holds minutes and seconds only ({cells[0]!r}), as a spreadsheet shows whole stamps"
+        fix = (
+            "take the file as the logger wrote it, or show the whole stamp in the spreadsheet (a cell format such as "
+            "yyyy-mm-dd hh:mm:ss.0) and export it again"
+        )
+        steps = np.diff([60.0 * minute + second for minute, second in parts]) % 3600.0
+        step = float(np.median(steps))
+        if step > 0 and float(np.abs(steps - step).max()) <= _STEADY:
+            minute, second = parts[0]
+            start = f"when the first row was written, its minutes and seconds being {minute:02d}:{second:04.1f}"
+            fix += f"; or, as the first rows are {step:g} s apart: --rate {1 / step:g} --start TIME, with TIME {start}"
+        return what, fix
+    return None
