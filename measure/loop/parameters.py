@@ -62,8 +62,10 @@ def _estimate(name: str, calibration: Calibration, half: float, weighed: float) 
 
 
 def _damping(value: float, half: float) -> Estimate:
-    """Damping [s]: what codes differ by is like so much more or less of it, whatever there is; none lies below 0."""
+    """Damping [s]: what codes differ by is like so much more or less of it, and where a fit ends is a factor beside;
+    none lies below 0."""
     between = CRITERIA.reach * CRITERIA.damping_between
-    low = value - math.hypot(value - value * math.exp(-half), between)
-    high = value + math.hypot(value * math.exp(half) - value, between)
+    whole = math.hypot(half, CRITERIA.reach * CRITERIA.damping_factor)
+    low = value - math.hypot(value - value * math.exp(-whole), between)
+    high = value + math.hypot(value * math.exp(whole) - value, between)
     return Estimate(value=value, low=max(0.0, low), high=high, unit="s", level=CRITERIA.interval)

@@ -7,7 +7,7 @@ shorter by other methods.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
@@ -18,6 +18,7 @@ from flagdata.errors import FlagdataError
 from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import SegmentWind
+from measure.nulls.fabric import Fabric
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.effects import Effect, apply
@@ -32,7 +33,7 @@ from sim.system import System
 
 Floats = NDArray[np.float64]
 
-_SETTLE = 3.0  # s; a flag of 1.5 m has forgotten a start from rest after two swings
+SETTLE = 3.0  # s, before the first frame; a flag of 1.5 m has forgotten a start from rest after two swings
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
 _SAMPLED = 0.05  # s, of winds that blow
@@ -55,7 +56,7 @@ class NullBatch:
         speeds: of the wind, along +x, one a recording [m/s].
         winds: that blow in place of steady ones of these speeds, one a recording; none where they are steady.
         seed: of the numerics, the starts and the noise.
-        stretching: factor on the nominal tables of stretching.
+        fabric: how its tables of stiffness differ from the nominal ones.
         effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
     """
 
@@ -67,7 +68,7 @@ class NullBatch:
     calibrations: tuple[Calibration, ...]
     speeds: tuple[float, ...]
     seed: int
-    stretching: float = 1.0
+    fabric: Fabric = field(default_factory=Fabric)
     winds: tuple[WindTrack, ...] = ()
     effects: tuple[Effect, ...] = ()
 
@@ -120,7 +121,7 @@ class NullBatch:
                 return found
         raise FlagdataError(
             f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
-            where=f"{self.calibrations[0]}, stretching × {self.stretching:.3g}, winds "
+            where=f"{self.calibrations[0]}, stretching × {self.fabric.stretching:.3g}, winds "
             f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
             fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
         )  # fmt: skip
@@ -139,7 +140,7 @@ class NullBatch:
         for calibration, rough, speed in zip(self.calibrations, roughness, self.speeds, strict=True):
             position = start + rough
             position[list(held)] = specimen.anchors
-            material = calibration.material(specimen.material.scaled(stretching=self.stretching))
+            material = calibration.material(self.fabric.of(specimen.material))
             scenes.append(
                 Scene(
                     mesh=flat, position=position, gravity=specimen.gravity, air=specimen.air, wind=(speed, 0.0, 0.0),
@@ -152,15 +153,15 @@ class NullBatch:
             system = replace(system, wind=self._blowing(system))
         frames = []
         with torch.no_grad():
-            for frame in range(round((_SETTLE + self.duration) * self.rate)):
+            for frame in range(round((SETTLE + self.duration) * self.rate)):
                 state = integrator.advance(system, state, 1 / self.rate)
-                if frame >= round(_SETTLE * self.rate):
+                if frame >= round(SETTLE * self.rate):
                     frames.append(state.position.double().numpy().copy())
         return np.stack(frames)
 
     def _blowing(self, system: System) -> SegmentWind:
         """The winds since the start of the run."""
-        times = np.arange(math.ceil((_SETTLE + self.duration) / _SAMPLED) + 1, dtype=np.float64) * _SAMPLED - _SETTLE
+        times = np.arange(math.ceil((SETTLE + self.duration) / _SAMPLED) + 1, dtype=np.float64) * _SAMPLED - SETTLE
         samples = np.stack([wind.at(times) for wind in self.winds], axis=-1)
         blown = torch.as_tensor(samples, dtype=system.cloth.dtype, device=system.cloth.device)
         return SegmentWind(period=_SAMPLED, samples=blown)

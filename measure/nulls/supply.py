@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,6 +11,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.rng import child_seed
 from measure.forecasting.setting import Setting, Stage
 from measure.nulls import bank as banks
+from measure.nulls import winds
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.verdict.criteria import CRITERIA
@@ -96,8 +97,8 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
 def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
     """Nulls over the priors of the cloth, of the winds of an experiment: a batch for each kind of numerics. Those of
     one cloth hold as many segments as the data, and are as noisy as the noisiest of its recordings."""
-    segments = setting.segments
-    return [
+    segments, recordings = setting.segments, setting.experiment.recordings
+    made = [
         banks.prior_batch(
             setting.experiment.specimen, markers=segments.markers, rate=1 / segments.period, noise=setting.design.noise,
             duration=segments.cut.lasting(banks.each(len(segments))),
@@ -106,6 +107,10 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
         )
         for index in range(kinds)
     ]  # fmt: skip
+    return [
+        replace(batch, winds=winds.like(recordings, batch.speeds, duration=batch.duration, seed=batch.seed))
+        for batch in made
+    ]
 
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:

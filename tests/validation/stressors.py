@@ -35,6 +35,7 @@ from flagdata.rng import child_seed, stream
 from measure.forecasting.setting import Setting
 from measure.loop.run import Options, solve
 from measure.nulls import bank as banks
+from measure.nulls.fabric import Fabric
 from measure.nulls.simulation import NullBatch
 from measure.nulls.supply import batches
 from measure.observe import Hold, Observation, Setup, from_arrays, observe
@@ -276,7 +277,8 @@ def _simulated(case: str, number: int, seed: int) -> Truth:
     winds = np.stack([_wind(speed, rng, turbulent=case == _TURBULENT) for speed in SPEEDS])
     times = np.arange(winds.shape[1]) / LOG_RATE - _SETTLED
     batch: NullBatch = replace(
-        drawn, calibrations=drawn.calibrations[: len(SPEEDS)], speeds=SPEEDS,
+        drawn, fabric=Fabric(stretching=drawn.fabric.stretching), speeds=SPEEDS,
+        calibrations=drawn.calibrations[: len(SPEEDS)],
         winds=tuple(WindTrack(times=times, velocity=wind) for wind in winds),
     )  # fmt: skip
     own = batch.calibrations[0]

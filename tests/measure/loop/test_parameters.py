@@ -53,16 +53,20 @@ def test_nulls_that_are_off_by_more_than_the_scale_widen_it() -> None:
     assert math.log(density.high) == pytest.approx(REACH * 0.05, rel=1e-6)
 
 
-def test_of_little_damping_the_interval_is_that_of_the_codes_and_begins_at_zero() -> None:
-    """2.4 ms · 1.645 = 3.95 ms to either side of 1 ms, and next to nothing of its own."""
+def test_the_factor_by_which_a_fit_ends_elsewhere_stands_beside_what_codes_differ_by() -> None:
+    """A standard deviation of 1.1 is a factor of e^(1.1 · 1.645) = 6.11 either way; 2.4 ms · 1.645 = 3.95 ms: of 1 ms,
+    √(5.11² + 3.95²) = 6.46 ms above it, and nothing below."""
     damping = told(Calibration(damping=1e-3), {"density": 0.1, "bending": 0.1, "damping": 1e-6})["damping"].before
+    assert (CRITERIA.damping_factor, CRITERIA.damping_between) == (1.1, 2.4e-3)
     assert damping.low == 0.0
-    assert damping.high == pytest.approx(1e-3 + REACH * 2.4e-3, rel=1e-4)
+    assert damping.high == pytest.approx(1e-3 + 6.456e-3, rel=1e-3)
 
 
 def test_of_much_damping_what_codes_differ_by_hardly_shows() -> None:
-    """30 ms known to 20 % is 6 ms, beside which 2.4 ms count little: √(6² + 2.4²) is about 6.5 ms a standard error."""
+    """30 ms known to 20 %: √(1.1² + 0.2²) = 1.118 is a factor of 6.29, to 4.77 and 189 ms, beside which 2.4 ms count
+    little."""
     damping = told(Calibration(damping=30e-3), {"density": 0.1, "bending": 0.1, "damping": 0.2})["damping"].before
-    own_low, own_high = 30e-3 * (1 - math.exp(-0.2 * REACH)), 30e-3 * (math.exp(0.2 * REACH) - 1)
-    assert damping.value - damping.low == pytest.approx(math.hypot(own_low, REACH * 2.4e-3), rel=1e-6)
-    assert damping.high - damping.value == pytest.approx(math.hypot(own_high, REACH * 2.4e-3), rel=1e-6)
+    factor = math.exp(REACH * math.hypot(0.2, 1.1))
+    assert damping.low == pytest.approx(30e-3 / factor, rel=0.1)
+    assert damping.high == pytest.approx(30e-3 * factor, rel=1e-3)
+    assert damping.value - damping.low == pytest.approx(math.hypot(30e-3 * (1 - 1 / factor), REACH * 2.4e-3), rel=1e-6)

@@ -1,0 +1,54 @@
+"""The winds of nulls: steady where the data's are, and else what the data's logs are, begun elsewhere and stronger.
+
+What a simulation leaves depends on how the wind fluctuates, so that nulls in steady winds calibrate no recording in a
+fluctuating one: its density would be told too high, and its interval too narrow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flagdata.rng import stream
+from measure.nulls.simulation import SETTLE
+from measure.observe.trajectory import Trajectory, WindTrack
+
+_STEADY = 1e-3
+"""Fluctuation below which a wind counts as steady, as a share of its mean [1]."""
+_EVERY = 0.05
+"""Between samples of a null's wind [s]."""
+
+
+def like(
+    recordings: Sequence[Trajectory], speeds: Sequence[float], *, duration: float, seed: int
+) -> tuple[WindTrack, ...]:
+    """A wind for each of `speeds` [m/s]; none where the logs of all recordings are steady.
+
+    Each is the log of a recording drawn at random, from an instant drawn at random, forwards and backwards in turns so
+    that it goes on, and multiplied to its speed.
+
+    Args:
+        recordings: of the data, in the frame of the fit.
+        duration: of a null recording behind the time in which it settles [s].
+        seed: of the draws.
+    """
+    changing = [one for one in recordings if _fluctuates(one)]
+    if not changing:
+        return ()
+    rng = stream(seed, "null", "winds")
+    times = np.arange(round((SETTLE + duration) / _EVERY) + 2, dtype=np.float64) * _EVERY
+    made: list[WindTrack] = []
+    for speed in speeds:
+        one = recordings[int(rng.integers(len(recordings)))]
+        length = float(one.times[-1])
+        there = np.abs((times + rng.uniform(0, 2 * length)) % (2 * length) - length)
+        velocity = one.wind.at(there)
+        mean = float(np.linalg.norm(one.wind.at(np.arange(0.0, length, _EVERY)), axis=1).mean())
+        made.append(WindTrack(times=times - SETTLE, velocity=velocity * (speed / mean)))
+    return tuple(made)
+
+
+def _fluctuates(recording: Trajectory) -> bool:
+    wind = recording.wind.at(np.arange(0.0, recording.times[-1], _EVERY))
+    return bool(np.linalg.norm(wind.std(axis=0)) > _STEADY * recording.wind.speed)
