@@ -13,13 +13,12 @@ _STATED = re.compile(
 )
 """How lines above a heading state a unit."""
 _UNIT_WORD = re.compile(
-    r"(?<![\w/])(?:km/d(?:ay)?|km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
+    r"(?:(?P<tenth>(?<![\d.,])0[.,]1|\b1/10|\btenths? of(?: an?)?)\s*\*?\s*)?"
+    r"(?<![\w/])(?P<unit>km/d(?:ay)?|km/?h|kph|kmph|m/s(?:ec)?|m s-1|mph|kts?|kn|knots?|knoten|n[oœ]e?uds|nudos|ft/s|"
     r"(?:kilomet|met)(?:er|re)s? per (?:hour|second)|miles per hour)(?![\w/])",
     re.IGNORECASE,
 )
-"""Units of speed as a title names them."""
-
-
+"""Units of speed as a title names them, and tenths of them."""
 _COMMENT = ("#", ";", "%", "!")
 """How lines begin that are no rows."""
 
@@ -54,7 +53,9 @@ def stated_unit(lines: Sequence[str]) -> tuple[str, int, str] | None:
     if not found:
         for number, line in enumerate(lines, start=1):
             for match in _UNIT_WORD.finditer(line):
-                name = spelled(match[0])
+                name = spelled(f"0.1 {match['unit']}" if match["tenth"] else match["unit"])
+                if name is None and match["tenth"]:
+                    return None  # tenths of a unit that has no name here: nothing is stated that can be taken
                 if name is not None and unit_of(name).si == "m/s":
                     found.setdefault(name, (name, number, match[0]))
     return next(iter(found.values())) if len(found) == 1 else None

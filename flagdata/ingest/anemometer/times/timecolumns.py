@@ -22,6 +22,7 @@ from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times import dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
 from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, share, time_choice
+from flagdata.ingest.anemometer.times.truncated import before_1970
 from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of, zone_of
 
@@ -362,6 +363,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     words = words_of(name)
     if set(words) & _YEAR_AND_DAY and (days := time_as(layout, (index,), "%y%j")) is not None:
         yield replace(days, score=0.9)
+        return
+    if before_1970(texts):
         return
     heading = understand(name, layout.units[index])
     if "wind" in heading.quantity and (heading.sure or not names_time(name)):

@@ -1,12 +1,13 @@
-"""Stamps that a spreadsheet cut to minutes and seconds ("42:10.0"): their hour and day are lost from the file.
+"""Stamps that a spreadsheet cut to minutes and seconds ("42:10.0"), and dates before 1970: no time can be made of them.
 
 A comma-separated file that was opened and saved in a spreadsheet holds what its cells showed, and a stamp with parts
-of a second is shown as mm:ss.0 unless the user formats the cell.
+of a second is shown as mm:ss.0 unless the user formats the cell. MCAP counts nanoseconds since 1970 without a sign.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,12 +15,27 @@ from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import names_time
 
 _CUT = re.compile(r"(\d{1,2}):([0-5]\d)\.\d")
+_DATE = re.compile(
+    r"\s*(?:(?P<year>(?:19|20)\d\d)(?P<sign>[-/.]?)(?:0[1-9]|1[0-2])(?P=sign)(?:0[1-9]|[12]\d|3[01]))(?!\d)"
+)
+"""A date whose year comes first."""
 _LEAST, _STEADY = 3, 0.06
 """Rows that tell, and the difference from the middle step [s] that a clock of tenths leaves a steady rate."""
 
 
+def before_1970(cells: Sequence[str]) -> bool:
+    """Whether cells begin with dates of which most are before 1970."""
+    years = [match["year"] for cell in cells if (match := _DATE.match(cell)) is not None]
+    return len(years) >= max(_LEAST, 0.9 * len(cells)) and sum(year < "1970" for year in years) > 0.5 * len(years)
+
+
 def doubt(layout: Layout) -> tuple[str, str] | None:
-    """What a column of times lacks, and what its owner can do; `None` where no column was cut so."""
+    """What a column of times lacks, and what its owner can do; `None` where no column was cut so or is too early."""
+    for at, name in enumerate(layout.names):
+        cells = [cell for cell in layout.column(at) if cell]
+        if names_time(name) and before_1970(cells):
+            what = f"column {name!r} holds dates before 1970 ({cells[0]!r}), which a recording cannot hold"
+            return what, "if a clock was never set, leave the column out by --columns, and give --start TIME --rate HZ"
     for at, name in enumerate(layout.names):
         cells = [cell for cell in layout.column(at) if cell]
         found = [_CUT.fullmatch(cell) for cell in cells]

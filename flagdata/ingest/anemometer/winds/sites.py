@@ -60,7 +60,7 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
         cells = layout.column(index)
-        kinds = sorted({cell for cell in cells if cell})
+        kinds = _kinds(cells, stamps)
         addresses = _addresses(words, kinds)
         if index in time or understand(name).quantity:
             continue
@@ -80,6 +80,12 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
     if apart_by:  # a number that each row has for itself tells rows apart, too, but no sites
         return min(apart_by, key=lambda column: len(column[1]))
     return _in_every_stamp(layout, time, stamps) if shared else None
+
+
+def _kinds(cells: Sequence[str], stamps: Sequence[str]) -> list[str]:
+    """The words of a column in rows that have a stamp: a line of totals below the rows is of no site."""
+    stamped = any(stamps)
+    return sorted({cell for cell, stamp in zip(cells, stamps, strict=True) if cell and (stamp or not stamped)})
 
 
 def _each_once(cells: Sequence[str], stamps: Sequence[str]) -> bool:
@@ -103,7 +109,7 @@ def _in_every_stamp(layout: Layout, time: Sequence[int], stamps: Sequence[str]) 
     """
     for index, name in enumerate(layout.names):
         cells = layout.column(index)
-        kinds = sorted({cell for cell in cells if cell})
+        kinds = _kinds(cells, stamps)
         if index in time or understand(name).quantity or not 2 <= len(kinds) <= _MOST:
             continue
         if any(cell_kind(kind) != "text" for kind in kinds) or compass_unit(layout, index) is not None:

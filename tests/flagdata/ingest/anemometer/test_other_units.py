@@ -37,3 +37,16 @@ def test_a_speed_that_is_another_in_other_units_is_not_read_in_the_users_unit(re
 def test_two_anemometers_stay_two(read: Read) -> None:
     with pytest.raises(InputError, match="2 anemometers"):
         read(table("wind speed A", "wind speed B", np.array([5.0, 6, 14, 12, 21, 9, 8, 10])), unit="mph")
+
+
+def test_tenths_of_a_unit_that_a_line_above_states_are_proposed_and_a_whole_one_is_contradicted(read: Read) -> None:
+    lines = "FG : mean wind speed in 0.1 m/s\n\n"
+    rows = "".join(f"2026-05-{day:02d}T12:00:00Z,{40 + day}\n" for day in range(1, 9))
+    with pytest.raises(InputError, match="line 1 says '0.1 m/s'") as refused:
+        read(f"{lines}time,Wind speed\n{rows}")
+    assert "--unit dm/s" in (refused.value.fix or "")
+    taken = read(f"{lines}time,Wind speed\n{rows}", unit="dm/s")
+    np.testing.assert_allclose(taken.series.channels["wind_speed"][0], 4.1)
+    assert not any("line 1 says" in finding.what for finding in taken.findings)
+    other = read(f"{lines}time,Wind speed\n{rows}", unit="m/s")
+    assert any("line 1 says '0.1 m/s'; taken as m/s" in finding.what for finding in other.findings)

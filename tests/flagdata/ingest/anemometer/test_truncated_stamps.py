@@ -34,3 +34,18 @@ def test_no_rate_is_offered_where_rows_came_unevenly(read: Read) -> None:
         read(table(["42:10.0", "42:11.0", "42:19.3", "42:20.1", "43:01.0"]))
     assert "--rate" not in (refused.value.fix or "")
     assert "export it again" in (refused.value.fix or "")
+
+
+@pytest.mark.parametrize("form", ["{}{:02d}{:02d}", "{}-{:02d}-{:02d}", "{}/{:02d}/{:02d} 12:00"])
+def test_dates_before_1970_are_no_count_and_are_named(read: Read, form: str) -> None:
+    rows = "".join(f"{form.format(1969, 1, day)},{3.0 + 0.1 * day:.1f}\n" for day in range(1, 9))
+    with pytest.raises(InputError, match="holds dates before 1970") as refused:
+        read(f"DATE,wind speed [m/s]\n{rows}")
+    assert "--start TIME" in (refused.value.fix or "")
+
+
+def test_a_line_of_totals_is_no_site_of_its_own(read: Read) -> None:
+    rows = "".join(f"Cape,{day:02d}/01/2010 12:00,{5.0 + 0.1 * day:.1f}\n" for day in range(1, 14))
+    log = read(f"Station Name,Date,Wind Speed (m/s)\n{rows}Totals:,,83.2\n", zone="UTC")
+    assert len(log.series.time) == 13
+    np.testing.assert_allclose(log.series.channels["wind_speed"][[0, -1]], [5.1, 6.3])
