@@ -42,7 +42,7 @@ def test_two_anemometers_stay_two(read: Read) -> None:
 def test_tenths_of_a_unit_that_a_line_above_states_are_proposed_and_a_whole_one_is_contradicted(read: Read) -> None:
     lines = "FG : mean wind speed in 0.1 m/s\n\n"
     rows = "".join(f"2026-05-{day:02d}T12:00:00Z,{40 + day}\n" for day in range(1, 9))
-    with pytest.raises(InputError, match="line 1 says '0.1 m/s'") as refused:
+    with pytest.raises(InputError, match=r"line 1 says '0\.1 m/s'") as refused:
         read(f"{lines}time,Wind speed\n{rows}")
     assert "--unit dm/s" in (refused.value.fix or "")
     taken = read(f"{lines}time,Wind speed\n{rows}", unit="dm/s")
