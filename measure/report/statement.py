@@ -230,7 +230,8 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     between = (
         "intervals of these hold what simulators of other authors differ by, "
         f"{100 * CRITERIA.density_between:.0f} % in density, a factor of {math.exp(CRITERIA.bending_between):.1f} in "
-        f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, each one standard deviation"
+        f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, and for the damping a factor "
+        f"of {math.exp(CRITERIA.damping_factor):.0f} by which its fit may end elsewhere, each one standard deviation"
     )
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
