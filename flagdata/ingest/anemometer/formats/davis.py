@@ -23,6 +23,7 @@ from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.signals import Sensor
 from flagdata.units import UNITS
+from flagdata.units import spelled as unit_of
 
 _NAMES = (
     (r"avg wind speed|wind speed", "wind_speed"),
@@ -161,6 +162,8 @@ def _program(lines: Sequence[str]) -> list[Column] | None:
     ]
     if [name.lower() for name in names[:2]] != ["date", "time"] or "wind speed" not in map(str.lower, names):
         return None
+    if sum(unit_of(word) is not None for word in lines[2][:2000].split()) > 1:
+        return None  # the program writes no line of units: it is another's table
     return [Column(number=number, name=name) for number, name in enumerate(names, start=1)]
 
 

@@ -56,6 +56,8 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.before_cells",
     "flagdata.ingest.anemometer.restating.listed_fields",
     "flagdata.ingest.anemometer.restating.counted_fields",
+    "flagdata.ingest.anemometer.restating.legend",
+    "flagdata.ingest.anemometer.restating.stacked_headings",
     "flagdata.ingest.anemometer.restating.headings_anew",
 )
 LOOKED_AT = 60

@@ -36,6 +36,9 @@ _WORD = re.compile(r"\d+(?:[.]\d+)?|[^\W\d_]+")
 _CAMEL = re.compile(r"[A-ZÀ-ÖØ-Þ]+(?![^\W\d_A-ZÀ-ÖØ-Þ])|[A-ZÀ-ÖØ-Þ]?[^\W\d_A-ZÀ-ÖØ-Þ]+|[^\W\d_]+")
 _BRACKET = re.compile(r"[\[(<{]([^\])>}]*)[\])>}]")
 _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
+_ABOVE = re.compile(
+    r"(?<![^\W_])above[ _](?:the[ _])?(?:ground|surface|sea|deck)(?:[ _](?:level|surface))?(?![^\W_])", re.IGNORECASE
+)
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
@@ -147,7 +150,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
-    text = _RATE.sub(" ", text)
+    text = _ABOVE.sub(" ", _RATE.sub(" ", text))
     text = _U_SONIC.sub("sonic", _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text)))
     tenfold = _TENFOLD.search(text)
     text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"
@@ -308,7 +311,7 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
     if len(text) > 1 and below is None and (whole := _known(text)) is not None:
         return text, whole
     for found in _BRACKET.finditer(text):
-        inside = _known(re.sub(r"^\s*units?\s*[=:]\s*|[\"']", "", found[1]))
+        inside = _known(re.sub(r"^\s*(?:units?\s*[=:]\s*|(?:in|en|em)\s+)|[\"']", "", found[1]))
         if inside is not None:
             return text[: found.start()] + " " + text[found.end() :], inside
     # HOBO writes the serial numbers of logger and sensor in brackets: they tell no instruments of one file apart.
