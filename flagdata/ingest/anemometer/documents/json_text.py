@@ -258,6 +258,8 @@ def _items(whole: Any) -> list[Any]:
     timed = json_measures.by_time(whole)
     if timed is not None:
         return timed
+    if isinstance(whole.get("obs"), list) and str(whole.get("type")) in _TEMPEST:
+        return [{**whole, "obs": [row]} for row in whole["obs"]]
     level = [whole]
     for _ in range(_DEEPEST):
         lists = [
@@ -269,10 +271,16 @@ def _items(whole: Any) -> list[Any]:
         if len(lists) == 1:
             above = next(item for item in level if any(member is lists[0] for member in item.values()))
             return json_measures.by_station(_at_one_time(above, _readings_within(lists[0])))
-        level = [member for item in level for member in item.values() if isinstance(member, dict)]
+        level = [inner for item in level for member in item.values() for inner in _objects(member)]
         if lists or not level:
             break
     return [whole]
+
+
+def _objects(member: Any) -> list[dict[str, Any]]:
+    """The object that a member is, or that is alone in its list; none in any other."""
+    alone = member[0] if isinstance(member, list) and len(member) == 1 else member
+    return [alone] if isinstance(alone, dict) else []
 
 
 def _readings_within(items: list[Any]) -> list[Any]:

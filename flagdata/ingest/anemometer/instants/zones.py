@@ -23,14 +23,14 @@ LINES = 100
 _LONGEST = 300
 """Characters of a line that are looked at."""
 _KEY = (
-    r"(?:time[ _-]?zone(?:[ _]name)?|(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|"
+    r"(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|"
     r"zeitzone|fuseau(?: horaire)?|zona horaria|tijdzone)"
 )
 _STATED = re.compile(
     rf"(?<![A-Za-z]){_KEY}(?P<count>[ _]?(?:in[ _])?\(?(?:seconds|minutes|hours)\)?)?[\"']?"
     r"\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?"
     r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?|(?:UTC|GMT)?\s?[+-]?\d{1,5}(?::?\d{2})?|UTC|GMT|Z)"
-    r"(?![A-Za-z/\d.])",
+    r"(?![A-Za-z/\d.]|\s?[+±]\s?\))",
     re.IGNORECASE,
 )
 _KEY_ALONE = re.compile(rf"{_KEY}(?P<count>[ _]?\(?(?:seconds|minutes|hours)\)?)?", re.IGNORECASE)

@@ -20,6 +20,10 @@ _FEW = 3
 """Different values from which a column with a stated unit shows that it is in another."""
 
 
+_DEGREES = frozenset({"d", "dg", "dgr"})
+"""What stands for degrees behind a direction, and for nothing or something else elsewhere."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Judged:
     """What a column of directions is.
@@ -52,7 +56,7 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
         return Judged()
     if heading.unit in compass.BY_UNIT:
         return Judged(unit=heading.unit, told="as points of the compass, 22.5° apart")
-    if heading.strange:
+    if heading.strange and heading.strange.lower() not in _DEGREES:
         return Judged(left_out=f"is in {heading.strange!r}, which is no direction clockwise from north: left out")
     stated = f"in {heading.unit} by its heading"
     if heading.unit in ("gon", "mil", "0.1 deg", "0.01 deg"):

@@ -73,7 +73,7 @@ def test_an_angle_that_is_not_clockwise_from_north_is_no_direction_of_the_wind(l
     assert any("ccw" in finding.what for finding in log.findings)
 
 
-@pytest.mark.parametrize("heading", ["wind_deg", "WindAngle", "Wind Angle", "wind angle (deg)"])
+@pytest.mark.parametrize("heading", ["wind_deg", "WindAngle", "Wind Angle", "wind angle (deg)", "WindDirection(d)"])
 def test_degrees_of_the_wind_are_its_direction(log_file: Write, heading: str) -> None:
     log = _log(log_file, heading, ["12", "48", "300"])
     np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"][:3]), [12, 48, 300])

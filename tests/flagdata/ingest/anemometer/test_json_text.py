@@ -66,6 +66,23 @@ def test_tempest_observations_are_arrays_in_the_order_of_its_reference(read: Rea
     assert series.channels["air_pressure"][0] == pytest.approx(101_320)
 
 
+def test_rows_of_one_tempest_answer_are_readings_each(read: Read) -> None:
+    rows = [[START + 60 * at, 1.0, speed, 9.0, 210, 6, 1013.2, 12.0, 60.0] for at, speed in enumerate(SPEEDS)]
+    text = json.dumps({"status": {"status_code": 0}, "device_id": 1, "type": "obs_st", "obs": rows})
+    series = read(text).series
+    assert series.channels["wind_speed"].tolist() == SPEEDS
+    assert series.time.tolist() == [(START + 60 * at) * 10**9 for at in range(3)]
+
+
+def test_readings_below_a_list_of_one_object_are_rows(read: Read) -> None:
+    intervals = [{"startTime": f"2026-05-01T{12 + at}:00:00Z", "values": {"windSpeed": speed}}
+                 for at, speed in enumerate(SPEEDS)]  # fmt: skip
+    line = {"timestep": "1h", "endTime": "2026-05-02T12:00:00Z", "intervals": intervals}
+    series = read(json.dumps({"data": {"timelines": [line]}}), unit="m/s").series
+    assert series.channels["wind_speed"].tolist() == SPEEDS
+    assert series.time.tolist() == [(START + 3600 * at) * 10**9 for at in range(3)]
+
+
 def test_signal_k_wind_is_apparent_and_in_si(read: Read) -> None:
     text = lines([
         {"updates": [{"timestamp": f"2026-05-01T12:00:0{at}Z",

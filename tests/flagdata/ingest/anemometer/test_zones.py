@@ -37,6 +37,8 @@ def kinds(log: WindLog) -> list[str]:
         ("utc_offset_seconds,3600", "+01:00"),
         ("GMT Offset=+0530", "+05:30"),
         ("TimeZone=Etc/GMT-1", "Etc/GMT-1"),
+        ("Timezone (UTC+)=1", "+01:00"),
+        ("Timezone (UTC+)=0", "+00:00"),
         ("latitude,utc_offset_seconds,timezone\n52.1,-18000,America/New_York", "-05:00"),
     ],
 )
