@@ -23,7 +23,8 @@ LINES = 100
 _LONGEST = 300
 """Characters of a line that are looked at."""
 _KEY = (
-    r"(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|"
+    r"(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|"
+    r"(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|"
     r"zeitzone|fuseau(?: horaire)?|zona horaria|tijdzone)"
 )
 _STATED = re.compile(
