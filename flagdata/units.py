@@ -121,6 +121,8 @@ SPELLINGS: dict[str, str] = {
     "10'sdeg": "10 deg", "10°": "10 deg", "tensofdegrees": "10 deg", "tensofdeg": "10 deg",
     "°c": "degC", "℃": "degC", "c": "degC", "celsius": "degC", "celcius": "degC", "degc": "degC", "deg_c": "degC",
     "degreesc": "degC", "degreec": "degC", "degreescelsius": "degC", "degreecelsius": "degC", "degcelsius": "degC",
+    "degrees_c": "degC", "degree_c": "degC", "degrees_celsius": "degC", "degree_celsius": "degC", "deg_celsius": "degC",
+    "degrees_f": "degF", "degree_f": "degF", "degrees_fahrenheit": "degF", "degree_fahrenheit": "degF",
     "°f": "degF", "℉": "degF", "f": "degF", "fahrenheit": "degF", "degf": "degF", "deg_f": "degF",
     "degreesf": "degF", "degreesfahrenheit": "degF",
     "k": "K", "kelvin": "K", "degk": "K", "°k": "K",

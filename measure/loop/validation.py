@@ -21,6 +21,7 @@ from measure.forecasting.segments import Segments
 from measure.forecasting.setting import Setting
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import Refined, finished
+from measure.nulls import winds
 from measure.nulls.simulation import NullBatch
 from measure.observe.anchors import as_seen
 from measure.verdict.criteria import CRITERIA
@@ -256,12 +257,13 @@ def numerical_floor(
     """
     first = setting.experiment.recordings[0]
     simulated = np.tile(recordings, copies)
+    speeds = tuple(float(u) for u in setting.speeds[simulated])
+    own = child_seed(seed, "floor")
     batch = NullBatch(
         specimen=setting.experiment.specimen, markers=first.markers, rate=1 / setting.segments.period,
-        duration=_DURATION,
-        noise=first.noise, calibrations=(model.calibration,) * len(simulated),
-        speeds=tuple(float(u) for u in setting.speeds[simulated]),
-        seed=child_seed(seed, "floor"), effects=model.acting,
+        duration=_DURATION, noise=first.noise, calibrations=(model.calibration,) * len(simulated), speeds=speeds,
+        winds=winds.like(setting.experiment.recordings, speeds, duration=_DURATION, seed=own),
+        seed=own, effects=model.acting,
     )  # fmt: skip
     made = batch.simulate()
     segments = Segments.of(made)

@@ -148,9 +148,10 @@ class NullBatch:
                     handles=Handles(vertices=held, stiffness=specimen.stiffness),
                 )
             )  # fmt: skip
-        system, state = apply(self.effects, *assemble(scenes))
-        if self.winds:
+        system, state = assemble(scenes)
+        if self.winds:  # before the effects, of which some change the wind
             system = replace(system, wind=self._blowing(system))
+        system, state = apply(self.effects, system, state)
         frames = []
         with torch.no_grad():
             for frame in range(round((SETTLE + self.duration) * self.rate)):

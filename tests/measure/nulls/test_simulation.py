@@ -12,6 +12,7 @@ from measure.forecasting.calibration import Calibration
 from measure.nulls.fabric import Fabric
 from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import Specimen, WindTrack
+from sim.effects.vertical_wind import VerticalWind
 
 
 def batch(specimen: Specimen, *, speed: float) -> NullBatch:
@@ -54,6 +55,16 @@ def test_a_wind_that_blows_is_the_steady_one_where_it_does_not_vary(specimen: Sp
     np.testing.assert_allclose(same.positions, steady.positions, rtol=0, atol=1e-6)
     assert np.abs(other.positions[0] - steady.positions[0]).max() > 1e-3
     assert other.wind is falls
+
+
+def test_an_effect_on_the_wind_acts_on_one_that_blows(specimen: Specimen) -> None:
+    """A wind that rises blows up a logged wind without variation as it does the steady one."""
+    rising = replace(batch(specimen, speed=9.0), effects=(VerticalWind(inclination=0.3),))
+    level = WindTrack(times=np.array([-4.0, 1.0]), velocity=np.full((2, 3), [9.0, 0.0, 0.0]))
+    (steady,), (same,) = rising.simulate(), _in(rising, level).simulate()
+    (without,) = _in(replace(rising, effects=()), level).simulate()
+    np.testing.assert_allclose(same.positions, steady.positions, rtol=0, atol=1e-5)
+    assert np.abs(without.positions - same.positions).max() > 1e-2
 
 
 def _in(nulls: NullBatch, wind: WindTrack) -> NullBatch:

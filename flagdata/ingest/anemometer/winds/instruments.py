@@ -244,7 +244,9 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
     for by_channel in groups.values():
         if named and not any(found.headings[i].sure for indices in by_channel.values() for i in indices):
             found.remarks.extend(
-                f"column {found.layout.names[i]!r} is in {found.headings[i].unit}, but nothing says that it is a wind"
+                f"column {found.layout.names[i]!r} "
+                f"{f'is in {unit}' if (unit := found.headings[i].unit) else 'may be a speed'}, "
+                "but nothing says that it is a wind"
                 for indices in by_channel.values() for i in indices
             )  # fmt: skip
             continue
