@@ -339,8 +339,17 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
 
 
 def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
-    """The strength of an effect, by its coefficient beyond null and the standard error that nulls leave."""
-    return estimate(null + coefficient, math.hypot(error, CRITERIA.response * coefficient), unit)
+    """The strength of an effect, by its coefficient beyond null and the standard error that nulls leave.
+
+    What the fit's mesh and a mistold cloth do to an effect is a factor, so that more of the interval lies beyond the
+    strength than between it and the null.
+    """
+    whole, reach = CRITERIA.reach * CRITERIA.strength_factor, CRITERIA.reach * error
+    inward = math.hypot(coefficient * (1 - math.exp(-whole)), reach)
+    outward = math.hypot(coefficient * (math.exp(whole) - 1), reach)
+    low, high = (outward, inward) if coefficient < 0 else (inward, outward)
+    value = null + coefficient
+    return Estimate(value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval)
 
 
 def estimate(value: float, error: float, unit: str) -> Estimate:

@@ -233,6 +233,7 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, and for the damping a factor "
         f"of {math.exp(CRITERIA.damping_factor):.0f} by which its fit may end elsewhere, each one standard deviation"
     )
+    factor = number(math.exp(CRITERIA.strength_factor), digits=2)
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
@@ -243,6 +244,6 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
         between,
-        f"the coarse mesh of the fit may bias a strength by {100 * CRITERIA.response:.0f} %: its interval says so",
+        f"a strength may be off by a factor of {factor}, by the mesh of the fit and a mistold cloth: its interval says so",
         "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
     )

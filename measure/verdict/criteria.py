@@ -31,9 +31,9 @@ class Criteria:
             in the confidence set are.
         lead: standard errors of the paired difference of held-out scores by which a model must be behind to leave the
             confidence set, and by which one must lead a model that it contains.
-        response: relative standard error of a strength by what the fit's mesh does to an effect, which nulls do not
-            show: strengths of 22 effects that were named rightly in two challenges scattered by so much beyond their
-            errors.
+        strength_factor: standard deviation of the logarithm of a strength by what the fit's mesh and a mistold cloth do
+            to an effect, which nulls do not show: the root mean square of ln(told/true) of eight strengths that were
+            named rightly (decision 030).
         least_turned: a wind that varies across its mean by less than this share of what it does along it is not
             turbulence (see `course`).
         most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
@@ -56,7 +56,7 @@ class Criteria:
     alike_noise: float = 1.5e-3
     refitted: int = 2
     lead: float = 2.0
-    response: float = 0.25
+    strength_factor: float = 0.5
     least_turned: float = 0.3
     most_within: float = 2.0
     density_between: float = 0.07
@@ -66,7 +66,7 @@ class Criteria:
     room: float = 0.02
 
     def __post_init__(self) -> None:
-        for name in ("level", "interval", "response", "room"):
+        for name in ("level", "interval", "room"):
             value = getattr(self, name)
             if not 0 < value < 1:
                 raise UsageError(f"a {name} of {value!r}", where="criteria", fix="give one between 0 and 1")

@@ -16,7 +16,7 @@ from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel, Nulls
 from measure.loop.refit import Refit
-from measure.loop.selection import GUST_COLUMN, Judgement, finalists, judge
+from measure.loop.selection import GUST_COLUMN, Judgement, finalists, judge, strength
 from measure.nulls.reference import GUSTS, NullBank, Reference
 from measure.probes.course import Course
 from measure.probes.lines import REDUCED
@@ -323,6 +323,18 @@ def test_a_strength_that_an_effect_cannot_have_is_not_named(null: NullModel, ref
     found = judged(null, reference, {"hem-mass.line_density": -1.0})
     assert "hem-mass.line_density" not in named(found)
     assert "no cloth has it" in next(w for w in found.ranking if w.candidate.effect == "hem-mass").candidate.why_not
+
+
+@pytest.mark.parametrize(("null", "coefficient"), [(0.0, 2.0), (1.0, 2.0), (0.0, -2.0)])
+def test_the_interval_of_a_strength_is_a_factor_to_either_side(null: float, coefficient: float) -> None:
+    """Without an error of its own 90 % of a log-normal factor with a standard deviation of 0.5: e^(1.645 · 0.5) = 2.28;
+    with one that is far larger, a normal interval."""
+    told = strength(null, coefficient, 0.0, "1")
+    near, far = sorted(abs(end - null) for end in (told.low, told.high))
+    assert told.value == null + coefficient
+    assert (near, far) == pytest.approx((2.0 / 2.2758, 2.0 * 2.2758), rel=1e-3)
+    wide = strength(null, coefficient, 100.0, "1")
+    assert (wide.low, wide.high) == pytest.approx((-164.5, 164.5), abs=4)
 
 
 LIFT, HEM = names().index("lift.coefficient"), names().index("hem-mass.line_density")
