@@ -244,6 +244,6 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
         between,
-        f"a strength may be off by a factor of {factor}, by the mesh of the fit and a mistold cloth: its interval says so",
+        f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its interval says so",
         "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
     )
