@@ -361,6 +361,9 @@ def _unit_doubt(
         fix += f"--unit {evidence.unit} or another"
         return Doubt(what=f"the unit of column {layout.names[column]!r} is not stated; {evidence.reason}", fix=fix)
     likely = f"; likely {evidence.unit}, since {evidence.reason}" if evidence else ""
+    if (strange := understand(layout.names[column]).strange)[1:].isdecimal():  # as "x10"
+        what = f"the heading of column {layout.names[column]!r} says {strange!r}, so that its numbers are no plain unit"
+        return Doubt(what=what, fix=f"give what one of them is: --unit '{1 / int(strange[1:]):g} m/s'")
     name = layout.names[column] or f"number {column + 1}"
     fix = (
         f"give it: --unit {evidence.unit if evidence else 'm/s'}{'' if evidence else ' (or km/h, mph, kn, ft/s)'}"

@@ -283,3 +283,13 @@ def test_headings_of_further_languages_and_glued_units_are_understood(
     found = understand(heading)
     assert (found.channel, found.unit) == (channel, unit)
     assert found.sure or not channel
+
+
+@pytest.mark.parametrize(("heading", "unit"), [("Wind speed (m/s) x10", "0.1 m/s"), ("Wind speed x100", "0.01 m/s")])
+def test_a_heading_of_multiples_asks_for_what_one_is(log_file: Write, heading: str, unit: str) -> None:
+    path = log_file(f"Time,{heading}\n" + "".join(f"2021-05-01T{hour:02d}:00:00Z,{30 + hour}\n" for hour in range(8)))
+    with pytest.raises(FlagdataError, match=f"--unit '{unit}'"):
+        read_log(path, WindOptions())
+    factor = 1 / float(unit.split()[0])
+    found = read_log(path, WindOptions(unit=unit)).series.channels["wind_speed"]
+    np.testing.assert_allclose(found, np.arange(30, 38) / factor)
