@@ -31,6 +31,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.pywws",
     "flagdata.ingest.anemometer.restating.hours_across",
     "flagdata.ingest.anemometer.restating.smet",
+    "flagdata.ingest.anemometer.restating.nead",
     "flagdata.ingest.anemometer.restating.numbered_columns",
     "flagdata.ingest.anemometer.restating.lvm",
     "flagdata.ingest.anemometer.restating.scintec",

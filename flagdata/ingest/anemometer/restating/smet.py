@@ -43,9 +43,9 @@ def as_table(source: TextFile) -> TableText | None:
     places = [place for place, name in enumerate(fields) if name in _NAMES]
     if "timestamp" not in fields or not {"VW", "DW"} & set(fields):
         return None
-    at, nodata, zone = fields.index("timestamp"), header.get("nodata", "-999"), _zone(header.get("tz", ""))
-    scales = _each(header.get("units_multiplier"), len(fields), usual=1.0)
-    offsets = _each(header.get("units_offset"), len(fields), usual=0.0)
+    at, nodata, offset = fields.index("timestamp"), header.get("nodata", "-999"), zone(header.get("tz", ""))
+    scales = each(header.get("units_multiplier"), len(fields), usual=1.0)
+    offsets = each(header.get("units_offset"), len(fields), usual=0.0)
     if scales is None or offsets is None:
         return None
 
@@ -54,7 +54,7 @@ def as_table(source: TextFile) -> TableText | None:
         if len(cells) != len(fields) or (stamp := _STAMP.fullmatch(cells[at])) is None:
             return None
         values = [_value(cells[place], nodata, scales[place], offsets[place]) for place in places]
-        return [cells[at] if stamp["zone"] else cells[at] + zone, *values]
+        return [cells[at] if stamp["zone"] else cells[at] + offset, *values]
 
     rows, other = rows_of(source, row)
     left_out = max(0, other - len(_above(source.head())))
@@ -73,7 +73,7 @@ def _header(lines: Sequence[str]) -> Mapping[str, str]:
     return {key.strip().lower(): value.strip() for key, sign, value in pairs if sign}
 
 
-def _each(text: str | None, count: int, *, usual: float) -> list[float] | None:
+def each(text: str | None, count: int, *, usual: float) -> list[float] | None:
     """A number for each field, the usual one where the header has none; `None` where it does not have as many."""
     if text is None:
         return [usual] * count
@@ -84,7 +84,7 @@ def _each(text: str | None, count: int, *, usual: float) -> list[float] | None:
     return found if len(found) == count else None
 
 
-def _zone(hours: str) -> str:
+def zone(hours: str) -> str:
     """The offset from UTC as stamps write it; "" where the header has none that can be read."""
     try:
         minutes = round(60 * float(hours))
