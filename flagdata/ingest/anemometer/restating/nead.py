@@ -11,9 +11,10 @@
     # [DATA]
     1996-05-12 11:00:00,-12.3,4.5,210
 
-Source: Iosifescu Enescu, Bavay and Mankoff, "New Environmental Data Archive (NEAD) format", EnviDat 2020, and WSL, "iCSV
-file format": names of fields are those of SMET, with a number where there are several sensors; timezone is the offset
-from UTC in hours; values times their multiplier plus their offset are in other units, and are left to their user.
+Source: Iosifescu Enescu, Bavay and Mankoff, "New Environmental Data Archive (NEAD) format", EnviDat 2020, and WSL,
+"iCSV file format": names of fields are those of SMET, with a number where there are several sensors; timezone is the
+offset from UTC in hours; values times their multiplier plus their offset are in other units, and are left to their
+user.
 """
 
 from __future__ import annotations
