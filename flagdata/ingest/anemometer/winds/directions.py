@@ -16,6 +16,8 @@ _TURN = (-181.0, 361.0)
 _GON, _MILS = 401.0, 6401.0
 _FASTEST = 100.0
 """Number that no speed of a log reaches in any unit, by which angles are told [of whatever unit]."""
+_EIGHT = 8
+"""The highest number of eight sectors that are counted from 1."""
 _FEW = 3
 """Different values from which a column with a stated unit shows that it is in another."""
 
@@ -69,10 +71,12 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
         return _beyond(low, high)
     whole, several = bool(np.all(known % 1 == 0)), len(np.unique(known)) > _FEW
     if heading.unit in (None, "deg") and low >= 0 and high <= 16 and whole and several:
+        eight = high <= _EIGHT
         return Judged(
-            left_out=f"holds sectors of the compass (0 to {high:g}), no angle; left out; they may be the sixteen from "
-            "north on, counted from 0, or tens of degrees; where they begin elsewhere, a recipe's offset turns them",
-            may_be=("sixteenths", "10 deg", "deg"),
+            left_out=f"holds sectors of the compass ({low:g} to {high:g}), no angle; left out; they may be the "
+            f"{'eight or the ' if eight else ''}sixteen from north on, counted from 0, or tens of degrees; where they "
+            "begin elsewhere, a recipe's offset turns them",
+            may_be=("45 deg", "sixteenths", "10 deg", "deg") if eight else ("sixteenths", "10 deg", "deg"),
         )
     if heading.misstated:
         return _misstated(heading.misstated, low, high)

@@ -293,3 +293,14 @@ def test_a_heading_of_multiples_asks_for_what_one_is(log_file: Write, heading: s
     factor = 1 / float(unit.split()[0])
     found = read_log(path, WindOptions(unit=unit)).series.channels["wind_speed"]
     np.testing.assert_allclose(found, np.arange(30, 38) / factor)
+
+
+def test_numbers_up_to_eight_may_be_eighths_of_a_turn(log_file: Write) -> None:
+    rows = "".join(f"01.05.2021 {hour:02d}:00,{3 + hour},{hour % 8}\n" for hour in range(20))
+    path = log_file("Datum,Wind [m/s],Richtung\n" + rows)
+    log = read_log(path, WindOptions(zone="UTC"))
+    assert "wind_direction" not in log.series.channels
+    assert any("[45 deg]" in finding.what for finding in log.findings)
+    line = "time,wind_speed[m/s],wind_direction[45 deg]"
+    found = read_log(path, WindOptions(zone="UTC", columns=line)).series.channels["wind_direction"]
+    np.testing.assert_allclose(np.rad2deg(found), 45 * (np.arange(20) % 8))
