@@ -14,8 +14,8 @@ from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.signals import WindLog
 
 Write = Callable[[str], Path]
-_NEAD = (
-    "# NEAD 1.0 UTF-8\n# [FIELDS]\n# fields = timestamp,TA1,TA2,RH1,VW1,VW1_max,DW1,V\n"
+_LISTED = (
+    "# Table of the mast 1.0\n# [FIELDS]\n# fields = timestamp,TA1,TA2,RH1,VW1,VW1_max,DW1,V\n"
     "# units = time,Degrees C,Degrees C,%,m/s,m/s,Degrees,V\n# [DATA]\n"
 )
 
@@ -56,7 +56,9 @@ def test_a_direction_of_another_name_is_told_with_its_line(log_file: Write) -> N
 
 
 def test_fields_listed_in_a_comment_keep_their_names_and_every_step_reads_the_same(log_file: Write) -> None:
-    path = log_file(_NEAD + _rows("2026-05-01 {at:02d}:00:00+00:00,-3.5,-3.25,81.5,{speed}.25,{speed}.75,{turned}.5,"))
+    path = log_file(
+        _LISTED + _rows("2026-05-01 {at:02d}:00:00+00:00,-3.5,-3.25,81.5,{speed}.25,{speed}.75,{turned}.5,")
+    )
     with pytest.raises(InputError, match="'VW1' may be a wind") as caught:
         read_log(path, WindOptions())
     line = re.search(r'--columns "([^"]+)"', caught.value.fix)
@@ -69,5 +71,7 @@ def test_fields_listed_in_a_comment_keep_their_names_and_every_step_reads_the_sa
 
 
 def test_an_extreme_read_for_itself_is_told_the_direction_of_its_mean(log_file: Write) -> None:
-    path = log_file(_NEAD + _rows("2026-05-01 {at:02d}:00:00+00:00,-3.5,-3.25,81.5,{speed}.25,{speed}.75,{turned}.5,"))
+    path = log_file(
+        _LISTED + _rows("2026-05-01 {at:02d}:00:00+00:00,-3.5,-3.25,81.5,{speed}.25,{speed}.75,{turned}.5,")
+    )
     assert "the direction 'DW1' is that of 'VW1'" in _notes(read_log(path, WindOptions(wind="VW1_max")))
