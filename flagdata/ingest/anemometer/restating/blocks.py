@@ -55,7 +55,7 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The values below their names, one reading a row."""
-    lines = [line for _, block in source.blocks() for line in block]
+    lines = list(source.each_line())
     rows = list(_rows(lines, _first(lines[:HEAD_LINES])))
     names = list(dict.fromkeys(name for row in rows for name in row if name))
     stamped = any("" in row for row in rows)

@@ -25,7 +25,7 @@ def as_table(source: TextFile) -> TableText | None:
     if span is None:
         return None
     first, last = span
-    lines = [line for _, block in source.blocks() for line in block]
+    lines = list(source.each_line())
     heading = " ".join(line.strip() for line in lines[first : last + 1])
     return TableText.of(source, [*lines[:first], heading, *lines[last + 1 :]])
 

@@ -38,12 +38,21 @@ _BARE = re.compile(r"[\[(<]?\s*(?:time|date)", re.IGNORECASE)
 
 @dataclass(frozen=True, kw_only=True)
 class _Heading:
-    """The line that names the columns: its number from 0, what marks it as a comment, its delimiter and cells."""
+    """The line that names the columns.
+
+    Attributes:
+        at: its number from 0.
+        mark: what marks it as a comment.
+        delimiter: between its cells.
+        cells: what it names the columns.
+        told: what each abbreviation stands for, by the first line above that says it.
+    """
 
     at: int
     mark: str
     delimiter: str
     cells: tuple[str, ...]
+    told: Mapping[str, str]
 
 
 def matches(lines: Sequence[str]) -> bool:
@@ -56,12 +65,10 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The file with explained headings in place of those that say too little; `None` where none gains by it."""
-    lines = source.head(_HEAD)
-    heading = _heading(lines)
+    heading = _heading(source.head(_HEAD))
     if heading is None:
         return None
-    told = _explained(lines[: heading.at])
-    names = [_better(cell, told.get(cell, "")) for cell in heading.cells]
+    names = [_better(cell, heading.told.get(cell, "")) for cell in heading.cells]
     changed = [(old, new) for old, new in zip(heading.cells, names, strict=True) if old != new]
     if not any(interest(new) == 2 for _, new in changed) or len(set(names)) < len(names):
         return None
@@ -70,7 +77,7 @@ def as_table(source: TextFile) -> TableText | None:
         names = [re.sub(r"\s+", "_", _compact(name)) for name in names]
     else:
         names = [name.replace(delimiter, " ") for name in names]
-    whole = [line for _, block in source.blocks() for line in block]
+    whole = list(source.each_line())
     whole[heading.at] = heading.mark + delimiter.join(names)
     shown = ", ".join(f"{old} is {new!r}" for old, new in changed if interest(new) == 2)
     what = f"the lines above line {heading.at + 1} explain its headings, which are read as they say: {shown}"
@@ -88,7 +95,7 @@ def _heading(lines: Sequence[str]) -> _Heading | None:
                 known = sum(cell in told for cell in cells)
                 enough = known > 1 and 2 * known >= len(cells)
                 if enough and _row_below(lines[at + 1 :], cells, delimiter):
-                    return _Heading(at=at, mark=mark, delimiter=delimiter, cells=cells)
+                    return _Heading(at=at, mark=mark, delimiter=delimiter, cells=cells, told=told)
         found = _ENTRY.fullmatch(line)
         if found is not None:
             told.setdefault(found["name"], found["text"])
@@ -102,16 +109,6 @@ def _row_below(lines: Sequence[str], cells: Sequence[str], delimiter: str) -> bo
     return any(
         len(row) == len(cells) and 2 * sum(cell_kind(cell) != "text" for cell in row) > len(row) for row in cut_rows
     )
-
-
-def _explained(lines: Sequence[str]) -> Mapping[str, str]:
-    """What each abbreviation stands for, by the first line that says it."""
-    told: dict[str, str] = {}
-    for line in lines:
-        found = _ENTRY.fullmatch(line)
-        if found is not None:
-            told.setdefault(found["name"], found["text"])
-    return told
 
 
 def _better(cell: str, text: str) -> str:

@@ -50,7 +50,7 @@ def as_table(source: TextFile) -> TableText | None:
     first = end + layout.lines[0]
     out = io.StringIO()
     csv.writer(out, delimiter=layout.delimiter, quoting=csv.QUOTE_ALL, lineterminator="").writerow(names)
-    text = [line for _, block in source.blocks() for line in block]
+    text = list(source.each_line())
     # The list and what stands around it are no part of the table, but may state its zone.
     above = [f"# {line}" if line.strip() else line for line in text[: first - 1]]
     empty = bool(above) and not re.sub(r"[#\s,;|]", "", above[-1])

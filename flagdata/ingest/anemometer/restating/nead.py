@@ -23,7 +23,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from flagdata.ingest.anemometer.restating.restate import rows_of, table
-from flagdata.ingest.anemometer.restating.smet import each, zone
+from flagdata.ingest.anemometer.restating.smet import each, value, zone
 from flagdata.ingest.anemometer.text.layout import cut
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
@@ -49,7 +49,8 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """Stamps with their zone and the columns under their names with their units; `None` without a field of the time."""
-    header = _header(source.head(_HEAD))
+    head = source.head(_HEAD)
+    header = _header(head)
     sign = _SIGNS.get(header.get("field_delimiter", ",").lower(), header.get("field_delimiter", ","))
     fields = cut(header.get("fields", ""), sign)
     if "timestamp" not in fields:
@@ -66,13 +67,13 @@ def as_table(source: TextFile) -> TableText | None:
         stamp = _STAMP.fullmatch(cells[at])
         if stamp is None:
             return None
-        others = ("" if _is(cell, nodata) else cell for place, cell in enumerate(cells) if place != at)
+        others = (value(cell, nodata, 1.0, 0.0) for place, cell in enumerate(cells) if place != at)
         return [cells[at] if stamp["zone"] else cells[at] + offset, *others]
 
     rows, other = rows_of(source, row)
-    left_out = max(0, other - sum(line.lstrip().startswith("#") for line in source.head(_HEAD)))
+    left_out = max(0, other - sum(line.lstrip().startswith("#") for line in head))
     names = [_heading(fields[place], units[place], plain[place]) for place in range(len(fields)) if place != at]
-    what = "the NEAD format" if "NEAD" in source.head(1)[0].upper() else "the iCSV format"
+    what = "the NEAD format" if "NEAD" in head[0].upper() else "the iCSV format"
     return table(source, ["time", *names], rows, kind="nead", what=what, left_out=left_out)
 
 
@@ -104,13 +105,3 @@ def _heading(field: str, unit: str, plain: bool) -> str:
     name = None if match is None else _NAMES.get(match["base"])
     name = field if name is None or match is None else f"{name} {match['number']}".strip()
     return f"{name} [{unit}]" if unit and plain else name
-
-
-def _is(cell: str, nodata: str) -> bool:
-    """Whether a cell is the mark for no value, as written or as a number."""
-    if cell == nodata:
-        return True
-    try:
-        return float(cell) == float(nodata)
-    except ValueError:
-        return False

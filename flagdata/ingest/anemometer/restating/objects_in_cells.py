@@ -35,7 +35,7 @@ def as_table(source: TextFile) -> TableText | None:
     """
     head = source.head(restate.LOOKED_AT)
     delimiter, columns = _columns(head)
-    lines = (line for _, block in source.blocks() for line in block)
+    lines = source.each_line()
     rows = csv.reader(lines, delimiter=delimiter)
     names = next(rows)
     kept = [at for at in range(len(names)) if at not in columns]

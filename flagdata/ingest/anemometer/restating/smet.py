@@ -53,7 +53,7 @@ def as_table(source: TextFile) -> TableText | None:
         cells = line.split()
         if len(cells) != len(fields) or (stamp := _STAMP.fullmatch(cells[at])) is None:
             return None
-        values = [_value(cells[place], nodata, scales[place], offsets[place]) for place in places]
+        values = [value(cells[place], nodata, scales[place], offsets[place]) for place in places]
         return [cells[at] if stamp["zone"] else cells[at] + offset, *values]
 
     rows, other = rows_of(source, row)
@@ -93,12 +93,12 @@ def zone(hours: str) -> str:
     return f"{'-' if minutes < 0 else '+'}{abs(minutes) // 60:02d}:{abs(minutes) % 60:02d}"
 
 
-def _value(cell: str, nodata: str, scale: float, offset: float) -> str:
+def value(cell: str, nodata: str, scale: float, offset: float) -> str:
     """A cell in the quantity's SI unit; as written where it is no number."""
     try:
-        value, missing = float(cell), float(nodata)
+        number, missing = float(cell), float(nodata)
     except ValueError:
         return "" if cell == nodata else cell
-    if value == missing:
+    if number == missing:
         return ""
-    return cell if (scale, offset) == (1.0, 0.0) else f"{value * scale + offset:.10g}"
+    return cell if (scale, offset) == (1.0, 0.0) else f"{number * scale + offset:.10g}"

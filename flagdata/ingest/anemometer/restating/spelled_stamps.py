@@ -62,7 +62,7 @@ def restamped(source: TextFile, order: Order | None) -> TextFile:
 
 def provisional(source: TextFile) -> TextFile:
     """The lines with their stamps in ISO 8601, in an order that may be wrong: enough to tell whose lines they are."""
-    lines = islice((line for _, block in source.blocks() for line in block), 1000)
+    lines = islice(source.each_line(), 1000)
     found = (match for line in lines if (match := _LINE.match(line)) is not None)
     return TableText.of(source, [f"2000-01-01T12:00:00 {match['rest']}" for match in found])
 

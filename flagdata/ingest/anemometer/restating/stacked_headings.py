@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
+from typing import TypeAlias
 
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recognition import recognise
@@ -26,6 +27,8 @@ from flagdata.ingest.anemometer.words.wind_words import WIND
 _MOST = 4
 """Lines of the highest stack, units among them."""
 _WORD = re.compile(r"\S+")
+
+_Span: TypeAlias = tuple[float, float]
 
 
 def matches(lines: Sequence[str]) -> bool:
@@ -43,7 +46,8 @@ def as_table(source: TextFile) -> TableText | None:
     stack = _stack(lines, layout)
     if len(stack) < 2:
         return None
-    by_line = {at: _cells(lines[at], lines, layout) for at in stack}
+    spans = _spans(lines, layout)
+    by_line = {at: _cells(lines[at], layout, spans) for at in stack}
     below = stack[-1] if _tells_units(by_line[stack[-1]]) else None
     named = [at for at in stack if at != below]
     if len(named) < 2:
@@ -59,7 +63,7 @@ def as_table(source: TextFile) -> TableText | None:
     if guesses and guesses[0].format != "delimited":
         return None
     units = by_line[below] if below is not None else [""] * len(names)
-    whole = [line for _, block in source.blocks() for line in block]
+    whole = list(source.each_line())
     for at in stack:
         whole[at] = ""
     whole[stack[-1]] = _joined(names, units, layout.delimiter)
@@ -70,6 +74,7 @@ def as_table(source: TextFile) -> TableText | None:
 def _stack(lines: Sequence[str], layout: Layout) -> list[int]:
     """Numbers from 0 of the lines of words right above the first row, the highest first."""
     found: list[int] = []
+    spans = _spans(lines, layout)
     at = layout.lines[0] - 2
     while at >= 0 and len(found) < _MOST:
         cells = [cell for cell in cut(lines[at].strip(), layout.delimiter) if cell]
@@ -77,28 +82,28 @@ def _stack(lines: Sequence[str], layout: Layout) -> list[int]:
             break
         if layout.delimiter != " " and not 1 < len(cells) <= layout.number_of_columns():
             break
-        if found and layout.delimiter == " " and _is_text(lines[at], lines, layout):
+        if found and layout.delimiter == " " and _is_text(lines[at], spans):
             break
         found.append(at)
         at -= 1
     return found[::-1]
 
 
-def _cells(line: str, lines: Sequence[str], layout: Layout) -> list[str]:
+def _cells(line: str, layout: Layout, spans: Sequence[_Span]) -> list[str]:
     """What a line of the stack says of each column, "" where it says nothing."""
     width = layout.number_of_columns()
     if layout.delimiter != " ":
         cells = cut(line.lstrip("\ufeff"), layout.delimiter)[:width]
         return [*cells, *[""] * (width - len(cells))]
     said: list[list[str]] = [[] for _ in range(width)]
-    for word, place in _placed(line, lines, layout):
+    for word, place in _placed(line, spans):
         said[place].append(word[0])
     return [" ".join(words) for words in said]
 
 
-def _placed(line: str, lines: Sequence[str], layout: Layout) -> list[tuple[re.Match[str], int]]:
+def _placed(line: str, spans: Sequence[_Span]) -> list[tuple[re.Match[str], int]]:
     """The words of a line that is divided by blanks, each with the column that it stands above."""
-    spans, found = _spans(lines, layout), []
+    found: list[tuple[re.Match[str], int]] = []
     for word in _WORD.finditer(line.expandtabs()):
         middle = (word.start() + word.end()) / 2
         away = [max(low - middle, middle - high, 0.0) for low, high in spans]
@@ -106,9 +111,9 @@ def _placed(line: str, lines: Sequence[str], layout: Layout) -> list[tuple[re.Ma
     return found
 
 
-def _is_text(line: str, lines: Sequence[str], layout: Layout) -> bool:
+def _is_text(line: str, spans: Sequence[_Span]) -> bool:
     """Whether a line runs on over the columns, as a title does: one blank lies between words of different columns."""
-    placed = _placed(line, lines, layout)
+    placed = _placed(line, spans)
     return any(
         place != other and after.start() - word.end() == 1
         for (word, place), (after, other) in itertools.pairwise(placed)
@@ -124,10 +129,10 @@ def _merged(cells: Sequence[str]) -> list[str]:
     return found
 
 
-def _spans(lines: Sequence[str], layout: Layout) -> list[tuple[float, float]]:
+def _spans(lines: Sequence[str], layout: Layout) -> list[_Span]:
     """From where to where each column's cells stand in the first rows."""
     width = layout.number_of_columns()
-    spans: list[tuple[float, float]] = [(float("inf"), 0.0)] * width
+    spans: list[_Span] = [(float("inf"), 0.0)] * width
     for number in layout.lines[:20]:
         words = list(_WORD.finditer(lines[number - 1].expandtabs()))
         if len(words) == width:

@@ -42,6 +42,10 @@ class TextFile:
                 yield first, lines
                 first += len(lines)
 
+    def each_line(self) -> Iterator[str]:
+        """Lines without their ends, one after the other."""
+        return (line for _, block in self.blocks() for line in block)
+
     def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
         """The file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a line."""
         with opened(self.path) as stream:

@@ -242,13 +242,12 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
     moving = own_motion.may_have_speed(found.layout)
     winds: list[Wind] = []
     for by_channel in groups.values():
-        if named and not any(found.headings[i].sure for indices in by_channel.values() for i in indices):
-            found.remarks.extend(
-                f"column {found.layout.names[i]!r} "
-                f"{f'is in {unit}' if (unit := found.headings[i].unit) else 'may be a speed'}, "
-                "but nothing says that it is a wind"
-                for indices in by_channel.values() for i in indices
-            )  # fmt: skip
+        members = [i for indices in by_channel.values() for i in indices]
+        if named and not any(found.headings[i].sure for i in members):
+            for i in members:
+                stated = found.headings[i].unit
+                told_by = f"is in {stated}" if stated else "may be a speed"
+                found.remarks.append(f"column {found.layout.names[i]!r} {told_by}, but nothing says that it is a wind")
             continue
         kept = {channel: _distinct(found, indices) for channel, indices in by_channel.items()}
         for at in range(max(map(len, kept.values()))):
