@@ -66,7 +66,7 @@ class Criteria:
     room: float = 0.02
 
     def __post_init__(self) -> None:
-        for name in ("level", "interval", "room"):
+        for name in ("level", "interval", "strength_factor", "room"):
             value = getattr(self, name)
             if not 0 < value < 1:
                 raise UsageError(f"a {name} of {value!r}", where="criteria", fix="give one between 0 and 1")
