@@ -22,10 +22,11 @@ from typing import Any
 
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.documents import coverage_json, json_measures, json_series
+from flagdata.ingest.anemometer.documents import coverage_json, json_keyed, json_measures, json_series
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
-from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of
+from flagdata.ingest.anemometer.words.headings import fits, names_time, understand, words_of
+from flagdata.units import spelled
 
 WIDEST = 2000
 """Columns of the widest table that is read."""
@@ -117,6 +118,7 @@ def as_table(source: TextFile) -> TableText | None:
         return None
     table, repeats = _once(table)
     table, names = _of_recording(table, names)
+    table, names = _in_unit_of_all(whole, table, names)
     kept, others = _of_wind(table, tuple(names))
     if others:
         names = dict.fromkeys(name for name in names if any(name in row for row in kept))
@@ -192,6 +194,23 @@ def _of_recording(table: list[dict[str, str]], names: dict[str, None]) -> tuple[
     return counted, dict.fromkeys("time [s]" if name == "time" else name for name in names)
 
 
+def _in_unit_of_all(
+    whole: Any, table: list[dict[str, str]], names: dict[str, None]
+) -> tuple[list[dict[str, str]], dict[str, None]]:
+    """The rows and columns, of which speeds without a unit have the one unit that the whole object states for all."""
+    stated = [whole.get(key) for key in ("unit", "units")] if isinstance(whole, dict) else []
+    known = next((unit for text in stated if isinstance(text, str) and (unit := spelled(text)) is not None), None)
+    if known is None:
+        return table, names
+    headings = {name: understand(name) for name in names}
+    renamed = {
+        name: f"{name} [{known}]" for name, heading in headings.items()
+        if heading.quantity.endswith("wind_speed") and heading.unit is None and fits("wind_speed", known)
+    }  # fmt: skip
+    changed = [{renamed.get(name, name): cell for name, cell in row.items()} for row in table]
+    return changed, {renamed.get(name, name): None for name in names}
+
+
 def _of_wind(table: Sequence[dict[str, str]], names: Sequence[str]) -> tuple[list[dict[str, str]], int]:
     """The rows that hold the wind or where the platform is, and the number of the others; all where no row holds it.
 
@@ -213,7 +232,9 @@ def _whole(source: TextFile) -> Any:
     first = filled[0].lstrip("\ufeff \t") if filled else ""
     if not first.startswith("[") and first.strip() != "{" and len(filled) > 1:
         return None
-    return _parsed("\n".join(line for _, lines in source.blocks() for line in lines).lstrip("\ufeff"))
+    return json_keyed.as_list(
+        _parsed("\n".join(line for _, lines in source.blocks() for line in lines).lstrip("\ufeff"))
+    )
 
 
 def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
@@ -255,6 +276,9 @@ def _items(whole: Any) -> list[Any]:
     """
     if isinstance(whole, list):
         return json_measures.by_station(whole)
+    own = _own_reading(whole)
+    if own is not None:
+        return [own]
     timed = json_measures.by_time(whole)
     if timed is not None:
         return timed
@@ -275,6 +299,19 @@ def _items(whole: Any) -> list[Any]:
         if lists or not level:
             break
     return [whole]
+
+
+def _own_reading(whole: dict[str, Any]) -> dict[str, Any] | None:
+    """An object without its lists, where its plain members are a reading of the wind at an instant and no list is."""
+    plain = {key: value for key, value in whole.items() if not isinstance(value, dict | list)}
+    lists = [value for value in whole.values() if isinstance(value, list) and value]
+    if not lists or not any(_is_instant(key, value) for key, value in plain.items()):
+        return None
+    if any(isinstance(row, dict) and any(_is_instant(k, v) for k, v in row.items()) for rows in lists for row in rows):
+        return None
+    if not any("wind" in understand(key).quantity for key, value in plain.items() if not isinstance(value, bool)):
+        return None
+    return plain
 
 
 def _objects(member: Any) -> list[dict[str, Any]]:

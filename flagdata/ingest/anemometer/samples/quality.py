@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading, streams
 from flagdata.schema import SampleFlag
@@ -27,6 +28,9 @@ STALE_SECONDS = 1.0
 STUCK_SECONDS = 60.0
 STUCK_REPEATS = 60
 """Wind that reads the same for as long as this [s], so many times, is stale whatever the rest of the log looks like."""
+
+_SIGNED_SHARE, _SIGNED_KINDS, _SIGNED_LEVEL = 0.05, 3, -0.5
+"""Share of the rows, different values, and their median [m/s], from which negative speeds are those of a component."""
 
 
 def gaps(reading: Reading) -> tuple[Finding, ...]:
@@ -93,7 +97,11 @@ def faults(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
 
 
 def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
-    """Speeds below zero are impossible: OUT_OF_RANGE; but for the scatter of a calm about a zero that was set right."""
+    """Speeds below zero are impossible: OUT_OF_RANGE; but for the scatter of a calm about a zero that was set right.
+
+    Raises:
+        InputError: so many are so far below zero that it is no speed, but a component of the wind.
+    """
     flags = np.zeros(len(reading.time), dtype=np.uint16)
     calm = (reading.flags & SampleFlag.DEAD_ZONE) != 0
     found: list[Finding] = []
@@ -105,6 +113,15 @@ def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]
             count = int(below.sum())
             flags[below] |= SampleFlag.OUT_OF_RANGE
             lowest = float(np.nanmin(reading.channels[name]))
+            if _signed(reading.channels[name][~calm]):
+                share = 100 * count / int(np.isfinite(reading.channels[name]).sum())
+                raise InputError(
+                    f"{name} is below zero in {share:.0f} % of its rows, down to {lowest:.3g} m/s, as a component of "
+                    "the wind is and no speed",
+                    where=f"line {reading.line[below][0]}",
+                    fix="name both components, each with its column, as wind_x[m/s] and wind_y[m/s] in --columns, and "
+                    "add --azimuth 270 where they are towards east and north",
+                )
             found.append(
                 Finding(
                     kind="negative-speed", severity=Severity.WARNING, count=count, value=lowest,
@@ -114,6 +131,13 @@ def negative(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]
                 )
             )  # fmt: skip
     return flags, tuple(found)
+
+
+def _signed(speed: NDArray[np.float64]) -> bool:
+    """Whether values are below zero as those of a component are: often, far, and by different numbers."""
+    below = speed[speed < 0]
+    often = len(below) >= _SIGNED_SHARE * np.isfinite(speed).sum()
+    return often and len(np.unique(below)) >= _SIGNED_KINDS and float(np.median(below)) < _SIGNED_LEVEL
 
 
 def dead_zone(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:

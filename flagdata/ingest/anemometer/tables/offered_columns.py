@@ -13,11 +13,11 @@ import numpy as np
 
 from flagdata.ingest.anemometer.instants import counted
 from flagdata.ingest.anemometer.options import in_shell
-from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARDS, shown
+from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARDS, named, shown
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice, whole_numbers
 from flagdata.ingest.anemometer.winds import beside, bow, own_motion, vectors
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
@@ -42,8 +42,8 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     speeds = [entry for entry in known.values() if entry.split("[")[0] in (*SPEEDS, *COMPONENTS)]
     if speeds:  # weather of a unit that nothing tells is not to be asked for with the wind
         known = {at: entry for at, entry in known.items() if not entry.endswith("[?]") or _of_wind_or_time(entry)}
-    named = "?" in known.values() or any("wind" in entry for entry in known.values())
-    if width > _WIDE or not named:
+    any_named = "?" in known.values() or any("wind" in entry for entry in known.values())
+    if width > _WIDE or not any_named:
         listed = [f"{at + 1}={entry}" for at, entry in sorted(known.items()) if "?" not in entry.split("[")[0]]
         entries = {entry.split("[")[0] for entry in known.values()}
         listed += ["?=time"] if time is None and not {"time", "date"} & entries else []
@@ -145,7 +145,11 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
     known = _understood(layout, None, winds)
     others = [at for at in range(layout.number_of_columns()) if at not in {*known, *dates}]
     said = []
-    if others and len(dates) == 1:
+    hours = _hours_of_days(layout, dates[0], others) if len(dates) == 1 else []
+    if len(hours) == 1:
+        line = ",".join(_numbered(known | {dates[0]: "date", hours[0]: "hour"}))
+        said.append(f'if {named(layout, hours[0])} is the hour of the day: --columns "{line}"')
+    elif others and len(dates) == 1:
         line = ",".join([*_numbered(known | {dates[0]: "date"}), "?=time"])
         said.append(f'if a column is the time of day: --columns "{line}" with its number for the ?')
     line = ",".join(_numbered(known))
@@ -153,6 +157,18 @@ def of_bare_dates(layout: Layout, dates: Sequence[int], winds: Sequence[Wind]) -
     if layout.site is None and others:
         said.append("if the rows of a date are of several stations, name the column that tells them apart as site")
     return "; ".join([*said, "else export the log with the time of each row"])
+
+
+def _hours_of_days(layout: Layout, date: int, others: Sequence[int]) -> list[int]:
+    """The columns of whole numbers up to 24, none of which returns within a date."""
+    dates, found = layout.column(date), []
+    for index in others:
+        cells = layout.column(index)
+        filled = [cell for cell in cells if cell]
+        once = len(set(zip(dates, cells, strict=True))) == len(cells)
+        if once and len(filled) == len(cells) and whole_numbers(filled, 0, 24):
+            found.append(index)
+    return [index for index in found if all(re.fullmatch(r"\d{1,2}", cell) for cell in layout.column(index))]
 
 
 def read_as(layout: Layout, time: TimeChoice, wind: Wind) -> str:

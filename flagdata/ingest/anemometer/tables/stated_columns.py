@@ -29,7 +29,7 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as
 from flagdata.ingest.anemometer.winds.angles import compass_unit
 from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Column, Wind
-from flagdata.ingest.anemometer.words.headings import fits, understand
+from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
@@ -44,6 +44,13 @@ SITE = "site"
 _COUNTS = {form.removeprefix("elapsed-"): form for form in counted.UNITS} | {"µs": "elapsed-us", "μs": "elapsed-us"}
 """Units that stand for a count of them since a start, as in time[s]."""
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
+_AXES = frozenset(
+    {
+        "u", "v", "u10", "v10", "east", "eastward", "north", "northward", "zonal", "meridional", "merid", "uwnd",
+        "vwnd", "ugrd", "vgrd", "ew", "ns",
+    }
+)  # fmt: skip
+"""Words by which users call components of the wind."""
 _ENTRY = re.compile(r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL)
 
 
@@ -97,8 +104,7 @@ def parse(text: str) -> tuple[Entry, ...]:
             fix = "write there what it is, or leave the entry blank where the column is not needed"
             raise UsageError(f"{part.strip()!r} still has a question mark, entry {number}", where=_WHERE, fix=fix)
         if match["name"] not in (*_NAMES, *FREE, *PARTS, SITE, TOWARDS):
-            known = [*FREE, *PARTS, SITE, TOWARDS, *_NAMES]
-            raise UnknownNameError.of("name of a column", match["name"], known, where=_WHERE)
+            raise _unknown(match["name"])
         column = match["column"].strip() if by_name else number - 1
         detail = (match["detail"] or "").strip()
         detail = counted.WORDS.get(detail.lower(), detail) if match["name"] in FREE else detail
@@ -112,6 +118,19 @@ def parse(text: str) -> tuple[Entry, ...]:
     if not any(entry.name in CHANNELS or entry.name == TOWARDS for entry in entries):
         raise UsageError("no column is measured", where=_WHERE, fix="name the wind's column: wind_speed[m/s]")
     return tuple(entries)
+
+
+def _unknown(name: str) -> UnknownNameError:
+    """The error of a name of a column that is not known: of a component, with the axis that is meant."""
+    words = set(words_of(name))
+    if words & _AXES:
+        fix = "call the component towards east wind_x and the one towards north wind_y, and add --azimuth 270; "
+        fix += "components along the axes of an instrument are wind_x and wind_y as well, without it"
+        return UnknownNameError(f"unknown name of a column {name!r}", where=_WHERE, fix=fix)
+    known = [*FREE, *PARTS, SITE, TOWARDS, *_NAMES]
+    near = UnknownNameError.of("name of a column", name, known, where=_WHERE)
+    listed = f"known: {', '.join(known)}"
+    return near if near.fix == listed else UnknownNameError(near.what, where=_WHERE, fix=f"{near.fix} {listed}")
 
 
 def names_time(text: str) -> bool:

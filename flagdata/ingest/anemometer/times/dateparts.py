@@ -37,7 +37,8 @@ _WORDS = {
     "doy": r"doy|jday|julian|day of year|julian day|julian date|yday|jd|j day|dayofyear|year ?day"
     r"|(?:decimal|dec) (?:day|doy)|day of year decimal|decimal day of year",
     "hour": r"hour|hours|hr|hrs|hh( 24)?|stunde|heure|hora|ora|tunti|uur|time|godzina|час|hour of day|hhmm|hour minute"
-    r"|(?:hours? (?:and )?minutes?|time)(?: (?:as|in))? hhmm|hours? (?:and )?minutes?|[ecmp]st|utc|gmt|lst",
+    r"|(?:hours? (?:and )?minutes?|time)(?: (?:as|in))? hhmm|hours? (?:and )?minutes?|[ecmp]st|utc|gmt|lst"
+    r"|obs ?time|time obs|observation (?:time|hour)|obs ?hour|synoptic (?:time|hour)|(?:time|hour) of observation",
     "minute": r"minute|minutes|min|mins|minuto|минута|mm",
     "second": r"seconds?|sec|secs|ss|sekunde|seconde|segundo",
 }

@@ -187,7 +187,9 @@ def _choices(layout: Layout, order: Order | None, events: Collection[int]) -> It
                 break
     for index, cells in enumerate(columns):
         if not any(index in choice.columns for choice in days):
-            yield from _counts(layout, index, [cell for cell in cells if cell])
+            counts = _counts(layout, index, [cell for cell in cells if cell])
+            # Beside dates a number whose unit nothing tells is an hour, or that of the row: no seconds from a start.
+            yield from (choice for choice in counts if not (choice.counts and choice.form is None and dates))
 
 
 def _of_other_zones(layout: Layout, date: int, clock: int, others: Sequence[int]) -> bool:

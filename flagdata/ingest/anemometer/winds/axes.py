@@ -11,7 +11,8 @@ from flagdata.ingest.anemometer.words.headings import Heading, words_of
 from flagdata.ingest.anemometer.words.wind_words import VERTICAL
 
 _AXES = (
-    frozenset({"north", "northward", "meridional", "vwn"}), frozenset({"east", "eastward", "zonal", "vwe"}),
+    frozenset({"north", "northward", "meridional", "merid", "vwn", "vwnd", "vgrd", "ns"}),
+    frozenset({"east", "eastward", "zonal", "vwe", "uwnd", "ugrd", "ew"}),
     frozenset({"south", "southward"}), frozenset({"west", "westward"}),
 )  # fmt: skip
 """Words of the components towards north and east, and of what cannot be beside them."""
@@ -60,7 +61,7 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
 
 def _towards(words: set[str], heading: Heading, side: frozenset[str]) -> bool:
     """Whether a heading is of the wind along an axis of the Earth, and not of its direction or spread."""
-    if words & {"vwn", "vwe"}:
+    if words & {"vwn", "vwe", "uwnd", "vwnd", "ugrd", "vgrd"}:
         return bool(words & side)
     windy = any("wind" in word for word in words) or heading.unit in _SPEED_UNITS
     none = heading.quantity.endswith("direction") or heading.spread or words & {"variance", "pos", "position"}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.winds import beside, bow, codes, other_units, own_motion, unitcheck
+from flagdata.ingest.anemometer.winds import beside, bow, codes, other_units, own_motion, powers, unitcheck
 from flagdata.ingest.anemometer.winds.angles import compass_unit, day_of_month, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
@@ -108,6 +108,9 @@ def find_winds(
     open_ones = [at for at in found.of("wind_speed") if (own := found.headings[at]).unit is None and own.height is None]
     for index, first in other_units.again(found.values, open_ones).items():
         found.remarks.append(f"column {found.name(index)!r} is {found.name(first)!r} in another unit: left out")
+        del found.values[index]
+    for index, (base, power) in powers.of_others(found.values, found.of("wind_speed")).items():
+        found.remarks.append(f"column {found.name(index)!r} is the {power} of {found.name(base)!r}, no speed: left out")
         del found.values[index]
     winds = [*_speeds(found, told), *_components(found, told)]
     winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]

@@ -21,7 +21,10 @@ _SITES = frozenset(
         "turb", "mac", "imei", "eui", "uuid", "gerät", "geraet", "gerat", "knoten", "dispositivo", "nodo", "appareil",
         "capteur", "dispositif", "noeud", "nœud", "apparaat", "enhet", "enhed", "urządzenie", "czujnik", "aparelho",
         "strumento", "beacon", "mote", "probe", "stationname", "stationid", "stationcode", "sitename", "siteid",
-        "devicename", "deviceid", "sensorname", "sensorid", "nodeid", "locationname", "wmo",
+        "devicename", "deviceid", "sensorname", "sensorid", "nodeid", "locationname", "wmo", "lake", "river", "airport",
+        "port", "harbour", "harbor", "beach", "glacier", "village", "farm", "pier", "bay", "island", "tower", "campus",
+        "municipality", "gemeinde", "lac", "lago", "vessel", "boat", "ship", "drone", "flughafen", "hafen", "puerto",
+        "aeropuerto", "aéroport", "aeroport",
     }
 )  # fmt: skip
 _STATIONS = frozenset({"station", "stid", "icao", "site", "stn"})

@@ -39,6 +39,8 @@ _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _ABOVE = re.compile(
     r"(?<![^\W_])above[ _](?:the[ _])?(?:ground|surface|sea|deck)(?:[ _](?:level|surface))?(?![^\W_])", re.IGNORECASE
 )
+_PERIOD = re.compile(r"(avg|average|mean)([\W_]*\(\s*\d+\s*)m(?=\s*\))", re.IGNORECASE)
+"""Minutes behind a mean, as "WS_Avg(5m)", which are no height."""
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
@@ -150,7 +152,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
-    text = _ABOVE.sub(" ", _RATE.sub(" ", text))
+    text = _PERIOD.sub(r"\1\2min", _ABOVE.sub(" ", _RATE.sub(" ", text)))
     text = _U_SONIC.sub("sonic", _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text)))
     tenfold = _TENFOLD.search(text)
     text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"

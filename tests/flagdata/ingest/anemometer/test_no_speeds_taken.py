@@ -1,0 +1,124 @@
+"""What is no speed, or no height: cubes, components, minutes of a mean; and hours that are no seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, UnknownNameError
+from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.ingest.anemometer.words.headings import understand
+
+Write = Callable[..., Path]
+Read = Callable[..., Any]
+
+
+def _table(heading: str, rows: list[str]) -> str:
+    return "\n".join([heading, *rows]) + "\n"
+
+
+def test_the_mean_cube_of_a_speed_is_no_wind(log_file: Write) -> None:
+    speed = [2.0 + 0.4 * (at % 6) for at in range(24)]
+    rows = [f"2026-05-01 {at:02d}:00:00,{v:.2f},{1.1 * v**3:.2f},{(20 * at) % 360}" for at, v in enumerate(speed)]
+    path = log_file(_table("TIMESTAMP,WS_ms_Avg(5m),WS3_Avg(5m),WindDir_Avg(5m)", rows))
+    assert anemometers(path) == ()  # one
+    log = read_log(path, WindOptions(zone="UTC"))
+    np.testing.assert_allclose(log.series.channels["wind_speed"], speed)
+    assert log.series.sensor.height is None  # five minutes of a mean, not five metres
+    assert any("WS3_Avg(5m)' is the cube of 'WS_ms_Avg(5m)'" in finding.what for finding in log.findings)
+
+
+def test_two_speeds_that_are_no_powers_are_both_winds(log_file: Write) -> None:
+    rows = [f"2026-05-01 {at:02d}:00:00,{2 + 0.4 * (at % 6):.2f},{3 + 0.5 * (at % 6):.2f}" for at in range(24)]
+    assert len(anemometers(log_file(_table("time,ws_10m [m/s],ws_40m [m/s]", rows)))) == 2
+
+
+@pytest.mark.parametrize(
+    ("heading", "height"),
+    [("WS_Avg(5m)", None), ("WS Mean (10 m)", None), ("WS_Avg 10m", 10.0), ("WS (10m)", 10.0), ("WS_10m_Avg", 10.0)],
+)
+def test_minutes_behind_a_mean_are_no_height(heading: str, height: float | None) -> None:
+    assert understand(heading).height == height
+
+
+@pytest.mark.parametrize(
+    ("east", "north"),
+    [("wind_zonal", "wind_merid"), ("uwnd", "vwnd"), ("UGRD", "VGRD"), ("wind_ew", "wind_ns"), ("East Wind", "northward")],
+)  # fmt: skip
+def test_components_towards_east_and_north_by_their_names(read: Read, east: str, north: str) -> None:
+    """A wind from 225° at √2 · 3 m/s blows towards north-east: both components are 3 m/s."""
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{3.0 + at},{3.0 + at}" for at in range(4)]
+    series = read(_table(f"time,{east},{north}", rows), unit="m/s").series
+    np.testing.assert_allclose(series.channels["wind_speed"], np.sqrt(2) * (3.0 + np.arange(4)))
+    np.testing.assert_allclose(np.rad2deg(series.channels["wind_direction"]), 225.0)
+
+
+def test_a_component_that_is_named_a_speed_is_refused(log_file: Write) -> None:
+    rows = [f"2026/05/01 {at:02d}:00:00 {-2.0 + 0.4 * at:.2f} {1.5 - 0.2 * at:.2f}" for at in range(24)]
+    path = log_file(_table("", rows).lstrip())
+    with pytest.raises(InputError, match="below zero in 21 % of its rows, down to -2 m/s, as a component") as raised:
+        read_log(path, WindOptions(wind="3", unit="m/s", zone="UTC"))
+    assert "wind_x[m/s] and wind_y[m/s]" in (raised.value.fix or "")
+
+
+def test_calm_air_that_reads_a_little_below_zero_is_a_speed(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{(-0.1, -0.2, -0.15, 2.0, 3.0)[at % 5]}" for at in range(20)]
+    log = read_log(log_file(_table("time,wind_speed [m/s]", rows)), WindOptions())
+    assert [finding.count for finding in log.findings if finding.kind == "negative-speed"] == [12]
+
+
+@pytest.mark.parametrize("name", ["wind_u", "wind_v", "wind_zonal", "u10", "eastward_wind"])
+def test_a_component_of_another_name_is_told_its_axis(log_file: Write, name: str) -> None:
+    path = log_file("2026-05-01T12:00:00Z 1.0 2.0\n2026-05-01T12:00:01Z 1.1 2.1\n")
+    with pytest.raises(UnknownNameError) as raised:
+        read_log(path, WindOptions(columns=f"time,{name}[m/s]"))
+    fix = raised.value.fix or ""
+    assert "wind_x and the one towards north wind_y, and add --azimuth 270" in fix
+    assert "did you mean" not in fix
+
+
+def test_a_misspelt_name_is_answered_with_the_nearest_and_all_names(log_file: Write) -> None:
+    path = log_file("2026-05-01T12:00:00Z 1.0 2.0\n2026-05-01T12:00:01Z 1.1 2.1\n")
+    with pytest.raises(UnknownNameError) as raised:
+        read_log(path, WindOptions(columns="time,wind_sped[m/s]"))
+    assert "did you mean 'wind_speed'? known: date, time, year" in (raised.value.fix or "")
+
+
+@pytest.mark.parametrize("heading", ["ObsTime", "obs_time", "Observation hour", "Time of observation"])
+def test_hours_of_an_observation_beside_a_date(read: Read, heading: str) -> None:
+    """24 is the midnight that ends the day."""
+    rows = [f"2026-05-01,1010.1,{2 + 0.1 * at:.1f},{15 * at % 360},{at}" for at in range(1, 25)]
+    series = read(_table(f"Date,StnPres,WS,WD,{heading}", rows), unit="m/s", zone="UTC").series
+    assert np.unique(np.diff(series.time)).tolist() == [3_600_000_000_000]
+    assert series.time[-1] == np.datetime64("2026-05-02T00:00:00", "ns").astype(np.int64)
+
+
+def test_a_number_beside_dates_is_offered_as_no_seconds(log_file: Write) -> None:
+    rows = [f"2026-05-01,1010.1,{2 + 0.1 * at:.1f},{15 * at % 360},{at}" for at in range(1, 25)]
+    path = log_file(_table("Date,StnPres,WS,WD,slot time", rows))
+    with pytest.raises(InputError) as raised:
+        read_log(path, WindOptions(unit="m/s", zone="UTC"))
+    told = f"{raised.value.what} {raised.value.fix}"
+    assert "elapsed" not in told
+    line = "1=date,3=wind_speed[m/s],4=wind_direction[deg],5=hour"
+    assert f"if column 'slot time' is the hour of the day: --columns \"{line}\"" in told
+    series = read_log(path, WindOptions(columns=line, zone="UTC")).series
+    assert np.unique(np.diff(series.time)).tolist() == [3_600_000_000_000]
+
+
+def test_dates_beside_a_running_number_are_the_time(read: Read) -> None:
+    rows = [f"{at},2026-05-{at + 1:02d},{2 + 0.1 * at:.1f}" for at in range(24)]
+    series = read(_table("datetime,date,wind_speed", rows), unit="m/s", zone="UTC").series
+    assert np.unique(np.diff(series.time)).tolist() == [86_400_000_000_000]
+
+
+def test_places_of_another_kind_are_winds_of_their_own(log_file: Write) -> None:
+    rows = [
+        f"{lake},2026-05-{day:02d} {at:02d}:00:00,{day + 0.1 * at:.1f}"
+        for day, lake in enumerate(["Mendota", "Erken", "Zurich"], 1) for at in range(12)
+    ]  # fmt: skip
+    assert anemometers(log_file(_table("lake,time,wind_speed_ms", rows))) == ("Erken", "Mendota", "Zurich")
