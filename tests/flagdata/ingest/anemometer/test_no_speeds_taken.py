@@ -47,7 +47,10 @@ def test_minutes_behind_a_mean_are_no_height(heading: str, height: float | None)
 
 @pytest.mark.parametrize(
     ("east", "north"),
-    [("wind_zonal", "wind_merid"), ("uwnd", "vwnd"), ("UGRD", "VGRD"), ("wind_ew", "wind_ns"), ("East Wind", "northward")],
+    [
+        ("wind_zonal", "wind_merid"), ("uwnd", "vwnd"), ("UGRD", "VGRD"), ("wind_ew", "wind_ns"),
+        ("East wind", "North wind"),
+    ],
 )  # fmt: skip
 def test_components_towards_east_and_north_by_their_names(read: Read, east: str, north: str) -> None:
     """A wind from 225° at √2 · 3 m/s blows towards north-east: both components are 3 m/s."""
