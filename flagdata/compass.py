@@ -63,13 +63,14 @@ def _russian() -> dict[str, float]:
 
 
 def _blowing() -> dict[str, float]:
-    """WIND BLOWING FROM THE SOUTH-SOUTHWEST, as the weather pages rp5 say in English."""
+    """WIND BLOWING FROM THE SOUTH-SOUTHWEST or NORTH-EAST, as the weather pages rp5 say in English."""
     of = dict(zip("NESW", _WORDS["en"], strict=True))
-    return {
-        "WIND BLOWING FROM THE " + "-".join([*(of[letter] for letter in point[:-2]),
-                                             "".join(of[letter] for letter in point[-2:])]): degrees
-        for point, degrees in _DEGREES.items()
-    }  # fmt: skip
+    found: dict[str, float] = {}
+    for point, degrees in _DEGREES.items():
+        first, last = ([of[letter] for letter in part] for part in (point[:-2], point[-2:]))
+        for name in ("-".join([*first, "".join(last)]), "-".join([*first, *last])):
+            found[f"WIND BLOWING FROM THE {name}"] = degrees
+    return found
 
 
 def _letters(north: str, east: str, south: str, west: str) -> dict[str, float]:

@@ -140,7 +140,8 @@ def pattern(form: str) -> str:
                 out.append(r"(?:\.0*)?")
             position += 2
             continue
-        out.append(r"[T\s]+" if letter == " " else re.escape(letter))
+        if not (letter in ".," and form.startswith("%f", position + 1)):  # %f reads the sign before it
+            out.append(r"[T\s]+" if letter == " " else re.escape(letter))
         position += 1
     if len(set(used)) < len(used):
         raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")

@@ -83,7 +83,7 @@ class RowClock:
         if "%p" not in self.form:
             return stamps
         text: Any = texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
-        half = pc.match_substring_regex(text, r"(?i)\d\s?[ap]\.?(?:m\.?)?(?:\s|$)").to_numpy(zero_copy_only=False)
+        half = pc.match_substring_regex(text, r"(?i)\d\s?[ap]\.?(?:m\.?)?(?:[\s,;]|$)").to_numpy(zero_copy_only=False)
         bare = ~half.astype(bool)
         if bare.any() and "%I" in self.form:
             either = re.sub(r" ?%p", "%p", self.form.replace("%I", "%H"))

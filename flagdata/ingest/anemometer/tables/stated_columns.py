@@ -24,6 +24,7 @@ from flagdata.ingest.anemometer.instants.stamps import EPOCH
 from flagdata.ingest.anemometer.recipe import COLUMNS_LIMIT
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times import truncated
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as
@@ -213,6 +214,10 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
     for form in forms:
         if form is not None and "%" not in form and form not in names:
             raise UnknownNameError.of("format of a time", form, names, where=_WHERE)
+    for index in columns:
+        if truncated.before_1970(cells := [cell for cell in layout.column(index) if cell]):
+            what, fix = truncated.too_early(repr(layout.names[index] or index + 1), cells)
+            raise InputError(what, where=where, fix=fix)
     known = [form for form in forms if form is not None]
     if len(known) == len(forms):
         form = " ".join(known)

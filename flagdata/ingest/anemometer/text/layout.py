@@ -404,7 +404,7 @@ def _names(line: str, delimiter: str, width: int, full: int) -> tuple[list[str] 
     if delimiter == " " and _NAMING.match(line):
         return (cells if len(cells := cut(_NAMING.sub("", line), delimiter)) == width else None), False
     plain, marked = _trimmed(cut(line, delimiter), width), bool(_MARK.match(line))
-    if len(plain) == full > width:
+    if len(plain) > width and len(plain) in (full, full - 1):  # the sign behind the last cell of a row makes one more
         first = settings.listed(_MARK.sub("", plain[0])) if marked else plain[0]
         return [first, *plain[1:width]], not marked
     if len(plain) == width and not marked:

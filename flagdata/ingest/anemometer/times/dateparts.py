@@ -413,7 +413,7 @@ def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ..
     Raises:
         TimeError: their numbers may be day and month, or month and day.
     """
-    named = ("%Y%m%d", "%Y%j", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
+    named = ("%Y%m%d", "%Y%j", "%Y:%m:%d", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
     try:
         numbered = decide(layout.column(index), told=order or order_of(layout.names[index]), where="").directives()
     except TimeError as error:

@@ -29,12 +29,14 @@ from flagdata.ingest.anemometer.words.headings import names_time, understand, wo
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
     r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
-    r"|^\s*(19|20)\d\d(?:[0-2]\d\d|3[0-6]\d)\s*$"
+    r"|^\s*(19|20)\d\d(?:[0-2]\d\d|3[0-6]\d)\s*$|^\s*(19|20)\d\d:\d{2}:\d{2}\s*$"
 )
 _CLOCK = re.compile(
     r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+|:\d{3})?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"
     r"|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}([.,]\d+)?\s*$"
 )
+_COLONS = re.compile(r"^\s*(19|20)\d\d:\d{2}:\d{2}[ T]")
+"""Dates with colons, as cameras write them (EXIF)."""
 _HALF = re.compile(r"^\s*[AaPp]\.?[Mm]\.?\s*$")
 """Before or after noon, in a column of its own."""
 _ZONED = rf"(?:Z|UTC|GMT|{'|'.join(ABBREVIATED)}|(?:0:00|:00[.,]0+|[T ]0{{4,6}}|[APap][Mm]) ?[+-]00(?::?00)?)$"
@@ -220,6 +222,8 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         found, _ = parse_with_bare_dates(texts, form)
         if fits(found):
             return time_choice(layout, columns, form, found, 2.0)
+    if share(_COLONS, texts):
+        return next((choice for clock in CLOCKS if (choice := time_as(layout, columns, f"%Y:%m:%d {clock}"))), None)
     for form in ("epoch-us", "epoch-ns"):
         found = counted.parse(texts, form)
         if fits(found):

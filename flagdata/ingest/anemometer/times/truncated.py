@@ -16,17 +16,24 @@ from flagdata.ingest.anemometer.words.headings import names_time
 
 _CUT = re.compile(r"(\d{1,2}):([0-5]\d)\.\d")
 _DATE = re.compile(
-    r"\s*(?:(?P<year>(?:19|20)\d\d)(?P<sign>[-/.]?)(?:0[1-9]|1[0-2])(?P=sign)(?:0[1-9]|[12]\d|3[01]))(?!\d)"
+    r"\s*(?:(?P<year>(?:19|20)\d\d)(?P<sign>[-/.]?)(?:0[1-9]|1[0-2])(?P=sign)(?:0[1-9]|[12]\d|3[01])"
+    r"|\d{1,2}(?P<between>[-/.])\d{1,2}(?P=between)(?P<last>(?:19|20)\d\d))(?!\d)"
 )
-"""A date whose year comes first."""
+"""A date with a year of four digits."""
 _LEAST, _STEADY = 3, 0.06
 """Rows that tell, and the difference from the middle step [s] that a clock of tenths leaves a steady rate."""
 
 
 def before_1970(cells: Sequence[str]) -> bool:
     """Whether cells begin with dates of which most are before 1970."""
-    years = [match["year"] for cell in cells if (match := _DATE.match(cell)) is not None]
+    years = [match["year"] or match["last"] for cell in cells if (match := _DATE.match(cell)) is not None]
     return len(years) >= max(_LEAST, 0.9 * len(cells)) and sum(year < "1970" for year in years) > 0.5 * len(years)
+
+
+def too_early(column: str, cells: Sequence[str]) -> tuple[str, str]:
+    """What is wrong with a column of dates before 1970, and what its owner can do."""
+    what = f"column {column} holds dates before 1970 ({cells[0]!r}), which a recording cannot hold"
+    return what, "if a clock was never set, leave the column out by --columns, and give --start TIME --rate HZ"
 
 
 def doubt(layout: Layout) -> tuple[str, str] | None:
@@ -34,8 +41,7 @@ def doubt(layout: Layout) -> tuple[str, str] | None:
     for at, name in enumerate(layout.names):
         cells = [cell for cell in layout.column(at) if cell]
         if names_time(name) and before_1970(cells):
-            what = f"column {name!r} holds dates before 1970 ({cells[0]!r}), which a recording cannot hold"
-            return what, "if a clock was never set, leave the column out by --columns, and give --start TIME --rate HZ"
+            return too_early(repr(name), cells)
     for at, name in enumerate(layout.names):
         cells = [cell for cell in layout.column(at) if cell]
         found = [_CUT.fullmatch(cell) for cell in cells]

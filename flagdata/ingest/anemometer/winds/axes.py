@@ -51,12 +51,24 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
                 channel = f"wind_{name[1]}"
                 found[at] = replace(headings[at], channel=channel, quantity=channel, sure=False, label=())
             return found, False
+    _speed_beside_its_direction(found, words)
     for letter, own_axis, other in (("u", "wind_x", "wind_y"), ("v", "wind_y", "wind_x")):
         if not any(heading.channel == other for heading in headings):
             for at, heading in enumerate(headings):
                 if heading.channel == own_axis and words_of(layout.names[at])[:1] == [letter]:
                     found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=False)
     return found, False
+
+
+def _speed_beside_its_direction(found: list[Heading], words: Sequence[set[str]]) -> None:
+    """Make W_vel beside W_dir the speed of the wind, where no components along x and y make it the vertical one."""
+    if any(heading.channel in ("wind_x", "wind_y") for heading in found):
+        return
+    if not any(heading.channel == "wind_direction" and "w" in said for heading, said in zip(found, words, strict=True)):
+        return
+    for at, heading in enumerate(found):
+        if heading.channel == "wind_z" and words[at] in ({"w", "vel"}, {"w", "velocity"}):
+            found[at] = replace(heading, channel="wind_speed", quantity="wind_speed")
 
 
 def _towards(words: set[str], heading: Heading, side: frozenset[str]) -> bool:

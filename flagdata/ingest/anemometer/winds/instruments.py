@@ -203,12 +203,13 @@ def named_wind(
     indices = [index for index, name in enumerate(layout.names) if name == column]
     if not indices and column.isdigit() and 1 <= int(column) <= layout.number_of_columns():
         indices = [int(column) - 1]
-    if len(indices) != 1 or layout.names[indices[0]] in beaufort(layout):
+    name = layout.names[indices[0]] if len(indices) == 1 else ""
+    if len(indices) != 1 or name in beaufort(layout):
         return (), ()
-    name = layout.names[indices[0]]
     stated = understand(name, layout.units[indices[0]])
     known = stated.unit if fits("wind_speed", stated.unit) else None
-    odd = (_otherwise(name, known, told),) if told is not None and known is not None and told != known else ()
+    odd = [_otherwise(name, known, told)] if told is not None and known is not None and told != known else []
+    odd += [f"the heading of {name!r} is of a gust, an extreme or a spread: taken as you said"] * stated.spread
     how = f"in {told}, as you said" if told else f"in {known} by its heading" if known else ""
     speed = Column(index=indices[0], unit=told or known, told=how)
     found = _gathered(layout, time, speed=indices[0])
@@ -218,7 +219,7 @@ def named_wind(
     elif len(found.of("wind_direction")) == 1 and not [at for at in found.of(*SPEEDS) if at != indices[0]]:
         towards = _direction(found, indices[0], "wind_direction")
     columns |= {} if towards is None else {towards[0]: towards[1]}
-    return (Wind(label=column, height=stated.height, columns=columns, sure=True),), odd
+    return (Wind(label=column, height=stated.height, columns=columns, sure=True),), tuple(odd)
 
 
 def _otherwise(name: str, stated: str, told: str) -> str:
@@ -274,7 +275,7 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
             ))  # fmt: skip
     if any(wind.sure for wind in winds):
         found.remarks.extend(
-            f"column {wind.label!r} is a speed, but beside positions nothing says that it is the wind's: left out"
+            f"column {wind.label!r} may be a speed, but nothing says that it is the wind's: left out"
             for wind in winds if not wind.sure
         )  # fmt: skip
         winds = [wind for wind in winds if wind.sure]
