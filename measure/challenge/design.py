@@ -34,7 +34,8 @@ def composition(recipe: ChallengeRecipe, count: int) -> dict[Kind, int]:
 def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[Key, ...]:
     """The keys of `count` sets, in the order of their names, which says nothing; impacts are not known yet.
 
-    Effects, noises and rates are dealt out evenly, everything else is drawn for each set.
+    Effects, noises, rates and strengths that are fixed beforehand are dealt out evenly, everything else is drawn for
+    each set.
 
     Raises:
         UsageError: fewer than one set.
@@ -55,6 +56,7 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[Key, ...]:
     rates, noises = deal("rate", recipe.rates, count), deal("noise", recipe.noises, count)
     varying = deal("wind", [index < round(10 * recipe.varying) for index in range(10)], count)
     order = stream(seed, "order").permutation(count)
+    turns = [groups[:index].count(group) for index, group in enumerate(groups)]
     keys: list[Key] = []
     for place, index in enumerate(order.tolist()):
         kind, effects = groups[index]
@@ -62,7 +64,8 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[Key, ...]:
         keys.append(
             _key(
                 recipe, stream(seed, "set", index), name=f"set-{place + 1:03d}", kind=kind, effects=effects,
-                numerics=numerics, rate=rates[index], noise=noises[index], varying=varying[index],
+                turn=None if kind is Kind.PAIR else turns[index], numerics=numerics, rate=rates[index],
+                noise=noises[index], varying=varying[index],
             )
         )  # fmt: skip
     return tuple(keys)
@@ -97,6 +100,7 @@ def _key(
     name: str,
     kind: Kind,
     effects: tuple[str, ...],
+    turn: int | None,
     numerics: str,
     rate: int,
     noise: float,
@@ -108,7 +112,7 @@ def _key(
     intensity = recipe.intensity.at(rng.random())
     table = recipe.outside if kind is Kind.OUTSIDE else recipe.effects
     return Key(
-        name=name, kind=kind, effects=tuple(_acting(effect, table[effect], rng.random) for effect in effects),
+        name=name, kind=kind, effects=tuple(_acting(effect, table[effect], turn, rng.random) for effect in effects),
         impact=0.0, material=material, density=density, bending=bending, damping=damping,
         speeds=_speeds(recipe, rng), toward=float(rng.uniform(-math.pi, math.pi)),
         heading=float(rng.uniform(-_HEADING, _HEADING)), intensity=intensity if varying else 0.0,
@@ -116,8 +120,8 @@ def _key(
     )  # fmt: skip
 
 
-def _acting(effect: str, strengths: Strengths, uniform: Callable[[], float]) -> Acting:
-    size = strengths.range.at(uniform())
+def _acting(effect: str, strengths: Strengths, turn: int | None, uniform: Callable[[], float]) -> Acting:
+    size = strengths.size(turn, uniform())
     value = -size if uniform() < strengths.negative else size
     unit = effect_type(effect).parameters()[strengths.parameter].unit
     return Acting(effect=effect, parameter=strengths.parameter, value=value, unit=unit)

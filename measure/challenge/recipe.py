@@ -9,7 +9,8 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
     [log]             share: of the sets whose wind varies; rate; intensity: a range; length: integral scale
     [markers]         columns, rows; jitter: as a share of the spacing; one pattern for all sets
     [numerics.NAME]   columns, rows, diagonals, integrator, step, thickness: of contact, none where it is 0; damping
-    [effects.NAME]    parameter, range, negative: share of the sets with the other sign; an effect of the library
+    [effects.NAME]    parameter, range, negative: share of the sets with the other sign; an effect of the library;
+                      values: magnitudes in place of a range; sets of this effect alone have them in turn
     [outside.NAME]    the same, of `measure.challenge.outside`
 """
 
@@ -85,11 +86,25 @@ class Strengths:
         parameter: which strength is drawn; everything else stays at its usual value.
         range: of its magnitude.
         negative: share of the sets in which it is negative.
+        values: magnitudes that were fixed beforehand; none where the magnitude is drawn from the range.
     """
 
     parameter: str
     range: Range
     negative: float
+    values: tuple[float, ...] = ()
+
+    def size(self, turn: int | None, uniform: float) -> float:
+        """The magnitude in a set: of fixed values that whose turn it is, or any where none has; else from the range.
+
+        Args:
+            turn: how many sets of this effect alone come before; `None` of an effect beside another.
+            uniform: a draw from 0 to 1.
+        """
+        if not self.values:
+            return self.range.at(uniform)
+        count = len(self.values)
+        return self.values[int(uniform * count) if turn is None else turn % count]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,10 +256,16 @@ def _strengths(table: Table, known: Registry) -> dict[str, Strengths]:
         parameter = inner.text("parameter", strengths[0]) or strengths[0]
         if parameter not in strengths:
             raise UnknownNameError.of("strength", parameter, strengths, where=inner.where)
+        values, drawn = inner.numbers("values"), _range(inner, "range", 1.0)
+        if any(value <= 0 for value in values):
+            raise InputError(
+                "values has magnitudes that are not above 0", where=inner.where, fix="say by negative which sets differ"
+            )
+        if values and "range" in inner.names():
+            raise InputError("values and a range", where=inner.where, fix="give one of them")
         found[name] = Strengths(
-            parameter=parameter, range=_range(inner, "range", 1.0),
-            negative=inner.number("negative", 0.0, least=0),
-        )  # fmt: skip
+            parameter=parameter, range=drawn, negative=inner.number("negative", 0.0, least=0), values=values
+        )
         inner.done()
     return found
 

@@ -178,6 +178,8 @@ def test_markers_lie_on_the_cloth_and_not_on_the_fitters_vertices(tiny: Challeng
         ('diagonals = "forward"', 'integrator = "implicit"', InputError),
         ('diagonals = "forward"', "step = 0.001", InputError),
         ("[effects.shear]\nrange = 0.4", "", InputError),
+        ("[effects.shear]\nrange = 0.4", "[effects.shear]\nrange = 0.4\nvalues = [0.2]", InputError),
+        ("[effects.shear]\nrange = 0.4", "[effects.shear]\nvalues = [0.2, 0.0]", InputError),
     ],
 )
 def test_recipes_that_make_no_sense_are_refused(old: str, new: str, error: type[Exception]) -> None:
@@ -186,6 +188,26 @@ def test_recipes_that_make_no_sense_are_refused(old: str, new: str, error: type[
         parse(TINY.replace(old, new), where="tiny")
 
 
+def test_strengths_that_are_fixed_beforehand_are_dealt_out_evenly() -> None:
+    recipe = load("registered")
+    keys = draw(recipe, seed=5, count=96)
+    alone: dict[str, list[float]] = {}
+    for key in keys:
+        if key.kind is Kind.ONE:
+            alone.setdefault(key.effects[0].effect, []).append(abs(key.effects[0].value))
+    assert {name: sorted(values) for name, values in alone.items()} == {
+        name: sorted(strengths.values) for name, strengths in recipe.effects.items()
+    }
+    beside = {(a.effect, abs(a.value)) for key in keys if key.kind is Kind.PAIR for a in key.effects}
+    assert beside <= {(name, value) for name, strengths in recipe.effects.items() for value in strengths.values}
+    assert len({value for _, value in beside}) > len(
+        {name for name, _ in beside}
+    )  # neither the first nor the last alone
+    outside = Counter(key.effects[0].effect for key in keys if key.kind is Kind.OUTSIDE)
+    assert set(outside.values()) == {3}
+    assert len(outside) == 10
+
+
 def test_the_catalogs_recipes_parse() -> None:
-    assert CHALLENGES.names() == ("standard", "strong")
-    assert [load(name).count for name in CHALLENGES.names()] == [3, 3]
+    assert CHALLENGES.names() == ("registered", "standard", "strong")
+    assert [load(name).count for name in CHALLENGES.names()] == [3, 3, 3]

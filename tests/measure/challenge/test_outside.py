@@ -12,15 +12,25 @@ import torch
 from torch import Tensor
 
 from flagdata.rng import stream
-from measure.challenge.outside import OUTSIDE, button, places, seam, tether
+from measure.challenge.outside import OUTSIDE, button, places, seam, tether, vent, whirl
 from measure.challenge.outside.attraction import Attraction
+from measure.challenge.outside.balloon import DRAG, NET, Balloon
+from measure.challenge.outside.drawstring import Drawstring
+from measure.challenge.outside.fringes import Fringes
+from measure.challenge.outside.neighbour import Neighbour
 from measure.challenge.outside.one_sided import OneSided
 from measure.challenge.outside.passing_obstacle import PERIOD, PassingObstacle
+from measure.challenge.outside.sheltering_wall import CREST, ShelteringWall
+from measure.challenge.outside.spray import Spray
+from measure.challenge.outside.swaying_pole import SwayingPole
 from measure.challenge.outside.tether import Tether
 from measure.challenge.outside.turning_pole import TurningPole
 from measure.challenge.outside.updraft import Updraft
+from measure.challenge.outside.veer import Veer
+from measure.challenge.outside.vent import Vent
 from measure.challenge.outside.vortex_street import STROUHAL, VortexStreet
 from measure.challenge.outside.weft_friction import WeftFriction
+from measure.challenge.outside.whirl import Whirl
 from sim.effects import EFFECTS, Effect, apply
 from sim.handles import Handles
 from sim.integrate.symplectic import Backend, advance
@@ -231,3 +241,99 @@ def test_the_two_sides_take_more_and_less_by_the_same_share() -> None:
     turn = torch.diag(torch.tensor([-1.0, -1.0, 1.0], dtype=torch.float64))
     other = float(added(OneSided(share=0.2), turn=turn)[:, 0].sum())
     assert {round(one, 9), round(other, 9)} == {5.0, -5.0}
+
+
+def air_at(effect: Any, *places_: tuple[float, float, float]) -> np.ndarray:
+    """(place, 3) the air at offsets from the middle of the attachments, in a wind of 5 m/s in +x [m/s]."""
+    wind = torch.tensor([[5.0], [0.0], [0.0]], dtype=torch.float64)
+    return effect.field(0.0, torch.tensor(places_, dtype=torch.float64)[..., None], wind)[..., 0].numpy()
+
+
+def test_the_wall_shelters_what_is_below_its_crest() -> None:
+    air = air_at(ShelteringWall(share=0.6), (0.0, 0.0, -2.0), (0.0, 0.0, CREST), (0.0, 0.0, 2.0))
+    np.testing.assert_allclose(air, np.outer([2.0, 3.5, 5.0], [1.0, 0.0, 0.0]), atol=1e-5)
+
+
+def test_a_veering_wind_turns_by_its_rate_times_the_height_and_keeps_its_speed() -> None:
+    air = air_at(Veer(rate=0.8), (0.3, 0.2, -0.5), (0.0, 0.0, 0.0), (0.0, -1.0, 1.0))
+    np.testing.assert_allclose(np.arctan2(air[:, 1], air[:, 0]), [-0.4, 0.0, 0.8], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(air, axis=1), 5.0, rtol=1e-12)
+
+
+def test_the_air_around_a_whirl_has_its_circulation() -> None:
+    """Γ (1 − e^(−(r/c)²)) around a circle of radius r, counter-clockwise; none of it in the middle."""
+    effect, angles, radius = Whirl(circulation=3.0, core=0.3), np.linspace(0, 2 * np.pi, 24, endpoint=False), 0.45
+    x, y = whirl.PLACE
+    circle = [(x + radius * math.cos(a), y + radius * math.sin(a), 0.2) for a in angles]
+    tangent = np.stack([-np.sin(angles), np.cos(angles)], axis=1)
+    around = (air_at(effect, *circle)[:, :2] * tangent).sum(axis=1).mean() * 2 * np.pi * radius
+    assert around == pytest.approx(3.0 * (1 - math.exp(-(1.5**2))), rel=1e-12)
+    np.testing.assert_allclose(air_at(effect, (x, y, 0.0))[0], [5.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_swaying_pole_pushes_every_mass_as_its_acceleration_asks() -> None:
+    """m A ω² sin ω t, to the left of the wind: at a quarter of the period all of it, at a half none."""
+    base, state = sheet_across()
+    wind, effect = base.wind.velocity(0.0), SwayingPole(amplitude=0.05, frequency=2.0)
+    mass = float(base.cloth.mass.sum())
+    for time, share in ((0.125, 1.0), (0.25, 0.0), (0.375, -1.0)):
+        push = effect.force(base.cloth, time, state.position, state.velocity, wind).sum(0)[:, 0]
+        expected = [0.0, share * mass * 0.05 * (4 * math.pi) ** 2, 0.0]
+        np.testing.assert_allclose(push, expected, atol=1e-12)
+
+
+def test_drops_give_up_all_their_momentum() -> None:
+    """A sheet of 1 m² across the wind catches L U of water a second, which has the velocity (U, 0, −V)."""
+    caught = 0.01 * 5.0
+    expected = caught * torch.tensor([5.0, 0.0, -7.0], dtype=torch.float64)
+    torch.testing.assert_close(added(Spray(content=0.01)).sum(0), expected, rtol=1e-12, atol=1e-14)
+
+
+def test_fringes_drag_at_the_fly_alone() -> None:
+    """½ ρ b H U² = 0.5 · 1.225 · 0.2 · 1 · 25 N downwind, also on a cloth that lies along the wind."""
+    along = torch.tensor([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], dtype=torch.float64)
+    for turn in (None, along):
+        force = added(Fringes(breadth=0.2), turn=turn)
+        assert float(force[:20].abs().max()) == 0.0
+        np.testing.assert_allclose(force.sum(0), [0.5 * 1.225 * 0.2 * 25, 0.0, 0.0], atol=1e-12)
+
+
+def test_the_vent_takes_the_pressure_off_its_panel() -> None:
+    """A share q of ρ U² = 25 N/m² over 0.4 · 0.6 m²."""
+    area = float(np.prod(np.array(vent.HIGH) - np.array(vent.LOW)))
+    force = added(Vent(share=0.5), cells=20)
+    np.testing.assert_allclose(force.sum(0), [-0.5 * 25 * area, 0.0, 0.0], atol=1e-9)
+    base, _ = sheet_across(20)
+    centre = force[:, 0].numpy() @ base.cloth.mesh.rest / float(force[:, 0].sum())
+    np.testing.assert_allclose(centre, np.add(vent.LOW, vent.HIGH) / 2, atol=1e-9)
+
+
+def test_the_neighbour_swings_the_wind_at_its_own_frequency_and_the_wind_carries_it_along() -> None:
+    effect = Neighbour(share=0.3, frequency=2.0)
+    for speed in (4.0, 8.0):
+        wind = torch.tensor([[speed], [0.0], [0.0]], dtype=torch.float64)
+        near, far = (torch.tensor([[[x], [0.4], [0.1]]], dtype=torch.float64) for x in (0.0, 1.0))
+        for time, share in ((0.125, 1.0), (0.25, 0.0), (0.375, -1.0)):
+            expected = [speed, share * 0.3 * speed, 0.0]
+            np.testing.assert_allclose(effect.field(time, near, wind)[0, :, 0], expected, atol=1e-12)
+            np.testing.assert_allclose(effect.field(time + 1 / speed, far, wind)[0, :, 0], expected, atol=1e-12)
+
+
+def test_a_balloon_lifts_and_is_blown_at_the_upper_fly_corner() -> None:
+    """0.5 N of lift take a sphere of 0.45 m: ½ ρ C_D S U² = 1.15 N at 5 m/s."""
+    force = added(Balloon(lift=0.5))
+    corner = 4 * 5 + 4
+    diameter = (6 * 0.5 / (math.pi * NET)) ** (1 / 3)
+    assert diameter == pytest.approx(0.45, abs=0.005)
+    blown = 0.5 * 1.225 * DRAG * math.pi / 4 * diameter**2 * 25
+    np.testing.assert_allclose(force[corner], [blown, 0.0, 0.5], rtol=1e-12)
+    assert int((force.abs().sum(1) > 0).sum()) == 1
+
+
+def test_a_drawstring_pulls_the_ends_of_the_fly_together_until_it_is_gathered() -> None:
+    force = added(Drawstring(tension=2.0))
+    np.testing.assert_allclose(force[[20, 24], 2], [2.0, -2.0], atol=1e-12)
+    assert float(force.sum(0).abs().max()) < 1e-12
+    assert float(force[:20].abs().max()) == 0.0
+    shrunk = torch.diag(torch.tensor([1.0, 1.0, 0.59], dtype=torch.float64))
+    assert float(added(Drawstring(tension=2.0, gathered=0.6), turn=shrunk).abs().max()) == 0.0
