@@ -38,7 +38,10 @@ VERBS: dict[str, tuple[str, str]] = {
     "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
     "withdraw": ("flagdata.commands.lake:withdraw", "Take artifacts off a branch; tags keep them."),
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
-    "export": ("flagdata.commands.export:export", "Write WebDataset, Parquet, MP4 + CSV, MCAP subsets or OBJ folders."),
+    "export": (
+        "flagdata.commands.export:export",
+        "Write WebDataset, Parquet, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
+    ),
     "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
     "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake."),
     "gc": ("flagdata.commands.upkeep:gc", "Delete what nothing refers to."),

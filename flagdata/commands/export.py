@@ -37,14 +37,15 @@ def export(
     as_json: bool,
     lake_path: str,
 ) -> None:
-    """Write a selection as WebDataset shards, Parquet, MP4 + CSV, MCAP subsets or OBJ folders.
+    """Write a selection as WebDataset shards, Parquet, MP4 + CSV, MCAP subsets, CSV of the wind or OBJ folders.
 
-    FORMAT is webdataset, parquet, mp4, mcap or, for mesh sequences, obj. The folder appears whole or not at all, and
-    its manifest.json names the version, the filter and the hash of every file:
+    FORMAT is webdataset, parquet, mp4, mcap, csv for every sample of an anemometer or, for mesh sequences, obj. The
+    folder appears whole or not at all, and its manifest.json names the version, the filter and the hash of every file:
 
     \b
       flagdata export webdataset --where "kind = 'clip'" --at v1 --split train --to shards/train
       flagdata export parquet --to catalog
+      flagdata export csv --where "kind = 'wind'" --to winds
       flagdata export obj --where "kind = 'meshes' and wind > 5" --to meshes
     """
     from flagdata.export import Export, prepare

@@ -26,6 +26,7 @@ FORMATS = Registry(
         "parquet": "flagdata.export.parquet:Parquet",
         "mp4": "flagdata.export.mp4:Mp4",
         "mcap": "flagdata.export.mcap:Mcap",
+        "csv": "flagdata.export.wind_csv:WindCsv",
         "obj": "flagdata.export.obj:ObjFolders",
     },
 )

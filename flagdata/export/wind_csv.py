@@ -1,0 +1,61 @@
+"""CSV of the wind: every sample of an anemometer with its instant, channels in SI units and what is wrong with it."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from flagdata.errors import InputError
+from flagdata.export.source import Entry, Source
+from flagdata.schema import CHANNELS, Kind, SampleFlag
+from flagdata.signals import WindSeries
+from flagdata.timebase import iso
+
+TIME, DEVICE, FLAGS = "time", "device_time", "flags"
+_NAMED = tuple(flag for flag in SampleFlag if flag)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindCsv:
+    """Files <artifact>.csv: UTC on the common clock and on the anemometer's own, each channel with its unit, flags.
+
+    Numbers read back exactly, and missing ones are empty cells. Flags are names of `schema.SampleFlag`, divided by
+    semicolons; samples that have them are written as all others are.
+    """
+
+    kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.WIND, Kind.RECORDING})
+
+    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+        samples = 0
+        channels: dict[str, None] = {}
+        for entry in source.entries():
+            wind = entry.record.wind()
+            if wind is None:
+                fix = "leave it out by --where"
+                raise InputError("a record without wind makes no table of it", where=entry.key, fix=fix)
+            with (folder / f"{entry.key}.csv").open("x", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow([TIME, DEVICE, *map(_heading, wind.channels), FLAGS])
+                writer.writerows(_rows(entry, wind))
+            samples += len(wind.time)
+            channels |= dict.fromkeys(wind.channels)
+            advance(1)
+        frames = {name: frame for name in channels if (frame := CHANNELS[name].frame)}
+        return {"samples": samples, "units": {name: CHANNELS[name].unit for name in channels}, "frames": frames}
+
+
+def _heading(channel: str) -> str:
+    return f"{channel} [{CHANNELS[channel].unit}]"
+
+
+def _rows(entry: Entry, wind: WindSeries) -> Iterator[Sequence[object]]:
+    columns = [values.tolist() for values in wind.channels.values()]
+    own = entry.record.device_wind_times.tolist()
+    for time, device, flags, *values in zip(wind.time.tolist(), own, wind.flags.tolist(), *columns, strict=True):
+        cells = [repr(value) if np.isfinite(value) else "" for value in values]
+        yield iso(time), iso(device), *cells, ";".join(str(flag.name) for flag in _NAMED if flags & flag)
