@@ -10,24 +10,35 @@ import click
 if TYPE_CHECKING:
     from flagdata.ingest.store import IngestResult
 
+_ONCE = frozenset({"why", "note"})
+"""What is told of one artifact alone where another of the same source has it, too."""
 _ANEMOMETERS = 4
 """Of one table that are described each; beyond these their number is told."""
 
 
 def print_results(results: Sequence[IngestResult]) -> None:
     """What one source became, for people, on stdout."""
+    told: set[tuple[str, str]] = set()
     for result in results:
-        _print_result(result)
+        _print_result(result, told)
 
 
-def _print_result(result: IngestResult) -> None:
+def _print_result(result: IngestResult, told: set[tuple[str, str]]) -> None:
+    """One artifact; of what was told of another of the same source, reasons and notes are not told again."""
     artifact, report = result.artifact, result.report
     if not result.created:
         click.echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
         return
     click.echo(f"{artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
+    again = 0
     for label, text in _lines(report):
+        if label in _ONCE and (label, text) in told:
+            again += 1
+            continue
+        told.add((label, text))
         click.echo(f"  {label:<8} {text}")
+    if again:
+        click.echo(f"  {'':<8} and {again} reasons and notes as above")
 
 
 def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:

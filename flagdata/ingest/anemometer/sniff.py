@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
@@ -63,7 +64,9 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         text = "profiles of a SODAR, in blocks whose stamp stands above them (Scintec, APRun, FORMAT-1)"
         fix = "write a table of one height with the program that reads them: one row a time, with speed and direction"
         return (Guess(format="SODAR profiles", score=0.0, reasons=(text,), kind="other", fix=fix),)
-    return recognise(source) or (unknown(source),)
+    rewritten = tuple(finding.what for finding in source.findings)
+    found = tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in recognise(source))
+    return found or (unknown(source),)
 
 
 def unknown(source: TextFile) -> Guess:

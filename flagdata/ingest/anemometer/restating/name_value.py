@@ -24,7 +24,8 @@ from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as
 from flagdata.ingest.anemometer.winds.angles import compass_unit
-from flagdata.ingest.anemometer.winds.instruments import SPEEDS, find_winds
+from flagdata.ingest.anemometer.winds.found import SPEEDS
+from flagdata.ingest.anemometer.winds.instruments import find_winds
 from flagdata.ingest.anemometer.winds.sites import sites
 from flagdata.ingest.anemometer.words.headings import interest, understand, words_of
 from flagdata.units import spelled

@@ -21,6 +21,7 @@ def report(reading: Reading, *, now: int) -> tuple[Finding, ...]:
         Finding(
             kind="stamps-in-future", severity=Severity.WARNING, count=count, where=f"line {reading.line[late][0]}",
             what=f"{count} {rows} stamped after today, the last {iso(int(reading.time.max()))}: a wrong clock or date",
-            fix="check the logger's clock and the order of day, month and year; the stamps are kept as written",
+            fix="check the logger's clock and the order of day, month and year; years of two digits are taken as 1970 "
+            "to 2069, and a recording holds none before",
         ),
     )  # fmt: skip

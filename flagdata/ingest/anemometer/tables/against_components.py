@@ -8,7 +8,7 @@ from flagdata.ingest.anemometer.tables import offered_columns
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import vectors
-from flagdata.ingest.anemometer.winds.instruments import Column, Wind
+from flagdata.ingest.anemometer.winds.found import Column, Wind
 from flagdata.ingest.anemometer.winds.vectors import Components
 from flagdata.ingest.anemometer.words.headings import understand
 

@@ -13,7 +13,7 @@ from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds.angles import compass_unit, unit_of
 from flagdata.ingest.anemometer.winds.directions import judge
-from flagdata.ingest.anemometer.winds.instruments import Column, Wind
+from flagdata.ingest.anemometer.winds.found import Column, Wind
 from flagdata.ingest.anemometer.words.headings import understand
 
 _CLOSE, _LEAST = 0.05, 0.05

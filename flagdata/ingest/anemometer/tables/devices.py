@@ -30,7 +30,8 @@ from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds.angles import compass_unit
-from flagdata.ingest.anemometer.winds.instruments import Wind, find_winds, named_wind
+from flagdata.ingest.anemometer.winds.found import Wind
+from flagdata.ingest.anemometer.winds.instruments import find_winds, named_wind
 from flagdata.ingest.anemometer.words.headings import interest, names_time, understand
 from flagdata.signals import Instants
 

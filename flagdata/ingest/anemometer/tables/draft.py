@@ -40,12 +40,8 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
 from flagdata.ingest.anemometer.winds.codes import below_zero
-from flagdata.ingest.anemometer.winds.instruments import (
-    Column,
-    Wind,
-    find_winds,
-    named_wind,
-)
+from flagdata.ingest.anemometer.winds.found import Column, Wind
+from flagdata.ingest.anemometer.winds.instruments import find_winds, named_wind
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts, of_no_mean
 from flagdata.ingest.anemometer.winds.row_units import mixed_units
 from flagdata.ingest.anemometer.winds.sites import site_of_all, sites

@@ -21,7 +21,8 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice, whole_number
 from flagdata.ingest.anemometer.winds import beside, bow, own_motion, vectors
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, WEATHER, Column, Wind
+from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Wind
+from flagdata.ingest.anemometer.winds.weather import WEATHER
 from flagdata.ingest.anemometer.words import headings, series
 from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import fits, understand
@@ -198,6 +199,9 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None
     direction = others.get("wind_direction")
     apart = (*time.columns, *([direction.index] if direction else []))
     own = None if speed is None else beside.direction_of(layout, speed, apart=apart)
+    if own is None and speed is not None and direction is not None and _of_another_height(layout, speed, direction):
+        entries, direction = {at: entry for at, entry in entries.items() if at != direction.index}, None
+        own = _at_its_height(layout, speed)
     if own is not None:
         entries = {at: entry for at, entry in entries.items() if "wind_direction" not in entry}
         return f'--columns "{",".join(_numbered(entries | {own: f"wind_direction[{unit_of(layout, own)}]"}))}"'
@@ -206,6 +210,20 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None
         return f'--columns "{",".join([*_numbered(entries), *open_one])}"'
     line = ",".join([*_numbered(entries | {direction.index: ways[0]}), *open_one])
     return f'--columns "{line}", or with {" or ".join(ways[1:])} for the direction, which is in doubt'
+
+
+def _of_another_height(layout: Layout, speed: int, direction: Column) -> bool:
+    """Whether the headings of a speed and a direction state heights that are not the same."""
+    heights = [understand(layout.names[at], layout.units[at]).height for at in (speed, direction.index)]
+    return None not in heights and heights[0] != heights[1]
+
+
+def _at_its_height(layout: Layout, speed: int) -> int | None:
+    """The one direction of the wind at the height of a speed; `None` where there is none or several."""
+    headings = [understand(name, unit) for name, unit in zip(layout.names, layout.units, strict=True)]
+    height = headings[speed].height
+    found = [at for at, own in enumerate(headings) if own.channel == "wind_direction" and own.height == height]
+    return found[0] if len(found) == 1 else None
 
 
 def _ways(layout: Layout, column: Column) -> tuple[str, ...]:

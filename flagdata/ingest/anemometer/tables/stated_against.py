@@ -5,7 +5,7 @@ from __future__ import annotations
 from flagdata.ingest.anemometer.tables import against_components
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds import bow, own_motion
-from flagdata.ingest.anemometer.winds.instruments import Wind
+from flagdata.ingest.anemometer.winds.found import Wind
 from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.words.headings import words_of
 

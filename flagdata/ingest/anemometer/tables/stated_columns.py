@@ -29,7 +29,7 @@ from flagdata.ingest.anemometer.times.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as
 from flagdata.ingest.anemometer.winds.angles import compass_unit
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, SPEEDS, Column, Wind
+from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical

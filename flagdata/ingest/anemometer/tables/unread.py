@@ -12,7 +12,7 @@ from flagdata.ingest.anemometer.times.timecolumns import event_stamps
 from flagdata.ingest.anemometer.winds import bow
 from flagdata.ingest.anemometer.winds.angles import compass_unit, may_be_direction, may_be_two
 from flagdata.ingest.anemometer.winds.directions import judge
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, Wind
+from flagdata.ingest.anemometer.winds.found import COMPONENTS, Wind
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import COURSES
 

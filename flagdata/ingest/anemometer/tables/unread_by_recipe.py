@@ -10,7 +10,7 @@ from flagdata.ingest.anemometer.tables import unread, unread_rest, unread_winds
 from flagdata.ingest.anemometer.text.layout import Layout, lay_out
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.ingest.anemometer.times.timecolumns import find_time
-from flagdata.ingest.anemometer.winds.instruments import Column, Wind
+from flagdata.ingest.anemometer.winds.found import Column, Wind
 from flagdata.ingest.anemometer.words.headings import interest
 
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.winds.instruments import Wind
+from flagdata.ingest.anemometer.winds.found import Wind
 
 _MOST = 40
 """Columns that are named; of more, the number."""

@@ -10,7 +10,7 @@ from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.winds import beside, own_motion
-from flagdata.ingest.anemometer.winds.instruments import Wind
+from flagdata.ingest.anemometer.winds.found import Wind
 from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import WIND

@@ -65,7 +65,12 @@ def in_tens(layout: Layout, index: int) -> bool:
 
 
 def compass_unit(layout: Layout, index: int) -> str | None:
-    """The unit of a column of points of the compass, by the language of its letters; `None` where it holds none."""
+    """The unit of a column of points of the compass, by the language of its letters; `None` where it holds none.
+
+    A letter or word that never changes is a point only below a heading that says a direction or a wind.
+    """
+    if len(set(_filled(layout, index))) < 2 and not may_be_points(understand(layout.names[index], layout.units[index])):
+        return None
     headings = " ".join(layout.names)
     return compass.table_of(_filled(layout, index), heading=f"{layout.names[index]} {headings}", share=1 - _UNREADABLE)
 

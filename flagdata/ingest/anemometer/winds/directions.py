@@ -67,6 +67,8 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
     low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     if not len(known) or high > _TURN[1] or low < _TURN[0]:
         return _beyond(low, high)
+    if high - low > _TURN[1]:
+        return Judged(left_out=f"runs over more than a turn, {low:g} to {high:g}, as a difference does: left out")
     whole, several = bool(np.all(known % 1 == 0)), len(np.unique(known)) > _FEW
     if heading.unit in (None, "deg") and low >= 0 and high <= 16 and whole and several:
         eight = high <= _EIGHT

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
@@ -15,84 +14,16 @@ from flagdata.ingest.anemometer.winds import beside, bow, codes, other_units, ow
 from flagdata.ingest.anemometer.winds.angles import compass_unit, day_of_month, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
+from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Found, Wind
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort
 from flagdata.ingest.anemometer.winds.vanes import number, vanes
+from flagdata.ingest.anemometer.winds.weather import with_weather
 from flagdata.ingest.anemometer.words.headings import Heading, fits, understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import WIND
 from flagdata.units import unit
 
-SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
-COMPONENTS = ("wind_x", "wind_y", "wind_z")
 _DIRECTION_OF = {name: name.replace("speed", "direction") for name in SPEEDS}
-WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
-_PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
-"""Ranges of the air pressure by unit [in it]; they do not overlap."""
 _UNREADABLE = 0.1
-
-
-@dataclass(frozen=True, kw_only=True)
-class Column:
-    """A column for a channel.
-
-    Attributes:
-        index: of the column.
-        unit: as `flagdata.units` spells it; `None` where nothing tells it.
-        told: how the unit is known.
-        towards: of a direction, whether the wind blows to it.
-    """
-
-    index: int
-    unit: str | None
-    told: str
-    towards: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wind:
-    """One anemometer of a table.
-
-    Attributes:
-        label: what the user calls it by: the heading of its speed, or of its first component.
-        height: above ground [m], where the heading tells.
-        columns: by channel.
-        sure: whether the heading names the wind; false where only the unit or a lone "speed" speaks for it.
-        site: column and text of the rows that are its own, where a table mixes sites.
-        of_earth: whether its components are said to be towards east (x) and north (y).
-    """
-
-    label: str
-    height: float | None
-    columns: Mapping[str, Column]
-    sure: bool
-    site: tuple[int, str] | None = None
-    of_earth: bool = False
-
-    def without_unit(self) -> tuple[str, ...]:
-        """Channels of the wind's speed whose unit nothing tells."""
-        return tuple(name for name in (*SPEEDS, *COMPONENTS) if name in self.columns and not self.columns[name].unit)
-
-
-@dataclass
-class _Found:
-    """Columns by what their heading says, with numbers in them."""
-
-    layout: Layout
-    headings: list[Heading]
-    values: dict[int, NDArray[np.float64]] = field(default_factory=dict)
-    remarks: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    of_earth: bool = False
-
-    def of(self, *channels: str) -> list[int]:
-        return [index for index in self.values if self.headings[index].channel in channels]
-
-    def key(self, index: int) -> tuple[object, ...]:
-        heading = self.headings[index]
-        return (*heading.label, heading.height)
-
-    def name(self, index: int) -> str:
-        name = self.layout.names[index]
-        return f"{name}#{index + 1}" if self.layout.names.count(name) > 1 else name
 
 
 def find_winds(
@@ -109,17 +40,27 @@ def find_winds(
     for index, first in other_units.again(found.values, open_ones).items():
         found.remarks.append(f"column {found.name(index)!r} is {found.name(first)!r} in another unit: left out")
         del found.values[index]
-    for index, (base, power) in powers.of_others(found.values, found.of("wind_speed")).items():
-        found.remarks.append(f"column {found.name(index)!r} is the {power} of {found.name(base)!r}, no speed: left out")
-        del found.values[index]
+    _leave_out_combinations(found)
     winds = [*_speeds(found, told), *_components(found, told)]
-    winds = [_with_weather(found, wind, many=len(winds) > 1) for wind in winds]
+    winds = [with_weather(found, wind, many=len(winds) > 1) for wind in winds]
     _doubt_headings(found, winds)
     _check_gusts(found, winds)
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
 
 
-def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) -> _Found:
+def _leave_out_combinations(found: Found) -> None:
+    """Leave out squares, cubes and differences of speeds, which are none."""
+    speeds = found.of("wind_speed")
+    for index, (base, power) in powers.of_others(found.values, speeds).items():
+        found.remarks.append(f"column {found.name(index)!r} is the {power} of {found.name(base)!r}, no speed: left out")
+        del found.values[index]
+    for index, (first, second) in powers.differences(found.values, found.of("wind_speed")).items():
+        of = f"{found.name(first)!r} less {found.name(second)!r}"
+        found.remarks.append(f"column {found.name(index)!r} is {of}, no speed: left out")
+        del found.values[index]
+
+
+def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) -> Found:
     """The columns whose heading names a quantity, and their values.
 
     Args:
@@ -132,7 +73,7 @@ def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) 
         own = beside.direction_of(layout, index, apart=time)
         if own is not None and (not headings[own].quantity or index == speed):
             headings[own] = beside.as_direction(headings[own], of=headings[index])
-    found = _Found(layout=layout, headings=headings, of_earth=of_earth)
+    found = Found(layout=layout, headings=headings, of_earth=of_earth)
     for index, heading in enumerate(headings):
         if index in time or not heading.quantity or day_of_month(layout, index):
             continue
@@ -159,7 +100,7 @@ def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) 
     return found
 
 
-def _few_words(found: _Found, index: int, parsed: Numbers) -> bool:
+def _few_words(found: Found, index: int, parsed: Numbers) -> bool:
     """Whether a column holds numbers, and a few words that say why there is none; of a wind, that is said."""
     cells = found.layout.column(index)
     listed = codes.words(cells, parsed)
@@ -172,7 +113,7 @@ def _few_words(found: _Found, index: int, parsed: Numbers) -> bool:
     return bool(listed)
 
 
-def _doubt_headings(found: _Found, winds: Sequence[Wind]) -> None:
+def _doubt_headings(found: Found, winds: Sequence[Wind]) -> None:
     """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
     words = [set(words_of(name)) for name in found.layout.names]
     windy = any("wind" in word or word in WIND for name in words for word in name)
@@ -226,7 +167,7 @@ def _otherwise(name: str, stated: str, told: str) -> str:
     return f"the heading of {name!r} states {stated}; taken as {told}, as you said"
 
 
-def _column(found: _Found, index: int, channel: str, told: str | None) -> Column:
+def _column(found: Found, index: int, channel: str, told: str | None) -> Column:
     """A column of a speed with its unit."""
     stated = found.headings[index].unit
     stated = stated if fits(channel, stated) else None
@@ -238,7 +179,7 @@ def _column(found: _Found, index: int, channel: str, told: str | None) -> Column
     return Column(index=index, unit=told, told=f"in {told}, as you said")
 
 
-def _speeds(found: _Found, told: str | None) -> list[Wind]:
+def _speeds(found: Found, told: str | None) -> list[Wind]:
     groups: dict[tuple[object, ...], dict[str, list[int]]] = {}
     for index in found.of(*SPEEDS):
         groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, []).append(index)
@@ -282,7 +223,7 @@ def _speeds(found: _Found, told: str | None) -> list[Wind]:
     return winds
 
 
-def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
+def _distinct(found: Found, indices: Sequence[int]) -> list[int]:
     """Those of columns with the same words that are readings of their own: not another unit, not the mean of one."""
     order = sorted(
         indices, key=lambda i: (found.headings[i].unit is None, found.headings[i].mean, found.headings[i].unit != "m/s")
@@ -302,7 +243,7 @@ def _distinct(found: _Found, indices: Sequence[int]) -> list[int]:
     return sorted(kept)
 
 
-def _marks_quality(found: _Found, index: int, indices: Sequence[int]) -> bool:
+def _marks_quality(found: Found, index: int, indices: Sequence[int]) -> bool:
     """Whether a column holds one or two whole numbers, where another of the same name holds more."""
     name = found.layout.names[index]
     kinds = {
@@ -312,7 +253,7 @@ def _marks_quality(found: _Found, index: int, indices: Sequence[int]) -> bool:
     return len(own) <= 2 and bool(np.all(own % 1 == 0)) and any(len(other) > 2 for other in kinds.values())
 
 
-def _same(found: _Found, index: int, other: int) -> bool:
+def _same(found: Found, index: int, other: int) -> bool:
     one, two = found.headings[index], found.headings[other]
     if one.mean != two.mean:
         return True
@@ -322,7 +263,7 @@ def _same(found: _Found, index: int, other: int) -> bool:
     return bool(np.nanmedian(np.abs(ratio[0] - ratio[1])) <= 0.1 * np.nanmedian(np.abs(ratio[0])) + 0.3)
 
 
-def _components(found: _Found, told: str | None) -> list[Wind]:
+def _components(found: Found, told: str | None) -> list[Wind]:
     groups: dict[tuple[object, ...], dict[str, int]] = {}
     for index in found.of(*COMPONENTS):
         groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, index)
@@ -356,7 +297,7 @@ def _components(found: _Found, told: str | None) -> list[Wind]:
     return winds
 
 
-def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | None:
+def _direction(found: Found, speed: int, channel: str) -> tuple[str, Column] | None:
     """The direction that belongs to a speed, as a channel and a column."""
     candidates = found.of(channel)
     exact = [index for index in candidates if found.key(index) == found.key(speed)]
@@ -392,7 +333,7 @@ def _direction(found: _Found, speed: int, channel: str) -> tuple[str, Column] | 
     return _as_direction(found, index, channel)
 
 
-def _as_direction(found: _Found, index: int, channel: str) -> tuple[str, Column] | None:
+def _as_direction(found: Found, index: int, channel: str) -> tuple[str, Column] | None:
     """A column as a direction, by its heading and numbers; `None` where they are none."""
     heading, value = found.headings[index], found.values[index]
     judged = judge(heading, value, channel)
@@ -409,7 +350,7 @@ def _as_direction(found: _Found, index: int, channel: str) -> tuple[str, Column]
     return channel, Column(index=index, unit=judged.unit, told=told, towards=heading.towards)
 
 
-def _of_its_number(found: _Found, speed: int, candidates: Sequence[int]) -> list[int]:
+def _of_its_number(found: Found, speed: int, candidates: Sequence[int]) -> list[int]:
     """The direction that has a speed's number and words of no other (WV2 or Vane 2 beside AN2Speed), if one does."""
     own = number(found.headings[speed])
     speeds = [at for at in found.of(found.headings[speed].channel) if number(found.headings[at]) == own]
@@ -420,7 +361,7 @@ def _of_its_number(found: _Found, speed: int, candidates: Sequence[int]) -> list
     return numbered if heading.label == (own,) and heading.height == found.headings[speed].height else []
 
 
-def _numbered_otherwise(found: _Found, speed: int, direction: int) -> bool:
+def _numbered_otherwise(found: Found, speed: int, direction: int) -> bool:
     """Whether a direction has the number of another speed, and this speed has not (WD2 beside AN1Speed, AN2Speed)."""
     own = number(found.headings[direction])
     others = {number(found.headings[at]) for at in found.of(*SPEEDS) if at != speed}
@@ -431,53 +372,7 @@ def _points(heading: Heading) -> bool:
     return heading.unit in compass.BY_UNIT
 
 
-def _with_weather(found: _Found, wind: Wind, *, many: bool) -> Wind:
-    """The anemometer with temperature, humidity and pressure, each where one column is surely it."""
-    columns = dict(wind.columns)
-    first = next(iter(columns.values())).index
-    for channel in WEATHER:
-        candidates = found.of(channel)
-        if channel == "sonic_temperature" and "wind_x" not in columns:
-            candidates = [i for i in candidates if found.headings[i].sure]
-        if channel == "sonic_temperature" and "wind_x" in columns:
-            candidates += [i for i in found.of("air_temperature") if words_of(found.layout.names[i])[:1] == ["t"]]
-        if channel == "air_temperature" and "wind_x" in columns:
-            candidates = [i for i in candidates if words_of(found.layout.names[i])[:1] != ["t"]]
-        known = [(i, column) for i in candidates if (column := _weather(found, i, channel)) is not None]
-        exact = [item for item in known if found.key(item[0]) == found.key(first)]
-        plain = [item for item in known if not found.headings[item[0]].label and found.headings[item[0]].height is None]
-        chosen = exact if len(exact) == 1 else plain if len(plain) == 1 else known if len(known) == 1 else []
-        if chosen:
-            columns[channel] = chosen[0][1]
-        elif len(known) > 1 and not many:
-            names = ", ".join(repr(found.layout.names[i]) for i, _ in known)
-            found.remarks.append(f"which of {names} is {channel} is not told: left out")
-    return Wind(
-        label=wind.label, height=wind.height, columns=columns, sure=wind.sure, site=wind.site, of_earth=wind.of_earth
-    )
-
-
-def _weather(found: _Found, index: int, channel: str) -> Column | None:
-    heading, value = found.headings[index], found.values[index]
-    median = float(np.nanmedian(value))
-    if fits(channel, heading.unit):
-        return Column(index=index, unit=heading.unit, told=f"in {heading.unit} by its heading")
-    guess: str | None = None
-    if heading.unit is None and channel == "relative_humidity" and 1.5 < float(np.nanmax(value)) <= 115:
-        guess = "%"
-    if heading.unit is None and channel == "air_pressure":
-        guess = next((name for name, low, high in _PRESSURES if low <= median <= high), None)
-    if heading.unit is None and channel == "sonic_temperature" and 230 <= median <= 330:
-        guess = "K"
-    if guess is None:
-        remark = f"column {heading.name!r} looks like {channel}, but its unit is not stated: left out"
-        if remark not in found.remarks:
-            found.remarks.append(remark)
-        return None
-    return Column(index=index, unit=guess, told=f"in {guess} by its values, about {median:.4g}")
-
-
-def _check_gusts(found: _Found, winds: Sequence[Wind]) -> None:
+def _check_gusts(found: Found, winds: Sequence[Wind]) -> None:
     """Remark gusts whose ratio to the mean no wind has: their units differ."""
     gusts = [
         i for i in found.values

@@ -8,7 +8,7 @@ from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds.codes import NO_ANGLE, words
-from flagdata.ingest.anemometer.winds.instruments import COMPONENTS, Wind
+from flagdata.ingest.anemometer.winds.found import COMPONENTS, Wind
 from flagdata.ingest.anemometer.winds.unitcheck import FASTEST
 from flagdata.units import unit as unit_of
 

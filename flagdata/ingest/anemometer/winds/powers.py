@@ -1,4 +1,4 @@
-"""Columns that are squares or cubes of a speed beside them, or means of those, which no heading tells from speeds.
+"""Columns that are squares, cubes or differences of speeds beside them, which no heading tells from speeds.
 
 Loggers of wind energy keep "WS3_Avg", the mean cube of the speed, for the power of the wind. The mean of a cube is at
 least the cube of the mean, and at a turbulence intensity of 0.3 it is 1 + 3 · 0.3² = 1.27 times that.
@@ -7,6 +7,7 @@ least the cube of the mean, and at a turbulence intensity of 0.3 it is 1 + 3 · 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ _TOLD = 1.5
 """Speeds from which on a power is told from its speed."""
 _ROWS, _SHARE, _APART = 5, 0.95, 1.3
 """Rows that must tell, the share of them that must agree, and how much the speeds in them must differ."""
+_ROUNDED = 0.0151
+"""Of a difference of numbers with two decimals, the most that rounding makes."""
 
 
 def of_others(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int]) -> dict[int, tuple[int, str]]:
@@ -33,6 +36,26 @@ def of_others(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int])
             power = None if base in (index, *found) else _power(values[base], values[index])
             if power is not None:
                 found[index] = base, _POWERS[power]
+                break
+    return found
+
+
+def differences(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int]) -> dict[int, tuple[int, int]]:
+    """For each column that is one other column less another, and below zero somewhere, those two.
+
+    Args:
+        values: (n,) as written, NaN where missing.
+        columns: speeds.
+    """
+    found: dict[int, tuple[int, int]] = {}
+    for index in columns:
+        if not bool(np.any(values[index] < 0)):
+            continue
+        for first, second in permutations([at for at in columns if at != index], 2):
+            off = np.abs(values[first] - values[second] - values[index])
+            known = off[np.isfinite(off)]
+            if len(known) >= _ROWS and float((known <= _ROUNDED).mean()) >= _SHARE:
+                found[index] = first, second
                 break
     return found
 

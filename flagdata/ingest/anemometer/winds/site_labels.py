@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
-from flagdata.ingest.anemometer.winds.instruments import Wind
+from flagdata.ingest.anemometer.winds.found import Wind
 
 
 def label_of(site: str, part: str) -> str:
@@ -55,7 +55,7 @@ def parts(wind: str, sites: Sequence[str]) -> Iterator[str]:
     if known is not None:
         yield wind[len(known) + 1 :]
         return
-    if not sites or not wind.isdigit():
+    if not wind.isdigit() or not any(site.isdigit() for site in sites):
         yield wind
     ends = (wind[at + 1 :] for at, letter in enumerate(wind) if letter == ":" and sites)
     yield from (end for end in ends if not end.isdigit())  # a number may be the end of an address

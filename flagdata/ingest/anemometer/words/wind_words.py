@@ -39,7 +39,7 @@ OTHER = frozenset(
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
         "load", "density", "elevation", *VERTICAL, "gyro", "acc", "accel", "course", "heading", "track", "duration",
-        "id", "unit", "units", "timer", "timers",
+        "id", "unit", "units", "timer", "timers", "rot", "unrot", "rotated", "unrotated",
     }
 )  # fmt: skip
 SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(

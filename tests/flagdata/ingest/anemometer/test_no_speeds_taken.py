@@ -11,6 +11,7 @@ import pytest
 
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.ingest.anemometer.sniff import sniff
 from flagdata.ingest.anemometer.words.headings import understand
 
 Write = Callable[..., Path]
@@ -125,3 +126,75 @@ def test_places_of_another_kind_are_winds_of_their_own(log_file: Write) -> None:
         for day, lake in enumerate(["Mendota", "Erken", "Zurich"], 1) for at in range(12)
     ]  # fmt: skip
     assert anemometers(log_file(_table("lake,time,wind_speed_ms", rows))) == ("Erken", "Mendota", "Zurich")
+
+
+def test_the_difference_of_two_sonics_is_no_third(log_file: Write) -> None:
+    """Blocks with the same headings side by side: two instruments, then one less the other."""
+    one = [1.0 + 0.3 * (at % 5) for at in range(12)]
+    two = [1.2 + 0.2 * (at % 4) for at in range(12)]
+    rows = [
+        f"2026-05-01T{at:02d}:00:00Z,{a:.2f},{10 * at},{b:.2f},{350 - 30 * at},{a - b:.2f},{40 * at - 350}"
+        for at, (a, b) in enumerate(zip(one, two, strict=True))
+    ]
+    path = log_file(_table("time,wind_speed,wind_dir,wind_speed,wind_dir,wind_speed,wind_dir", rows))
+    assert anemometers(path) == ("wind_speed#2", "wind_speed#4")
+    series = read_log(path, WindOptions(wind="wind_speed#4", unit="m/s")).series
+    np.testing.assert_allclose(series.channels["wind_speed"], two)
+
+
+def test_angles_over_more_than_a_turn_are_no_direction(read: Read) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{2 + at},{-178 + 36 * at}" for at in range(13)]
+    log = read(_table("when,wind_speed [m/s],wind_dir", rows))
+    assert "wind_direction" not in log.series.channels
+    assert any("over more than a turn, -178 to 254" in finding.what for finding in log.findings)
+
+
+def test_a_letter_that_marks_every_row_is_offered_as_no_direction(log_file: Write) -> None:
+    """D is east in Turkish, and here the kind of the record."""
+    rows = [f'D,"2024/12/23","10:{at:02d}",{15 * at},{0.1 * at:.1f},2,!050' for at in range(12)]
+    path = log_file("\n".join(rows) + "\n")
+    with pytest.raises(InputError) as raised:
+        read_log(path, WindOptions(zone="UTC"))
+    assert '--columns ",date,time,' in (raised.value.fix or "")
+    log = read_log(path, WindOptions(wind="5", unit="m/s", zone="UTC"))
+    assert not any("points" in finding.what for finding in log.findings)
+
+
+def test_components_that_were_turned_into_the_mean_wind_are_no_wind_of_their_own(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{2 + at},{-1.0 - at},0.3,{2 + at},0.0,{10 * at}" for at in range(12)]
+    path = log_file(_table("time,wind_speed [m/s],u_unrot [m/s],v_unrot [m/s],u_rot [m/s],v_rot [m/s],wind_dir", rows))
+    assert anemometers(path) == ()  # one
+    assert set(read_log(path, WindOptions()).series.channels) == {"wind_speed", "wind_direction"}
+
+
+def test_a_wind_that_is_offered_has_the_direction_of_its_height(log_file: Write) -> None:
+    heading = "time,40m speed [m/s],40m speed max [m/s],40m Wind Direction,60m speed [m/s],60m Wind Direction"
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{2 + at},{3 + at},{10 * at},{4 + at},{15 * at}" for at in range(12)]
+    path = log_file(_table(heading, rows))
+    assert len(anemometers(path)) == 2
+    for wind in anemometers(path):
+        told = " ".join(finding.what for finding in read_log(path, WindOptions(wind=wind)).findings)
+        assert '--columns "1=time,3=wind_speed[m/s],4=wind_direction[deg]"' in told or "3=wind_speed" not in told
+        assert "3=wind_speed[m/s],6=wind_direction" not in told
+    first = read_log(path, WindOptions(wind=anemometers(path)[0]))
+    assert any('"1=time,3=wind_speed[m/s],4=wind_direction[deg]"' in finding.what for finding in first.findings)
+
+
+def test_a_number_names_a_column_where_sites_are_called_by_words(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at // 2:02d}:00:00Z,{('hill', 'lake')[at % 2]},20.1,{2 + at},{15 * at}" for at in range(24)]
+    path = log_file("\n".join(rows) + "\n")
+    series = read_log(path, WindOptions(wind="lake:4", unit="m/s")).series
+    assert series.channels["wind_speed"].tolist() == [3.0 + 2 * at for at in range(12)]
+
+
+def test_rich_text_is_named(log_file: Write) -> None:
+    path = log_file("{\\rtf1\\ansi\\ansicpg1252\n61  1  1 15.04 14.96\\\n61  1  2 14.71   NaN\\\n}")
+    with pytest.raises(InputError, match="rich text") as raised:
+        read_log(path, WindOptions())
+    assert "plain text" in (raised.value.fix or "")
+
+
+def test_a_sniff_says_what_a_file_was_rewritten_from(log_file: Write) -> None:
+    rows = [f'{{"time": "2026-05-01T{at:02d}:00:00Z", "wind_speed_ms": {2 + at}}}' for at in range(12)]
+    notes = sniff(log_file("\n".join(rows) + "\n"))[0].notes
+    assert notes[0].startswith("JSON, read as a table of 2 columns")
