@@ -14,12 +14,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.documents.json_instants import is_instant
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of
 
 STATION = "station"
-_EPOCH = 1e8
-"""Seconds from 1970 to 1973, from which on numbers are instants."""
 _OF_A_STORE = re.compile(r"-[\w-]{19}|[0-9a-f]{24}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.IGNORECASE)
 """Keys that a store of documents makes: Firebase's push IDs, MongoDB's object IDs, UUIDs."""
 _NUMBERED = re.compile(r"(?P<word>[^\W\d]*)[ _-]?(?P<number>\d+)")
@@ -54,13 +52,13 @@ def _of_columns(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
     keys = list(columns[0])
     if any(list(cells) != keys for cells in columns) or any("wind" in understand(key).quantity for key in keys):
         return None
-    timed = all(_instant("time", _number(key)) for key in keys)
+    timed = all(is_instant("time", _number(key)) for key in keys)
     if not timed and not (_consecutive(keys) and any(names_time(name) for name in item)):
         return None
     if not any("wind" in understand(name).quantity for name in item):
         return None
     rows = [{name: cells[key] for name, cells in item.items()} for key in keys]
-    if not timed or any(_instant(name, value) for name, value in rows[0].items()):
+    if not timed or any(is_instant(name, value) for name, value in rows[0].items()):
         return rows
     return [{"time": _number(key), **row} for key, row in zip(keys, rows, strict=True)]
 
@@ -71,7 +69,7 @@ def _of_members(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
     if len(members) < 2 or not all(isinstance(one, dict) and _timed(one) for one in members):
         return None
     keys = list(item)
-    if all(_instant("time", _number(key)) for key in keys):
+    if all(is_instant("time", _number(key)) for key in keys):
         return None  # called by their times
     if all(_OF_A_STORE.fullmatch(key) for key in keys) or (_consecutive(keys) and not _elsewhere(keys, members)):
         return members
@@ -96,15 +94,9 @@ def _called(key: str) -> str:
 def _timed(item: Mapping[str, Any]) -> bool:
     """Whether an object holds an instant, itself or in an object within."""
     return any(
-        _instant(key, value) or (isinstance(value, dict) and any(_instant(k, v) for k, v in value.items()))
+        is_instant(key, value) or (isinstance(value, dict) and any(is_instant(k, v) for k, v in value.items()))
         for key, value in item.items()
     )
-
-
-def _instant(key: str, value: Any) -> bool:
-    if not names_time(key) or isinstance(value, bool):
-        return False
-    return cell_kind(value) == "stamp" if isinstance(value, str) else isinstance(value, int | float) and value > _EPOCH
 
 
 def _number(key: str) -> Any:

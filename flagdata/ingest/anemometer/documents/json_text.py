@@ -23,17 +23,16 @@ from typing import Any
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.documents import coverage_json, json_keyed, json_measures, json_series
+from flagdata.ingest.anemometer.documents.json_instants import is_instant
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
-from flagdata.ingest.anemometer.words.headings import fits, names_time, understand, words_of
+from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
 from flagdata.units import spelled
 
 WIDEST = 2000
 """Columns of the widest table that is read."""
 _DEEPEST = 8
 """Objects within objects that are looked into."""
-_EPOCH = 1e8
-"""Seconds from 1970 to 1973, from which on numbers are instants."""
 _LONGEST = 20_000
 """Characters of the longest dictionary that is read as Python prints it."""
 _LOOKED_AT = 50
@@ -305,9 +304,9 @@ def _own_reading(whole: dict[str, Any]) -> dict[str, Any] | None:
     """An object without its lists, where its plain members are a reading of the wind at an instant and no list is."""
     plain = {key: value for key, value in whole.items() if not isinstance(value, dict | list)}
     lists = [value for value in whole.values() if isinstance(value, list) and value]
-    if not lists or not any(_is_instant(key, value) for key, value in plain.items()):
+    if not lists or not any(is_instant(key, value) for key, value in plain.items()):
         return None
-    if any(isinstance(row, dict) and any(_is_instant(k, v) for k, v in row.items()) for rows in lists for row in rows):
+    if any(isinstance(row, dict) and any(is_instant(k, v) for k, v in row.items()) for rows in lists for row in rows):
         return None
     if not any("wind" in understand(key).quantity for key, value in plain.items() if not isinstance(value, bool)):
         return None
@@ -333,7 +332,7 @@ def _readings_within(items: list[Any]) -> list[Any]:
         ((key, readings),) = lists.items()
         if not readings or not all(isinstance(one, dict) for one in readings):
             return items
-        if not all(any(_is_instant(name, value) for name, value in one.items()) for one in readings):
+        if not all(any(is_instant(name, value) for name, value in one.items()) for one in readings):
             return items
         found += [{name: value for name, value in item.items() if name != key} | one for one in readings]
     return found if len(found) > len(items) else items
@@ -342,22 +341,15 @@ def _readings_within(items: list[Any]) -> list[Any]:
 def _at_one_time(above: Mapping[str, Any], items: list[Any]) -> list[Any]:
     """Readings that tell no time, at the one instant that the object around their list tells; others as they are."""
     plain = all(isinstance(item, dict) for item in items)
-    if not plain or any(_is_instant(name, value) for item in items for name, value in item.items()):
+    if not plain or any(is_instant(name, value) for item in items for name, value in item.items()):
         return items
-    told = {name: value for name, value in above.items() if _is_instant(name, value) or _is_update(name, value)}
+    told = {name: value for name, value in above.items() if is_instant(name, value) or _is_update(name, value)}
     return [told | item for item in items] if len(told) == 1 else items
 
 
 def _is_update(key: str, value: object) -> bool:
     """Whether a member tells when what is beside it was brought up to date."""
     return "updated" in words_of(key) and isinstance(value, str) and cell_kind(value) == "stamp"
-
-
-def _is_instant(key: str, value: object) -> bool:
-    """Whether a member is the instant of a reading: a stamp, or Unix seconds or milliseconds."""
-    if not names_time(key) or isinstance(value, bool):
-        return False
-    return cell_kind(value) == "stamp" if isinstance(value, str) else isinstance(value, int | float) and value > _EPOCH
 
 
 def _timed(items: Sequence[Any]) -> bool:
