@@ -3,7 +3,7 @@
     {"time": {"0": "2026-05-01T12:00", …}, "wind_speed": {"0": 3.1, …}}     columns, cells by the rows' numbers or times
     {"0": {"time": "2026-05-01T12:00", "wind_speed": 3.1}, "1": {…}}        rows by their numbers, or by keys of a store
     {"0115": {"timestamp": "…", "value_WS": 3.1}, "0122": {…}}              places, one reading each
-    {"S1": [{"time": "…", "ws": 3.1}, …], "S2": […]}                        places, a list of readings each
+    {"S1": [{"time": "…", "ws": 3.1}, …], "S2": {"rows": […]}}              places, a list of readings each
 
 So write pandas (`DataFrame.to_json`, orient "columns" and "index"), Firebase and stations' services.
 """
@@ -18,6 +18,8 @@ from flagdata.ingest.anemometer.documents.json_instants import is_instant
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of
 
 STATION = "station"
+_SEVERAL = 2
+"""Members from which an object is one of rows or places."""
 _OF_A_STORE = re.compile(r"-[\w-]{19}|[0-9a-f]{24}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.IGNORECASE)
 """Keys that a store of documents makes: Firebase's push IDs, MongoDB's object IDs, UUIDs."""
 _NUMBERED = re.compile(r"(?P<word>[^\W\d]*)[ _-]?(?P<number>\d+)")
@@ -40,7 +42,7 @@ def as_list(whole: Any) -> Any:
     if len(within) == 1 and isinstance(whole[within[0]], dict):
         above = {key: value for key, value in whole.items() if key != within[0]}
         item = whole[within[0]]
-    found = _of_columns(item) or _of_members(item) or _of_lists(item)
+    found = _of_columns(item) or _of_lists(item) or _of_members(item)
     return whole if found is None else [{**above, **row} for row in found]
 
 
@@ -66,7 +68,7 @@ def _of_columns(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
 def _of_members(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
     """Rows of objects that each hold an instant: of one log, or of places that their keys name."""
     members = list(item.values())
-    if len(members) < 2 or not all(isinstance(one, dict) and _timed(one) for one in members):
+    if len(members) < _SEVERAL or not all(isinstance(one, dict) and _timed(one) for one in members):
         return None
     keys = list(item)
     if all(is_instant("time", _number(key)) for key in keys):
@@ -77,13 +79,27 @@ def _of_members(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
 
 
 def _of_lists(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
-    """Rows of places that hold a list of readings each."""
-    members = list(item.values())
-    if len(members) < 2 or not all(isinstance(one, list) and one for one in members):
+    """Rows of places that hold a list of readings each, itself or as a member beside what is said of the place."""
+    if len(item) < _SEVERAL:
         return None
-    if not all(isinstance(row, dict) and _timed(row) for one in members for row in one):
-        return None
-    return [{STATION: _called(key), **row} for key, one in item.items() for row in one]
+    found: list[dict[str, Any]] = []
+    for key, one in item.items():
+        readings = _readings(one)
+        if not readings:
+            return None
+        found += [{STATION: _called(key), **row} for row in readings]
+    return found
+
+
+def _readings(place: Any) -> list[dict[str, Any]]:
+    """The readings of a place; none where it is no list of them, nor an object with one such list."""
+    if isinstance(place, list):
+        return place if place and all(isinstance(row, dict) and _timed(row) for row in place) else []
+    lists = [rows for value in place.values() if (rows := _readings(value))] if isinstance(place, dict) else []
+    if len(lists) != 1:
+        return []
+    said = {k: v for k, v in place.items() if not isinstance(v, dict | list) and not is_instant(k, v)}
+    return [{**said, **row} for row in lists[0]]
 
 
 def _called(key: str) -> str:

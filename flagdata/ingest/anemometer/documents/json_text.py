@@ -53,6 +53,8 @@ _DATE_AND_TIME = re.compile(
 """A stamp of two words before an object."""
 _RECEPTION = frozenset({_REPEAT, "rssi", "snr", "noise", "freq", "freq1", "freq2"})
 """Members that tell how a radio message was received, not what it says."""
+_INDEX = re.compile(r"\.\d+(?=\.)")
+"""The number of an element of a list in the name of a column."""
 _LINE = re.compile(r"\s*(?P<before>[^\s{\[][^{]{0,300}?)?[\s,;]*(?P<object>\{.*\})[\s,]*")
 _TEMPEST = {
     "obs_st": (
@@ -118,6 +120,7 @@ def as_table(source: TextFile) -> TableText | None:
     table, repeats = _once(table)
     table, names = _of_recording(table, names)
     table, names = _in_unit_of_all(whole, table, names)
+    _refuse_several_instants(table, where=str(source.path))
     kept, others = _of_wind(table, tuple(names))
     if others:
         names = dict.fromkeys(name for name in names if any(name in row for row in kept))
@@ -191,6 +194,29 @@ def _of_recording(table: list[dict[str, str]], names: dict[str, None]) -> tuple[
         for row in table
     ]
     return counted, dict.fromkeys("time [s]" if name == "time" else name for name in names)
+
+
+def _refuse_several_instants(table: Sequence[Mapping[str, str]], *, where: str) -> None:
+    """Refuse rows that hold readings of several instants, in lists within them: all would be put at one.
+
+    Raises:
+        InputError: there are such rows.
+    """
+    for row in table[:_LOOKED_AT]:
+        counted: dict[str, list[str]] = {}
+        for name, cell in row.items():
+            like = _INDEX.sub(".#", name)
+            if like != name and is_instant(name.rpartition(".")[2], cell):
+                counted.setdefault(like, []).append(cell)
+        like, cells = max(counted.items(), key=lambda item: len(set(item[1])), default=("", []))
+        within = like.rpartition(".#")[0]
+        if len(set(cells)) > 1 and any(
+            _INDEX.sub(".#", name).startswith(f"{within}.#") and "wind" in understand(name.rpartition(".")[2]).quantity
+            for name in row
+        ):
+            what = f"JSON with readings of {len(set(cells))} instants in one object, in its list {within!r}"
+            fix = "export them as a list of objects or as CSV, one row a reading with its own time"
+            raise InputError(what, where=where, fix=fix)
 
 
 def _in_unit_of_all(

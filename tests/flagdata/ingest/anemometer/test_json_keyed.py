@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.errors import InputError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
 
 Write = Callable[..., Path]
@@ -89,3 +90,21 @@ def test_a_reading_with_lists_beside_it_is_the_reading(read: Read) -> None:
     """An object with its own time and wind, and a list of attempts that hold a wind but no time."""
     whole = {**_reading(0), "debug": [{"tried": "a", "wind": 11.0}, {"tried": "b", "wind": 12.0}]}
     _expect(read(json.dumps(whole)).series, 1)
+
+
+def test_places_with_a_list_of_readings_beside_what_is_said_of_them(log_file: Write) -> None:
+    """The instant at which a place was asked is none of its readings'."""
+    places = {
+        name: {"altitude": 800, "updated": "2026-05-02T08:00:00Z", "rows": [_reading(at) for at in range(4)]}
+        for name in ("37100MS", "20500MS")
+    }
+    path = log_file(json.dumps({"stations": places}))
+    assert anemometers(path) == ("20500MS", "37100MS")
+    _expect(read_log(path, WindOptions(wind="37100MS")).series, 4)
+
+
+def test_readings_of_several_instants_that_no_rule_takes_apart_are_refused(log_file: Write) -> None:
+    readings = [_reading(at) for at in range(3)]
+    whole = {"here": {"x": 1, "readings": readings}, "there": {"list": readings[:2]}, "others": {"a": {"b": 1}}}
+    with pytest.raises(InputError, match=r"readings of 3 instants in one object, in its list 'here\.readings'"):
+        read_log(log_file(json.dumps(whole)), WindOptions())
