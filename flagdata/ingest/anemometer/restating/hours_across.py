@@ -4,7 +4,8 @@ date, 00, 01 … 23        or 1 … 24, H01 … H24, 00:00 … 23:00, 1h … 24h
 fecha, H01, V01, H02 …   with a column beside each hour that says whether its value is valid: V, or N
 
 The other columns are kept and repeated; the hour's number and its value become the columns "hour" and "value". What the
-values are, no heading says: the user names them (--wind value --unit m/s).
+values are, no heading says: the user names them (--wind value --unit m/s). Where a column says it, as WIND_SPEED and
+CH4 do in the rows of a day (Taiwan's network of air quality), each becomes a column.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
+from flagdata.ingest.anemometer.words.headings import understand
 
 _HOUR = re.compile(
     r"(?:h|hr|hour|hora|heure|ora|stunde|uur)?[ _]?(\d{1,2})(?::00(?::00)?|\s?h|\s?hrs?)?", re.IGNORECASE
@@ -24,6 +26,8 @@ _HOUR = re.compile(
 _VALID = re.compile(r"v[ _]?(\d{1,2})", re.IGNORECASE)
 _DELIMITERS = (";", ",", "\t", "|")
 _HOURS = 24
+_MOST = 100
+"""Quantities of one station."""
 _HEAD = 30
 """Lines among which the heading stands."""
 
@@ -59,9 +63,7 @@ def as_table(source: TextFile) -> TableText | None:
     heading = _heading(source.head(_HEAD))
     if heading is None:
         return None
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*(heading.names[at] for at in heading.kept), "hour", "value"])
+    rows: list[list[str]] = []
     days = short = invalid = 0
     for number, lines in source.blocks():
         for line in lines[max(0, heading.line + 2 - number) :]:
@@ -73,10 +75,20 @@ def as_table(source: TextFile) -> TableText | None:
             for hour, at in heading.hours.items():
                 good = hour not in heading.valid or cells[heading.valid[hour]].upper() in ("V", "")
                 invalid += not good
-                writer.writerow([*(cells[k] for k in heading.kept), hour, cells[at] if good else ""])
+                rows.append([*(cells[k] for k in heading.kept), str(hour), cells[at] if good else ""])
     if not days:
         return None
-    what = f"{days} rows of 24 hours side by side, read as a row an hour; nothing says what their values are"
+    what = f"{days} rows of 24 hours side by side, read as a row an hour"
+    names = [*(heading.names[at] for at in heading.kept), "hour", "value"]
+    item = _of_items(rows, len(heading.kept))
+    if item is not None:
+        said = names[item]
+        names, rows = _by_item(names, rows, item)
+        what += f", with a column for each of the {len(names) - len(heading.kept)} quantities in column {said!r}"
+    else:
+        what += "; nothing says what their values are"
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows([names, *rows])
     notes = [Finding(kind="hours-across", severity=Severity.NOTE, what=what, count=days)]
     if invalid:
         what = f"{invalid} values that the file says are not valid; left out"
@@ -85,6 +97,29 @@ def as_table(source: TextFile) -> TableText | None:
         what = f"{short} lines have another number of columns than the heading; left out"
         notes.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=short, what=what))
     return TableText.of(source, out.getvalue().splitlines(), notes)
+
+
+def _of_items(rows: Sequence[Sequence[str]], kept: int) -> int | None:
+    """The column whose cells say what the values are, among them a wind, each once a day; `None` where none does."""
+    for at in range(kept):
+        items = {row[at] for row in rows}
+        others = {tuple(cell for place, cell in enumerate(row[:-1]) if place != at) for row in rows}
+        windy = any("wind" in understand(item).quantity and understand(item).sure for item in items)
+        once = len({tuple(row[:-1]) for row in rows}) == len(rows)
+        if windy and once and 1 < len(items) <= _MOST and len(others) < len(rows):
+            return at
+    return None
+
+
+def _by_item(names: Sequence[str], rows: Sequence[Sequence[str]], item: int) -> tuple[list[str], list[list[str]]]:
+    """The heading and the rows with a column for each item in place of that of the items and of the values."""
+    items = list(dict.fromkeys(row[item] for row in rows))
+    found: dict[tuple[str, ...], dict[str, str]] = {}
+    for row in rows:
+        key = tuple(cell for at, cell in enumerate(row[:-1]) if at != item)
+        found.setdefault(key, {})[row[item]] = row[-1]
+    heading = [name for at, name in enumerate(names[:-1]) if at != item] + items
+    return heading, [[*key, *(values.get(name, "") for name in items)] for key, values in found.items()]
 
 
 def _heading(lines: Sequence[str]) -> _Heading | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from flagdata.ingest.anemometer.tables import devices, filled_later, unread_by_r
 from flagdata.ingest.anemometer.tables.draft import Draft, draft
 from flagdata.ingest.anemometer.tables.rowclock import Given
 from flagdata.ingest.anemometer.tables.table import read_table
+from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import cut, lay_out
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -167,11 +169,19 @@ def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:
         return proposal.winds
     known = {site_labels.site_of(text, proposal.parts)[0] for text in proposal.winds}
     for first, lines in source.blocks():
-        for line in lines[HEAD_LINES:] if first == 1 else lines:
-            cells = cut(line, proposal.delimiter)
+        head = lines[proposal.first : HEAD_LINES] if first == 1 else ()
+        rows = (cells for line in head if _is_row(cells := cut(line, proposal.delimiter)))
+        later = (cut(line, proposal.delimiter) for line in (lines[HEAD_LINES:] if first == 1 else lines))
+        for cells in chain(rows, later):
             if len(cells) > proposal.site and cells[proposal.site]:
                 known.add(cells[proposal.site])
     return tuple(site_labels.label_of(site, part) for site in sorted(known) for part in sorted(proposal.parts))
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    """Whether a line among rows is one, though with fewer cells: it holds a stamp, and numbers in most of them."""
+    kinds = [kind for cell in cells if (kind := cell_kind(cell)) != "missing"]
+    return "stamp" in kinds and sum(kind != "text" for kind in kinds) > len(kinds) / 2
 
 
 def _not_read(remarks: Sequence[str]) -> tuple[Finding, ...]:

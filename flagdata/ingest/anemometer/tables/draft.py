@@ -79,6 +79,7 @@ class Draft:
         parts: labels of the anemometers of one row, "" for one alone (see `site_labels.columns`).
         delimiter: of the cells.
         of_earth: whether the components of the wind are towards east (x) and north (y).
+        first: line of its first row, counted from 0.
         stretches: whether its sites follow one another, each with a count of time and a start of its own.
     """
 
@@ -95,6 +96,7 @@ class Draft:
     delimiter: str = ","
     of_earth: bool = False
     stretches: bool = False
+    first: int = 0
 
 
 @lru_cache(maxsize=4)
@@ -208,6 +210,7 @@ def draft(
         unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth, stretches=bool(anew),
+        first=layout.lines[0] - 1,
     )  # fmt: skip
 
 

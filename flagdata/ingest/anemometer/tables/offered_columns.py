@@ -47,7 +47,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     if width > _WIDE or not any_named:
         listed = [f"{at + 1}={entry}" for at, entry in sorted(known.items()) if "?" not in entry.split("[")[0]]
         entries = {entry.split("[")[0] for entry in known.values()}
-        listed += ["?=time"] if time is None and not {"time", "date"} & entries else []
+        listed += ["?=time"] if time is None and not {"time", "date", "hour"} & entries else []
         directed = any("wind_direction" in entry for entry in known.values())
         listed += ["?=wind_speed[?]"] if not winds and not speeds else []
         listed += ["?=wind_direction[deg]"] if not winds and not speeds and not directed else []
@@ -66,6 +66,8 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         further = (
             f"; column 1 grows in small steps, as a count of seconds since a start does: add --start TIME{further}"
         )
+    if time is None and known.get(0) == "hour":
+        further = f"; column 1 counts the hours of a day: add the day by --date DATE{further}"
     steady = _steady(layout) if time is None and "time[?]" in known.values() else None
     if steady is not None:
         units = ", ".join(counted.UNITS[:-1]) + f" or {counted.UNITS[-1]}"
@@ -95,6 +97,12 @@ def _steady(layout: Layout) -> int | None:
         return None
     usual = float(np.median(step))
     return 0 if usual > 0 and bool(np.all(np.abs(step - usual) <= _UNEVEN * usual)) else None
+
+
+def _of_one_day(layout: Layout) -> bool:
+    """Whether the first column counts the hours of one day, from 0 to 23 or from 1 to 24."""
+    value = numbers(layout.column(0), decimal=layout.decimal).value
+    return value.tolist() in (list(range(24)), list(range(1, 25)))
 
 
 def _grows(layout: Layout) -> bool:
@@ -297,7 +305,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     if not timed and (serial := _serial(layout)) is not None:
         found[0], timed = f"time[{serial}]", True
     elif steady is not None:
-        found[steady] = "time[?]"
+        found[steady] = "hour" if _of_one_day(layout) else "time[?]"
     elif not timed and _grows(layout):
         found[0], timed = f"time[{_SECONDS}]", True
     for at in range(len(layout.names)):

@@ -16,6 +16,7 @@ _AXES = (
     frozenset({"south", "southward"}), frozenset({"west", "westward"}),
 )  # fmt: skip
 """Words of the components towards north and east, and of what cannot be beside them."""
+_COMPONENTS = ("wind_x", "wind_y", "wind_z")
 _SPEED_UNITS = frozenset({"m/s", "km/h", "kn", "mph", "cm/s", "ft/s"})
 
 
@@ -61,14 +62,16 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
 
 
 def _speed_beside_its_direction(found: list[Heading], words: Sequence[set[str]]) -> None:
-    """Make W_vel beside W_dir the speed of the wind, where no components along x and y make it the vertical one."""
-    if any(heading.channel in ("wind_x", "wind_y") for heading in found):
-        return
-    if not any(heading.channel == "wind_direction" and "w" in said for heading, said in zip(found, words, strict=True)):
-        return
-    for at, heading in enumerate(found):
-        if heading.channel == "wind_z" and words[at] in ({"w", "vel"}, {"w", "velocity"}):
-            found[at] = replace(heading, channel="wind_speed", quantity="wind_speed")
+    """Make W_vel beside W_dir, and VVel (viento) beside VDir, the speed of the wind where no other component stands."""
+    for letter, channel in (("w", "wind_z"), ("v", "wind_y")):
+        if any(heading.channel in _COMPONENTS and heading.channel != channel for heading in found):
+            continue
+        own = [heading for heading, said in zip(found, words, strict=True) if letter in said]
+        if not any(heading.channel == "wind_direction" for heading in own):
+            continue
+        for at, heading in enumerate(found):
+            if heading.channel == channel and words[at] in ({letter, "vel"}, {letter, "velocity"}):
+                found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=True)
 
 
 def _towards(words: set[str], heading: Heading, side: frozenset[str]) -> bool:

@@ -20,7 +20,7 @@ _EIGHT = 8
 """The highest number of eight sectors that are counted from 1."""
 _FEW = 3
 """Different values from which a column with a stated unit shows that it is in another."""
-_DEGREES = frozenset({"d", "dg", "dgr"})
+_DEGREES = frozenset({"d", "dg", "dgr", "gr", "grd", "º"})
 """What stands for degrees behind a direction, and for nothing or something else elsewhere."""
 
 

@@ -8,8 +8,10 @@ from flagdata.ingest.anemometer.winds.found import Column, Found, Wind
 from flagdata.ingest.anemometer.words.headings import fits, words_of
 
 WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
-_PRESSURES = (("hPa", 500.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
-"""Ranges of the air pressure by unit [in it]; they do not overlap."""
+_PRESSURES = (("hPa", 800.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
+"""Ranges of the air pressure by unit [in it]; they do not overlap.
+
+From 500 to 800 it may be in hPa on a mountain or in mmHg."""
 
 
 def with_weather(found: Found, wind: Wind, *, many: bool) -> Wind:

@@ -81,6 +81,8 @@ _COMPONENTS = {
     "u": "wind_x", "v": "wind_y", "w": "wind_z", "ux": "wind_x", "uy": "wind_y", "uz": "wind_z", "vx": "wind_x",
     "vy": "wind_y", "vz": "wind_z", "x": "wind_x", "y": "wind_y", "z": "wind_z",
 }  # fmt: skip
+_ENDING_IN_DIRECTION = frozenset({"dir", "direction", "direccion", "direc", "direzione", "richtung"})
+"""What stands behind the letter of a wind in the heading of its direction, as VDir (viento)."""
 _INSIDE = {
     "ms": "m/s", "mps": "m/s", "kmh": "km/h", "kph": "km/h", "kts": "kn", "kt": "kn", "knots": "kn", "kn": "kn",
     "sknt": "kn", "mph": "mph", "deg": "deg", "degc": "degC", "degf": "degF", "c": "degC", "f": "degF", "hpa": "hPa",
@@ -167,7 +169,8 @@ def understand(name: str, stated: str = "") -> Heading:
     if tenfold is not None:
         unit = None
     elif unit is None:
-        unit = next((_INSIDE[word] for word in words[1:] or words if word in _INSIDE and word != "deg"), None)
+        last = reversed(words[1:] or words)
+        unit = next((_INSIDE[word] for word in last if word in _INSIDE and word != "deg"), None)
         unit = "deg" if unit is None and "deg" in words[1:] else unit
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
     known = set(words)
@@ -310,8 +313,8 @@ def _height(text: str) -> float | None:
 def _unit(text: str, stated: str) -> tuple[str, str | None]:
     """The heading without its unit, and the unit."""
     below = _known(stated.strip().strip("[]()<>"))
-    if len(text) > 1 and below is None and (whole := _known(text)) is not None:
-        return text, whole
+    if len(text) > 1 and text.lower() != "pa" and below is None and (whole := _known(text)) is not None:
+        return text, whole  # Pa alone is a pressure of the air, in whatever unit
     for found in _BRACKET.finditer(text):
         inside = _known(re.sub(r"^\s*(?:units?\s*[=:]\s*|(?:in|en|em)\s+)|[\"']", "", found[1]))
         if inside is not None:
@@ -429,6 +432,8 @@ def _component(words: list[str], si: str | None) -> str | None:
     if not head or head[0] not in _COMPONENTS:
         return None
     if head[0] == "w" and head[1:2] and head[1] in {*SPEED, *DIRECTION} - {"vel", "velocity"}:
+        return None
+    if head[0] in ("u", "v") and head[1:2] and head[1] in _ENDING_IN_DIRECTION:
         return None
     if head[0] in ("x", "y", "z", "vx", "vy", "vz") and not set(core) & {"wind", "sonic", "csat"}:
         return None

@@ -22,7 +22,7 @@ DIRECTION = frozenset(
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
         "dd", "vane", "wvane", "windvane", "angle", "direccion", "dirección", "direção", "direcao", "richting",
         "windrichting", "direzione", "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire",
-        "deg", "winddeg", "azimuth", "bearing", "provenienza", "direcció",
+        "deg", "winddeg", "azimuth", "bearing", "provenienza", "direcció", "direc",
     }
 )  # fmt: skip
 SURE_DIRECTION = DIRECTION - {"angle", "deg", "azimuth", "bearing", "dd", "vane"}
