@@ -107,12 +107,19 @@ def _few(reasons: Sequence[str]) -> list[str]:
     return shown if len(each) <= _ANEMOMETERS else [*shown, f"{len(each) - _ANEMOMETERS} anemometers more: see --json"]
 
 
+def _how_sure(guess: Mapping[str, Any]) -> str:
+    """What speaks for a guess: the format's own score, or how far a draft tells what the columns are."""
+    if guess["draft"] and guess["kind"] == "anemometer":
+        return "by its columns, with questions" if guess["doubts"] else "by its columns"
+    return f"{guess['score']:.0%} match"
+
+
 def print_sniffed(entry: Mapping[str, Any]) -> None:
     """One source and its guesses for people, on stdout."""
     click.echo(entry["source"])
     for guess in entry["guesses"]:
         recipe = f", recipe {guess['recipe']}" if guess["recipe"] else ""
-        click.echo(f"  {guess['score']:.0%} {guess['kind']}: {guess['format']}{recipe}")
+        click.echo(f"  {guess['kind']}: {guess['format']}{recipe} ({_how_sure(guess)})")
         for reason in _few(guess["reasons"]):
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
