@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
-from flagdata.errors import FlagdataError, InputError, NothingMeasuredError
+from flagdata.errors import FlagdataError, InputError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
@@ -215,21 +215,22 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
         NothingMeasuredError: no value of any of them can be used.
     """
     from flagdata.ingest.anemometer import anemometers
-    from flagdata.ingest.store import ingest_wind
+    from flagdata.ingest.store import IngestResult, ingest_wind, ingest_winds
 
     found = anemometers(source, options.wind.wind)
     if not found:
         return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
     stem = options.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
-    results: list[IngestResult] = []
-    dead: list[tuple[str, NothingMeasuredError]] = []
-    for label in found:
-        labels = replace(options.labels, name=f"{stem}:{label}")
-        wind = replace(options.wind, wind=replace(options.wind.wind, wind=label))
-        try:
-            results.append(ingest_wind(lake, source, wind, labels=labels, branch=options.branch))
-        except NothingMeasuredError as error:
-            dead.append((label, error))
+    each = [
+        (
+            replace(options.wind, wind=replace(options.wind.wind, wind=label)),
+            replace(options.labels, name=f"{stem}:{label}"),
+        )
+        for label in found
+    ]
+    done = ingest_winds(lake, source, each, branch=options.branch)
+    results = [one for one in done if isinstance(one, IngestResult)]
+    dead = [(label, one) for label, one in zip(found, done, strict=True) if not isinstance(one, IngestResult)]
     if not results:
         raise dead[0][1]
     told = [

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pyarrow.compute as pc
 
-from flagdata.align.paired import host_clock
-from flagdata.errors import ConflictError, FlagdataError, InputError
+from flagdata.align.paired import PairedClocks, host_clock
+from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.reading import streams
@@ -191,42 +191,108 @@ def ingest_wind(
         FlagdataError: as `read_log`; the lake is unchanged.
         ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
-    options, labels = options or WindIngest(), labels or Labels()
+    (result,) = ingest_winds(lake, path, [(options or WindIngest(), labels or Labels())], branch=branch)
+    if isinstance(result, NothingMeasuredError):
+        raise result
+    return result
+
+
+def ingest_winds(
+    lake: Lake, path: Path, each: Sequence[tuple[WindIngest, Labels]], *, branch: str = "main"
+) -> tuple[IngestResult | NothingMeasuredError, ...]:
+    """Ingest the anemometers of one log, in one transaction: all that can be used, or none where one cannot be read.
+
+    Args:
+        each: the options that read one of them, and its labels.
+
+    Returns:
+        for each what became of it, or why none of its values can be used.
+
+    Raises:
+        FlagdataError, ConflictError: as `ingest_wind`, of any of them; the lake is unchanged.
+    """
     source = Source.of(path)
-    recipe = options.recipe()
-    present = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
+    read = [_read(lake, path, source, options, labels, branch=branch) for options, labels in each]
+    new = [one for one in read if isinstance(one, _Read)]
+    if not new:
+        return tuple(one for one in read if not isinstance(one, _Read))
+    with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
+        staged = [_staged(transaction, path, source, one) for one in new]
+        for artifact, _ in staged:
+            transaction.add(artifact)
+    done = iter(
+        result_of(lake, transaction, artifact, report, one.labels, branch=branch)
+        for one, (artifact, report) in zip(new, staged, strict=True)
+    )
+    return tuple(next(done) if isinstance(one, _Read) else one for one in read)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Read:
+    """A log that was read and is not in the lake yet.
+
+    Attributes:
+        log: what was read.
+        options, labels: of it.
+        findings: of the log, of its clocks and of other logs beside it.
+        paired: the logging computer's clock against the instrument's; `None` where the log has one alone.
+    """
+
+    log: WindLog
+    options: WindIngest
+    labels: Labels
+    findings: tuple[Finding, ...]
+    paired: PairedClocks | None
+
+
+def _read(
+    lake: Lake, path: Path, source: Source, options: WindIngest, labels: Labels, *, branch: str
+) -> _Read | IngestResult | NothingMeasuredError:
+    """A log as it is to be written; what is in the lake already; or why none of its values can be used."""
+    present = find(lake, Kind.WIND, source, options.recipe(), labels, branch=branch)
     if present is not None:
         return present
-    log = read_log(path, options.wind)
-    time = log.series.time
+    try:
+        log = read_log(path, options.wind)
+    except NothingMeasuredError as error:
+        return error
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
     findings = (*findings, *_beside(lake, log.series, labels.session, branch=branch))
-    with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
-        staged = transaction.staging(".mcap")
-        with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
-            record.wind(log.series)
-            if path.stat().st_size <= ATTACHMENT_LIMIT:
-                record.attach_file(source.name, path, media_type="text/plain", log_time=int(time[0]))
-            else:
-                findings = (*findings, _not_attached(path))
-            if options.wind.recipe is not None:
-                found = SENSORS.find(options.wind.recipe)
-                name = f"{found.name}.recipe.toml"
-                record.attach(name, found.data, media_type="application/toml", log_time=int(time[0]))
-            elif log.drafted:
-                drafted = log.drafted.encode()
-                record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
-        source.check_unchanged()
-        report = _wind_report(log, findings, named=options.wind.recipe)
-        if paired is not None:
-            report["host_clock"] = json.loads(paired.model.to_json())
-        artifact = _artifact(
-            Kind.WIND, source, recipe, labels, findings=findings, report=report, start=int(time[0]), end=int(time[-1]),
-            rate=report["rate"], frame_count=None, stored=transaction.put(staged),
-        )  # fmt: skip
-        transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, labels, branch=branch)
+    return _Read(log=log, options=options, labels=labels, findings=findings, paired=paired)
+
+
+def _staged(transaction: Transaction, path: Path, source: Source, one: _Read) -> tuple[Artifact, dict[str, Any]]:
+    """The artifact of a log, whose record is written for a transaction, and its report.
+
+    Raises:
+        ConflictError: the file changed while it was read.
+    """
+    log, findings, recipe = one.log, one.findings, one.options.recipe()
+    time = log.series.time
+    staged = transaction.staging(".mcap")
+    with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
+        record.wind(log.series)
+        if path.stat().st_size <= ATTACHMENT_LIMIT:
+            record.attach_file(source.name, path, media_type="text/plain", log_time=int(time[0]))
+        else:
+            findings = (*findings, _not_attached(path))
+        if one.options.wind.recipe is not None:
+            found = SENSORS.find(one.options.wind.recipe)
+            name = f"{found.name}.recipe.toml"
+            record.attach(name, found.data, media_type="application/toml", log_time=int(time[0]))
+        elif log.drafted:
+            drafted = log.drafted.encode()
+            record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
+    source.check_unchanged()
+    report = _wind_report(log, findings, named=one.options.wind.recipe)
+    if one.paired is not None:
+        report["host_clock"] = json.loads(one.paired.model.to_json())
+    artifact = _artifact(
+        Kind.WIND, source, recipe, one.labels, findings=findings, report=report, start=int(time[0]), end=int(time[-1]),
+        rate=report["rate"], frame_count=None, stored=transaction.put(staged),
+    )  # fmt: skip
+    return artifact, report
 
 
 def _beside(lake: Lake, series: WindSeries, session: str | None, *, branch: str) -> tuple[Finding, ...]:

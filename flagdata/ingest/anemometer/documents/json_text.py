@@ -55,6 +55,7 @@ _RECEPTION = frozenset({_REPEAT, "rssi", "snr", "noise", "freq", "freq1", "freq2
 """Members that tell how a radio message was received, not what it says."""
 _INDEX = re.compile(r"\.\d+(?=\.)")
 """The number of an element of a list in the name of a column."""
+_LAST_INDEX = re.compile(r"\.\d+$")
 _LINE = re.compile(r"\s*(?P<before>[^\s{\[][^{]{0,300}?)?[\s,;]*(?P<object>\{.*\})[\s,]*")
 _TEMPEST = {
     "obs_st": (
@@ -202,6 +203,13 @@ def _refuse_several_instants(table: Sequence[Mapping[str, str]], *, where: str) 
     Raises:
         InputError: there are such rows.
     """
+    listed = [name.rpartition(".")[0] for name, cell in (table[0].items() if len(table) == 1 else ())
+              if _LAST_INDEX.search(name) and is_instant(name.rpartition(".")[0].rpartition(".")[2], cell)]  # fmt: skip
+    if len(listed) > 1 and len(set(listed)) == 1:
+        what = f"JSON with {len(listed)} instants in its list {listed[0]!r}, and readings that no rule puts at them"
+        raise InputError(
+            what, where=where, fix="export it as a list of objects or as CSV, one row a reading with its time"
+        )
     for row in table[:_LOOKED_AT]:
         counted: dict[str, list[str]] = {}
         for name, cell in row.items():

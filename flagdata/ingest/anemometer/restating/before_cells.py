@@ -3,7 +3,8 @@
     2026-05-01T12:00:01Z 02.3;240;+23.5;15;;*31
     12:00:01.250 -> 2.3,240                             as the Arduino IDE's serial monitor shows them
 
-The blank behind the stamp becomes that sign, so that the line is a row of a table, of which nothing is known yet.
+The blank behind the stamp becomes that sign, so that the line is a row of a table, of which nothing is known yet. A
+hyphen before digits is none of those blanks: it begins the zone of the stamp, -05:00.
 """
 
 from __future__ import annotations
@@ -13,14 +14,14 @@ from collections.abc import Sequence
 
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.sniffing import SURE
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 _LINE = re.compile(
     r"\s*(?P<stamp>(?:\d{4}[-/]\d{2}[-/]\d{2}[T ])?\d{2}:\d{2}:\d{2}(?:[.,]\d{1,9})?"
     r"(?:Z|[+-]\d{2}:?\d{2}| ?(?:UTC|GMT))?)"
-    r"(?!:\d{1,9}\s*[,;\t]|:\d{2}:\d{2})(?P<gap>[\s>:|-]+)(?![A-Z]{3,4}\s*[,;\t])(?P<rest>[^\s$!].*)"
+    r"(?!:\d{1,9}\s*[,;\t]|:\d{2}:\d{2}|-\d)(?P<gap>[\s>:|-]+)(?![A-Z]{3,4}\s*[,;\t])(?P<rest>[^\s$!].*)"
 )
-_SIGNS = ",;\t"
 _SHARE = 0.8
 _LEAST = 3
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
@@ -57,7 +58,7 @@ def _sign(lines: Sequence[str]) -> str | None:
         return None
     if all("\t" in match["gap"] and _more_cells(match["rest"]) for match in matched):
         return None
-    for sign in _SIGNS:
+    for sign in SIGNS:
         counts = [rest.count(sign) for rest in found]
         if min(counts) >= 1 and sum(count == counts[0] for count in counts) >= _SHARE * len(counts):
             return sign

@@ -20,7 +20,7 @@ from flagdata.ingest.anemometer.text.source import TableText, TextFile
 _CELL = re.compile(r"(\d{3}),(\w),(\w),(\d{4}),(\w)")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}")
 _WRONG = frozenset("2367")
-_NAMES = ("time [UTC]", "station", "wind speed [m/s]", "wind direction [deg]", "air temperature [degC]")
+NAMES = ("time [UTC]", "station", "wind speed [m/s]", "wind direction [deg]", "air temperature [degC]")
 
 
 def matches(lines: Sequence[str]) -> bool:
@@ -43,13 +43,27 @@ def as_table(source: TextFile) -> TableText | None:
                 if found is None or not _DATE.fullmatch(row["DATE"]):
                     other += bool(cells)
                     continue
-                speed = "" if found[4] == "9999" or found[5] in _WRONG else f"{int(found[4]) / 10:g}"
-                away = "" if found[1] == "999" or found[2] in _WRONG or found[3] in "VC" else found[1]
-                yield [f"{row['DATE']}Z", row["STATION"], speed, away, _tenths(row.get("TMP", ""))]
+                away, speed = wind(*found.groups())
+                yield [f"{row['DATE']}Z", row["STATION"], speed, away, tenths(row.get("TMP", ""))]
 
-    return table(source, _NAMES, list(rows()), kind="global-hourly", what="NOAA's Global Hourly data", left_out=other)
+    return table(source, NAMES, list(rows()), kind="global-hourly", what="NOAA's Global Hourly data", left_out=other)
 
 
-def _tenths(cell: str) -> str:
+def wind(away: str, good: str, kind: str, speed: str, sure: str) -> tuple[str, str]:
+    """Direction [deg] and speed [m/s] of the five values of a report's wind; "" for what is missing or not to be used.
+
+    Args:
+        away, good: direction and its quality.
+        kind: of observation.
+        speed, sure: speed and its quality.
+    """
+    return (
+        "" if away == "999" or good in _WRONG or kind in "VC" else away,
+        "" if speed == "9999" or sure in _WRONG else f"{int(speed) / 10:g}",
+    )
+
+
+def tenths(cell: str) -> str:
+    """Degrees Celsius of a temperature in tenths with its quality; "" for one that is missing or not to be used."""
     found = re.fullmatch(r"([+-]\d{4}),(\w)", cell)
     return "" if found is None or found[1] == "+9999" or found[2] in _WRONG else f"{int(found[1]) / 10:g}"

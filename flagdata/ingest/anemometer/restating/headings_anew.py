@@ -14,10 +14,10 @@ from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating.restate import table
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import cut
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import interest, names_time, understand
 
-_DELIMITERS = (",", ";", "\t")
 _DECIMAL_COMMA = re.compile(r"^([-+]?\d+),(\d+)$")
 
 
@@ -63,7 +63,7 @@ def as_table(source: TextFile) -> TableText | None:
 
 def _first(lines: Sequence[str]) -> _Heading | None:
     for number, line in enumerate(lines, start=1):
-        for delimiter in _DELIMITERS:
+        for delimiter in SIGNS:
             names = tuple(cut(line.lstrip("\ufeff"), delimiter))
             if _names_columns(names):
                 return _Heading(line=number, delimiter=delimiter, names=names)

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import understand
 
@@ -24,7 +25,6 @@ _HOUR = re.compile(
     r"(?:h|hr|hour|hora|heure|ora|stunde|uur)?[ _]?(\d{1,2})(?::00(?::00)?|\s?h|\s?hrs?)?", re.IGNORECASE
 )
 _VALID = re.compile(r"v[ _]?(\d{1,2})", re.IGNORECASE)
-_DELIMITERS = (";", ",", "\t", "|")
 _HOURS = 24
 _MOST = 100
 """Quantities of one station."""
@@ -125,7 +125,7 @@ def _by_item(names: Sequence[str], rows: Sequence[Sequence[str]], item: int) -> 
 def _heading(lines: Sequence[str]) -> _Heading | None:
     """The heading with a column for each hour; `None` where no line is one."""
     for number, line in enumerate(lines):
-        for delimiter in _DELIMITERS:
+        for delimiter in SIGNS:
             names = _cells(line, delimiter)
             hours = {int(match[1]): at for at, name in enumerate(names) if (match := _HOUR.fullmatch(name))}
             if sorted(hours) not in (list(range(_HOURS)), list(range(1, _HOURS + 1))):

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import cut
+from flagdata.ingest.anemometer.text.signs import BLANKS, SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import fits, interest, names_time, understand, zone_of
 
-_DELIMITERS = (";", ",", "\t", "|", " ")
 _HEAD = 400
 """Lines of the longest legend that is read, with the heading below it."""
 _LONG = 40
@@ -90,7 +90,7 @@ def _heading(lines: Sequence[str]) -> _Heading | None:
     for at, line in enumerate(lines):
         if len(told) > 1:
             mark = line[: len(line) - len(line.lstrip("#%*! \t"))] if line.lstrip()[:1] in ("#", "%", "*", "!") else ""
-            for delimiter in _DELIMITERS:
+            for delimiter in (*SIGNS, BLANKS):
                 cells = tuple(cut(line[len(mark) :].strip(), delimiter))
                 known = sum(cell in told for cell in cells)
                 enough = known > 1 and 2 * known >= len(cells)

@@ -14,10 +14,10 @@ from collections.abc import Iterator, Sequence
 from flagdata.errors import LimitError
 from flagdata.ingest.anemometer.documents.json_text import WIDEST, members
 from flagdata.ingest.anemometer.restating import restate
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 _OPENINGS = ("{'", '{"')
-_DELIMITERS = ",;\t"
 _SHARE = 0.8
 """Share of a column's filled cells that must hold an object."""
 
@@ -64,7 +64,7 @@ def as_table(source: TextFile) -> TableText | None:
 
 def _columns(lines: Sequence[str]) -> tuple[str, tuple[int, ...]]:
     """The delimiter of a table below a line of names, and its columns of objects; none where there are none."""
-    for delimiter in _DELIMITERS:
+    for delimiter in SIGNS:
         rows = list(_rows(lines, delimiter))
         if len(rows) < 2 or not all(rows[0]) or len(rows[0]) < 2:
             continue

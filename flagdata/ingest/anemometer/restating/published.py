@@ -21,10 +21,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from flagdata.ingest.anemometer.restating.restate import LOOKED_AT, table
+from flagdata.ingest.anemometer.text.signs import BLANKS, SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 Row = Mapping[str, str]
-_DELIMITERS = (";", ",", "|", "\t", " ")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -323,7 +323,7 @@ def _cells(lines: Sequence[str], delimiter: str) -> Iterator[list[str]]:
 
 def _find(lines: Sequence[str]) -> _Found | None:
     for number, line in enumerate(lines):
-        for delimiter in _DELIMITERS:
+        for delimiter in (*SIGNS, BLANKS):
             cells = next(_cells([line.lstrip("\ufeff")], delimiter), [])
             names = tuple(cell.strip().strip('"') for cell in cells)
             if names and names[0].startswith("# "):

@@ -27,6 +27,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.metar",
     "flagdata.ingest.anemometer.restating.synop",
     "flagdata.ingest.anemometer.restating.global_hourly",
+    "flagdata.ingest.anemometer.restating.isd",
     "flagdata.ingest.anemometer.restating.published",
     "flagdata.ingest.anemometer.restating.pywws",
     "flagdata.ingest.anemometer.restating.hours_across",

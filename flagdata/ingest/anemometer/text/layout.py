@@ -91,6 +91,8 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
     filled = [(number, line) for number, line in enumerate(lines) if line.strip(" \t\x00\x1a")]
     tail = min(TAIL, max(1, len(filled) // 2))
     found = _lay_out(lines, filled, tail, interest)
+    if found is None:
+        found = _above_a_legend(lines, interest)
     while found is None and _LEAST < tail < TAIL:
         # A short log below a long preamble: fewer lines of its end may be rows alone. Their names must bear it out.
         tail = max(_LEAST, tail // 2)
@@ -98,6 +100,18 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         if shorter is not None and shorter.by_name and sum(interest(name) > 0 for name in shorter.names) > 1:
             found = shorter
     return found
+
+
+def _above_a_legend(lines: Sequence[str], interest: Callable[[str], int]) -> Layout | None:
+    """The table above one of the blank lines of a short file, where notes follow it; its names must bear it out."""
+    if len(lines) > TAIL:
+        return None
+    for end in reversed([at for at, line in enumerate(lines) if not line.strip()]):
+        above = [(number, line) for number, line in enumerate(lines[:end]) if line.strip(" \t\x00\x1a")]
+        found = _lay_out(lines[:end], above, max(1, len(above) // 2), interest) if above else None
+        if found is not None and found.by_name and sum(interest(name) > 0 for name in found.names) > 1:
+            return found
+    return None
 
 
 def _lay_out(
@@ -131,7 +145,7 @@ def _lay_out(
     full = Counter(len(cells) for (_, cells), fit in zip(table, fits, strict=True) if fit).most_common(1)[0][0]
     names, units, at, by_name, strange = _heading(lines, start, delimiter, (width, full), interest)
     short = _short(lines, at, delimiter, width)
-    if _leaves_out_the_last(names, rows):
+    if at is not None and len(cut(lines[at], delimiter)) < width and _leaves_out_the_last(names, rows):
         names, short = (*names[1:], ""), width - 1
     if short and _shifted(table, names, kept, short, interest):
         strange = (*strange, f"line {(at or 0) + 1} names {short} columns, but rows have {width}, and do not fit it")

@@ -73,7 +73,7 @@ def time_choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stam
     ns = found.ns[found.valid]
     varied = len(np.unique(ns)) / len(ns) if len(ns) > 1 else 1.0
     words = {word for name in names for word in words_of(name)}
-    score += (0.6 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
+    score += (0.8 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
     score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & {"gust", "max", "min", "created", "updated", "start"})
     return TimeChoice(
         columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score

@@ -21,7 +21,7 @@ from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times import dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
-from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, share, time_choice
+from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, hours_and_minutes, share, time_choice
 from flagdata.ingest.anemometer.times.truncated import before_1970
 from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of, zone_of
@@ -399,6 +399,9 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     found = counted.parse(texts, form or "elapsed-s")
     choice = time_choice(layout, (index,), form or "elapsed-s", found, 0.2)
     if form is None:
+        if hours_and_minutes(texts) and (bool(np.any(steps < 0)) or value[-1] >= _LAST_HOUR):
+            yield time_choice(layout, (index,), "%H%M", counted.parse(texts, "%H%M"), 0.1)
+            return
         usual = float(np.median(steps[steps > 0]))
         unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"
         likely = f"likely {unit}" if usual < _SLOW else "ms of a slow logger, or us of a fast one"
@@ -435,6 +438,8 @@ _YEAR_AND_DAY = frozenset({"date", "yyddd", "yrdoy", "yydoy"})
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
 _YEARS_AND_PARTS = frozenset({"decimal", "decyear", "dyear", "decdate", "decimalyear", "decimaldate"})
 _HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
+_LAST_HOUR = 2300
+"""Hours and minutes in one number, from which on a day is over: a count without a unit would not end there."""
 _SLOW = 5000.0
 """Steps of a count from which it is as likely of microseconds as of milliseconds."""
 _SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0, "elapsed-h": 3600.0}

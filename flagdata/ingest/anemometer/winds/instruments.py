@@ -10,7 +10,7 @@ import numpy as np
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.winds import beside, bow, codes, other_units, own_motion, powers, unitcheck
+from flagdata.ingest.anemometer.winds import beside, bow, codes, other_units, own_motion, powers, shipboard, unitcheck
 from flagdata.ingest.anemometer.winds.angles import compass_unit, day_of_month, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
@@ -68,7 +68,7 @@ def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) 
         speed: a column that is a speed of the wind by the user's word.
     """
     headings = [bow.heading_of(layout, index) for index in range(len(layout.names))]
-    headings = [_gust_of_weather_pages(layout, heading) for heading in headings]
+    headings = shipboard.as_coded([_gust_of_weather_pages(layout, heading) for heading in headings])
     headings, of_earth = along_axes(layout, headings)
     for index in [at for at, heading in enumerate(headings) if at == speed or heading.channel == "wind_speed"]:
         own = beside.direction_of(layout, index, apart=time)

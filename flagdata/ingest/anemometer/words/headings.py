@@ -154,6 +154,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
+    text = re.sub(r"(?<=direction), ?\*$", ", deg", text, flags=re.IGNORECASE)  # a sign for degrees, lost by HOBO
     text = _PERIOD.sub(r"\1\2min", _ABOVE.sub(" ", _RATE.sub(" ", text)))
     text = _U_SONIC.sub("sonic", _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text)))
     tenfold = _TENFOLD.search(text)
@@ -174,6 +175,8 @@ def understand(name: str, stated: str = "") -> Heading:
         unit = "deg" if unit is None and "deg" in words[1:] else unit
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
     known = set(words)
+    if unit is not None and UNITS[unit].si == "m/s":
+        known.discard("samples")  # of a speed, not a count of them
     compact = "".join(words)
     spread = bool(known & SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
     misstated = _misstated(known, unit)
@@ -233,6 +236,7 @@ def names_time(name: str) -> bool:
 def is_format(name: str) -> bool:
     """Whether a heading is the format of the stamps below it, such as "yyyy-mm-dd hh:mm" or "JJ/MM/AAAA"."""
     parts = re.findall(r"[^\W\d_]+", name.lower())
+    parts = parts[1:] if parts[:1] in (["date"], ["datum"], ["fecha"], ["data"], ["dato"]) else parts
     year = any(part in _YEARS for part in parts)
     return len(parts) >= _PARTS_OF_DATE and year and all(part in _YEARS | _DATE_PARTS for part in parts)
 
@@ -275,6 +279,7 @@ def words_of(name: str) -> list[str]:
 
 def _words(text: str) -> list[str]:
     found: list[str] = []
+    text = text.replace("WDrs", "wdir")  # the resultant direction of Campbell's programs
     text = re.sub(r"(?<![^\W_])([ATG]W)(?=(?:angle|speed|spd|dir))", r"\1 ", text)
     for word in _WORD.findall(text.replace("µ", "u")):
         if word[0].isdigit():
@@ -385,7 +390,11 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
                 return channel, True, {word}
         named = known & SPEED or (known & {"strength"} if windy else set())
         if named or re.search(r"wind.?(speed|spd|vel|geschw)|^ws\d*$|^wspd|^spd", compact) or (windy and si == "m/s"):
-            return _by_platform(known, "speed"), bool(named) or windy, named | (known & (_APPARENT | _THEORETICAL))
+            return (
+                _by_platform(known, "speed"),
+                bool(named - {"sp"}) or windy,
+                named | (known & (_APPARENT | _THEORETICAL)),
+            )
         if windy and (not known - WIND - MEAN - (PLAIN - {"d", "u"}) or _of_a_place(known)):
             return "wind_speed", True, known & WIND
         if _of_a_cup(words):
