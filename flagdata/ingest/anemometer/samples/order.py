@@ -108,7 +108,8 @@ def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading
     settled = reading.take(~wild)
     jumps = clock.set_back(settled.time)
     if len(jumps) > clock.MOST or not all(_believable(settled, jump, choice) for jump in jumps):
-        return _late_rows_sorted(_one_clock(_risen(reading, lag, few, where), (), choice))
+        settable = choice is None and len(jumps) <= clock.MOST
+        return _late_rows_sorted(_one_clock(_risen(reading, lag, few, where, settable=settable), (), choice))
     if wild.any():
         settled = settled.with_findings((_left_out(reading, wild, lag),))
     return _late_rows_sorted(_one_clock(settled, jumps, choice))
@@ -174,8 +175,13 @@ def _late_rows_sorted(reading: Reading) -> Reading:
     return reading.with_findings((finding,), flags=flags).take(np.argsort(time, kind="stable"))
 
 
-def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str) -> Reading:
+def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, settable: bool) -> Reading:
     """The rows without the fewest whose removal leaves time in order.
+
+    Args:
+        lag: (n,) how far each row lies before the latest above it [ns].
+        few: rows that may go.
+        settable: whether a word on whose stamps are right would have them read.
 
     Raises:
         TimeError: they are many.
@@ -188,14 +194,17 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str) -> Re
     if count > few:
         backwards = np.flatnonzero(np.diff(time) < 0) + 1
         at = int(backwards[np.argmax(lag[backwards])])
+        clocks = (
+            "or, if one log's clock was set anew, say whose stamps are right: --clock first (before it) or --clock "
+        )
+        clocks += "last (after it); "
         raise TimeError(
-            f"time runs backwards by {lag[at] / NANOSECONDS:.1f} s, from {iso(int(time[at - 1]))} to "
+            f"time runs backwards by {lag[at] / NANOSECONDS:.1f} s, from {iso(int(time[at] + lag[at]))} to "
             f"{iso(int(time[at]))}, and {count} rows would have to go: the logger's clock was set back, or files were "
             "joined",
             where=f"{where}, line {reading.line[at]}",
-            fix="split the file there and ingest the parts by themselves; or, if one log's clock was set anew, say "
-            "whose stamps are right: --clock first (before it) or --clock last (after it); or, if all stamps are right "
-            "and only the rows are out of order: --clock sort",
+            fix=f"split the file there and ingest the parts by themselves; {clocks if settable else ''}or, if all "
+            "stamps are right and only the rows are out of order: --clock sort",
         )  # fmt: skip
     return reading.take(keep).with_findings((_left_out(reading, wild, lag),))
 

@@ -130,8 +130,8 @@ def _unknown(name: str) -> UnknownNameError:
         return UnknownNameError(f"unknown name of a column {name!r}", where=_WHERE, fix=fix)
     known = [*FREE, *PARTS, SITE, TOWARDS, *_NAMES]
     near = UnknownNameError.of("name of a column", name, known, where=_WHERE)
-    listed = f"known: {', '.join(known)}"
-    return near if near.fix == listed else UnknownNameError(near.what, where=_WHERE, fix=f"{near.fix} {listed}")
+    meant = near.fix if near.fix is not None and near.fix.startswith("did you mean") else ""
+    return UnknownNameError(near.what, where=_WHERE, fix=f"{meant} known: {', '.join(known)}".strip())
 
 
 def names_time(text: str) -> bool:

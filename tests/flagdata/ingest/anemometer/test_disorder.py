@@ -206,6 +206,10 @@ def test_many_of_few_rows_out_of_order_are_not_left_out_but_the_way_to_sort_them
     with pytest.raises(TimeError, match="8 rows would have to go") as caught:
         read(text, zone="UTC")
     assert "--clock sort" in caught.value.fix
+    assert "from 2026-05-01T11:13:00Z to 2026-05-01T11:00:30Z" in caught.value.what  # the latest row before it
+    with pytest.raises(TimeError, match="8 rows would have to go") as again:
+        read(text, zone="UTC", clock="first")
+    assert "--clock first" not in again.value.fix  # which was tried
     found = read(text, zone="UTC", clock="sort")
     assert len(found.series.time) == len(seconds)
     assert bool((np.diff(found.series.time) > 0).all())
