@@ -100,6 +100,8 @@ def angles(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 def within_a_turn(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) which directions are a code that might be an angle: -1 among angles to 360°, 99 among tens of degrees.
 
+    Where north is 360 in steps of ten degrees, 0 is calm air (WMO-No. 306, code table 0877).
+
     Args:
         values: (n,) as written, NaN where missing.
     """
@@ -110,6 +112,9 @@ def within_a_turn(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     rest = values[known & (values != 99)]
     if len(rest) >= _OTHERS and float(rest.min()) >= 0 and float(rest.max()) <= 36 and bool(np.all(rest % 1 == 0)):
         found |= values == 99
+    for north, step in ((360.0, 10.0), (36.0, 1.0)):
+        if len(rest) >= _OTHERS and float(rest.max()) == north and bool(np.all(rest % step == 0)):
+            found |= values == 0
     return found
 
 

@@ -121,3 +121,22 @@ def test_a_deep_table_of_stations_takes_seconds(log_file: Write) -> None:
     series = read_log(path, WindOptions(wind="37100MS")).series
     np.testing.assert_allclose(series.channels["wind_speed"], 9.7 / 3.6)
     assert len(series.time) == 100
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("deg", 10), ("10 deg", 1)])
+def test_0_beside_360_is_calm_air_and_360_is_north(read: Read, unit: str, scale: int) -> None:
+    """Steps of ten degrees, as weather services report the wind; 0 in steps of one degree is north."""
+    away = [36, 0, 18, 9, 36, 27, 1, 0, 35, 12, 20, 30, 36]
+    rows = [f"2021-05-01T{at:02d}:00:00Z,{3 + at % 4},{value * scale}" for at, value in enumerate(away)]
+    log = read("\n".join([f"time,wind speed [m/s],wind dir [{unit}]", *rows]) + "\n")
+    found = np.rad2deg(log.series.channels["wind_direction"])
+    wanted = [np.nan if value == 0 else 10 * value for value in away]
+    np.testing.assert_allclose(np.cos(np.deg2rad(found)), np.cos(np.deg2rad(wanted)), atol=1e-9)
+    assert [f.kind for f in log.findings if f.kind == "code-for-missing"] == ["code-for-missing"]
+
+
+def test_0_beside_360_in_steps_of_a_degree_is_north(read: Read) -> None:
+    away = [360, 0, 181, 93, 359, 271, 1, 0, 350, 12, 20, 30, 360]
+    rows = [f"2021-05-01T{at:02d}:00:00Z,{3 + at % 4},{value}" for at, value in enumerate(away)]
+    series = read("\n".join(["time,wind speed [m/s],wind dir [deg]", *rows]) + "\n").series
+    assert bool(np.isfinite(series.channels["wind_direction"]).all())
