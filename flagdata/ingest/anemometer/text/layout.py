@@ -30,6 +30,8 @@ _NAMING = re.compile(r"^\s*@\s*")
 _BRACKETS = re.compile(r"[(\[（]([^()\[\]（）]{1,12})[)\]）]\s*$")
 _LEAST_UNITS = 2
 """In brackets that make a second line of names one that tells units."""
+_COUNTED = 6
+"""Columns that are numbered one after another in a heading."""
 _HEADING_LINES = 10
 """Lines that the heading, its units and blank lines below it may take."""
 
@@ -130,7 +132,7 @@ def _lay_out(
     first = next(
         (
             at for at in range(len(table))
-            if fits[at] and _mostly(fits[at : at + 20])
+            if fits[at] and _mostly(fits[at : at + 20]) and not _counts_columns(table[at][1], typed)
             and not _names_follow(table[at + 1 : at + 3], fits[at + 1 : at + 3], interest)
             and not (delimiter == " " and any(_NAMING.match(line) for _, line in filled[at : at + _HEADING_LINES]))
         ),
@@ -163,6 +165,15 @@ def _lay_out(
         lines=tuple(number + 1 for number, _ in kept), suffixes=suffixes, unit_columns=beside, strange=strange,
         short=short, named=0 if at is None or delimiter == " " else _beyond(lines[at], delimiter, width),
     )  # fmt: skip
+
+
+def _counts_columns(cells: Sequence[str], typed: Sequence[int]) -> bool:
+    """Whether a line is a heading that counts: words above columns of numbers, and 0, 1, 2 … above all others."""
+    kinds = {index: cell_kind(cells[index]) for index in typed if index < len(cells)}
+    counted = [cells[index].strip() for index, kind in kinds.items() if kind == "number"]
+    if "text" not in kinds.values() or len(counted) < _COUNTED or not all(map(str.isdigit, counted)):
+        return False
+    return [int(cell) for cell in counted] == list(range(int(counted[0]), int(counted[0]) + len(counted)))
 
 
 def _names_follow(rows: Sequence[tuple[int, list[str]]], fits: Sequence[bool], interest: Callable[[str], int]) -> bool:

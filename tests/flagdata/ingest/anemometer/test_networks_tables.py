@@ -140,3 +140,13 @@ def test_0_beside_360_in_steps_of_a_degree_is_north(read: Read) -> None:
     rows = [f"2021-05-01T{at:02d}:00:00Z,{3 + at % 4},{value}" for at, value in enumerate(away)]
     series = read("\n".join(["time,wind speed [m/s],wind dir [deg]", *rows]) + "\n").series
     assert bool(np.isfinite(series.channels["wind_direction"]).all())
+
+
+def test_a_heading_that_counts_the_hours_is_no_first_reading(log_file: Write) -> None:
+    rows = [
+        f"{35 + at}.1,{-97 - at}.2,STN{at},{','.join(f'{3 + at}.{hour % 10}' for hour in range(23))}" for at in range(5)
+    ]
+    path = log_file("\n".join(["lat,lon,station," + ",".join(map(str, range(23))), *rows]) + "\n")
+    options = WindOptions(columns="4=wind_speed[m/s]", start=np.datetime64("2020-01-01", "ns").astype(int), rate=1.0)
+    series = read_log(path, options).series
+    assert series.channels["wind_speed"].tolist() == [3.0, 4.0, 5.0, 6.0, 7.0]
