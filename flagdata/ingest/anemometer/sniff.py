@@ -50,11 +50,15 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     try:
         opened = open_text(path, limits=Limits())
         if untimed.clocked(opened):
-            day = untimed.year_alone(opened) or "01-01"
-            return recognise(untimed.dated(opened, dt.date.fromisoformat(f"2000-{day}")))
+            day = untimed.year_alone(opened)
+            dated = untimed.dated(opened, dt.date.fromisoformat(f"2000-{day or '01-01'}"))
+            lacks = "date" if day is None else "year"
+            return _asking(dated, f"its lines have no {lacks}: give the first day: --date YYYY-{day or 'MM-DD'}")
         if bulletins.matches(opened.head()):
-            day = dt.date.fromisoformat(f"2000-01-{bulletins.first_day(opened)}")
-            return recognise(bulletins.dated(opened, day))
+            first = bulletins.first_day(opened)
+            dated = bulletins.dated(opened, dt.date.fromisoformat(f"2000-01-{first}"))
+            need = f"the bulletins have no month and no year: give the first day in UTC: --date YYYY-MM-{first}"
+            return _asking(dated, need)
         if spelled_stamps.spelled(opened.head()):
             return recognise(spelled_stamps.provisional(opened))
         source = restate(opened)
@@ -67,6 +71,14 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     rewritten = tuple(finding.what for finding in source.findings)
     found = tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in recognise(source))
     return found or (unknown(source),)
+
+
+def _asking(dated: TextFile, need: str) -> tuple[Guess, ...]:
+    """Guesses at lines that were dated for the time being, with what their user must say of the date.
+
+    A recipe of them would not read the file as it is, and is left out.
+    """
+    return tuple(replace(guess, needs=(need, *guess.needs), draft=None) for guess in recognise(dated))
 
 
 def unknown(source: TextFile) -> Guess:

@@ -11,6 +11,7 @@ import pytest
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
+from flagdata.ingest.anemometer.sniff import sniff
 from flagdata.timebase import iso
 
 Write = Callable[[str], Path]
@@ -112,3 +113,11 @@ def day() -> Callable[[str], WindOptions]:
         return WindOptions(date=dt.date.fromisoformat(date), wind=wind or None)
 
     return options
+
+
+def test_a_sniff_asks_for_the_date_of_bulletins(log_file: Write) -> None:
+    """It read them by a date of its own, which is none of theirs."""
+    (guess, *_) = sniff(log_file(_BULLETINS))
+    assert guess.needs[0].endswith("--date YYYY-MM-30")
+    assert guess.draft is None
+    assert not any("2000" in text for text in (*guess.reasons, *guess.notes, *guess.needs))
