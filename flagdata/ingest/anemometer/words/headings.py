@@ -175,7 +175,7 @@ def understand(name: str, stated: str = "") -> Heading:
         unit = "deg" if unit is None and "deg" in words[1:] else unit
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
     known = set(words)
-    if unit is not None and UNITS[unit].si == "m/s":
+    if unit is not None and UNITS[unit].si == "m/s" and "latest" not in known:
         known.discard("samples")  # of a speed, not a count of them
     compact = "".join(words)
     spread = bool(known & SPREAD) or "*" in rest or bool(re.search(r"gust|böe|std|max$|min$|chill|rms$", compact))
