@@ -15,7 +15,6 @@ from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants.wall import offset_at
 from flagdata.ingest.anemometer.instants.zone_sentences import sentences
-from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
 
@@ -107,7 +106,7 @@ def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[F
 
 def _below(line: str, below: str, number: int) -> list[Statement]:
     """Statements of which one line is a row of names and the next one of their values."""
-    for delimiter in SIGNS:
+    for delimiter in (",", ";", "\t"):
         names, values = ([cell.strip().strip('"') for cell in text.split(delimiter)] for text in (line, below))
         if len(names) < 2 or len(names) != len(values):
             continue
