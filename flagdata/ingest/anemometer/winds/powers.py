@@ -19,6 +19,8 @@ _TOLD = 1.5
 """Speeds from which on a power is told from its speed."""
 _ROWS, _SHARE, _APART = 5, 0.95, 1.3
 """Rows that must tell, the share of them that must agree, and how much the speeds in them must differ."""
+_EXACT = 1e-6
+"""What the arithmetic of shares may be off by."""
 _ROUNDED = 0.0151
 """Of a difference of numbers with two decimals, the most that rounding makes."""
 
@@ -31,13 +33,35 @@ def of_others(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int])
         columns: speeds.
     """
     found: dict[int, tuple[int, str]] = {}
-    for index in columns:
-        for base in columns:
-            power = None if base in (index, *found) else _power(values[base], values[index])
+    possible = _possible([values[index] for index in columns])
+    for at, index in enumerate(columns):
+        for below, base in enumerate(columns):
+            apart = base in (index, *found) or not possible[below, at]
+            power = None if apart else _power(values[base], values[index])
             if power is not None:
                 found[index] = base, _POWERS[power]
                 break
     return found
+
+
+def _possible(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """(base, other) pairs of columns that the first rows do not rule out: not too many of them are of no power.
+
+    A table may have hundreds of speeds, of which hardly any pair is left for `_power` to look at whole.
+    """
+    count = len(columns)
+    possible = np.zeros((count, count), dtype=np.bool_)
+    if not count:
+        return possible
+    rows = len(columns[0])
+    others = np.stack(columns)[:, : rows // 5 + 20]
+    for at, speed in enumerate(others):
+        telling = np.isfinite(others) & (speed >= _TOLD)
+        for power in _POWERS:
+            ratio = np.divide(others, speed**power, out=np.zeros_like(others), where=telling)
+            off = (telling & ((ratio < _LEAST) | (ratio > _MOST))).sum(axis=1)
+            possible[at] |= off <= (1 - _SHARE) * rows + _EXACT
+    return possible
 
 
 def differences(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int]) -> dict[int, tuple[int, int]]:
