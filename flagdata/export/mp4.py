@@ -6,7 +6,6 @@ bits, so nanoseconds would overflow at a gap of 4.3 s); <artifact>.frames.csv ha
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,6 +20,7 @@ from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
+from flagdata.export.csv_text import cell, write_csv
 from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, Source
 from flagdata.schema import CATALOG, CHANNELS, FRAME_RATE, Kind
 from flagdata.timebase import iso
@@ -57,15 +57,15 @@ class Mp4:
                 )
             name = f"{entry.key}.mp4"
             _encode(entry, folder / name, self.crf)
-            _write_csv(folder / f"{entry.key}.frames.csv", FRAMES_HEADER, _frame_rows(entry))
+            write_csv(folder / f"{entry.key}.frames.csv", FRAMES_HEADER, _frame_rows(entry))
             wind = _wind_rows(entry)
             if wind is not None:
-                _write_csv(folder / f"{entry.key}.wind.csv", WIND_HEADER, wind)
-            index.append([name, *(_text(entry.row[column]) for column in INDEX_COLUMNS)])
+                write_csv(folder / f"{entry.key}.wind.csv", WIND_HEADER, wind)
+            index.append([name, *(cell(entry.row[column]) for column in INDEX_COLUMNS)])
             frames += entry.count
             advance(1)
         header = ["file", *(f"{c} [{CATALOG[c].unit}]" if CATALOG[c].unit else c for c in INDEX_COLUMNS)]
-        _write_csv(folder / "index.csv", header, index)
+        write_csv(folder / "index.csv", header, index)
         return {
             "videos": len(source),
             "frames": frames,
@@ -146,20 +146,6 @@ def _wind_rows(entry: Entry) -> list[tuple[object, ...]] | None:
     begin, end = entry.wind_span
     inside = np.nonzero((wind.time >= begin) & (wind.time <= end))[0]
     return [
-        (iso(int(wind.time[i])), *(_text(float(v[i])) for v in (wind.speed, wind.sigma, wind.direction)), wind.count[i])
+        (iso(int(wind.time[i])), *(cell(float(v[i])) for v in (wind.speed, wind.sigma, wind.direction)), wind.count[i])
         for i in inside.tolist()
     ]
-
-
-def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with path.open("x", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
-
-
-def _text(value: Any) -> Any:
-    """A cell: floats so that they read back exactly, unknown ones empty, lists by semicolons."""
-    if isinstance(value, float):
-        return repr(value) if np.isfinite(value) else ""
-    return ";".join(map(str, value)) if isinstance(value, list) else value

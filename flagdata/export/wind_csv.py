@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
 from flagdata.errors import InputError
+from flagdata.export.csv_text import cell, write_csv
 from flagdata.export.source import Entry, Source
 from flagdata.schema import CHANNELS, Kind, SampleFlag
 from flagdata.signals import WindSeries
@@ -38,10 +36,8 @@ class WindCsv:
             if wind is None:
                 fix = "leave it out by --where"
                 raise InputError("a record without wind makes no table of it", where=entry.key, fix=fix)
-            with (folder / f"{entry.key}.csv").open("x", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow([TIME, DEVICE, *map(_heading, wind.channels), FLAGS])
-                writer.writerows(_rows(entry, wind))
+            header = [TIME, DEVICE, *map(_heading, wind.channels), FLAGS]
+            write_csv(folder / f"{entry.key}.csv", header, _rows(entry, wind))
             samples += len(wind.time)
             channels |= dict.fromkeys(wind.channels)
             advance(1)
@@ -57,5 +53,4 @@ def _rows(entry: Entry, wind: WindSeries) -> Iterator[Sequence[object]]:
     columns = [values.tolist() for values in wind.channels.values()]
     own = entry.record.device_wind_times.tolist()
     for time, device, flags, *values in zip(wind.time.tolist(), own, wind.flags.tolist(), *columns, strict=True):
-        cells = [repr(value) if np.isfinite(value) else "" for value in values]
-        yield iso(time), iso(device), *cells, ";".join(str(flag.name) for flag in _NAMED if flags & flag)
+        yield iso(time), iso(device), *map(cell, values), ";".join(str(flag.name) for flag in _NAMED if flags & flag)
