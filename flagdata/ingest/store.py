@@ -220,7 +220,7 @@ def ingest_winds(
         staged = [_staged(transaction, path, source, one) for one in new]
         for artifact, _ in staged:
             transaction.add(artifact)
-    done = iter(
+    done = (
         result_of(lake, transaction, artifact, report, one.labels, branch=branch)
         for one, (artifact, report) in zip(new, staged, strict=True)
     )

@@ -14,10 +14,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flagdata.ingest.anemometer.documents.json_instants import is_instant
+from flagdata.ingest.anemometer.documents.json_instants import holds_instant, is_instant
+from flagdata.ingest.anemometer.documents.places import STATION
 from flagdata.ingest.anemometer.words.headings import names_time, understand, words_of
 
-STATION = "station"
 _SEVERAL = 2
 """Members from which an object is one of rows or places."""
 _OF_A_STORE = re.compile(r"-[\w-]{19}|[0-9a-f]{24}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.IGNORECASE)
@@ -60,7 +60,7 @@ def _of_columns(item: Mapping[str, Any]) -> list[dict[str, Any]] | None:
     if not any("wind" in understand(name).quantity for name in item):
         return None
     rows = [{name: cells[key] for name, cells in item.items()} for key in keys]
-    if not timed or any(is_instant(name, value) for name, value in rows[0].items()):
+    if not timed or holds_instant(rows[0]):
         return rows
     return [{"time": _number(key), **row} for key, row in zip(keys, rows, strict=True)]
 
@@ -109,10 +109,7 @@ def _called(key: str) -> str:
 
 def _timed(item: Mapping[str, Any]) -> bool:
     """Whether an object holds an instant, itself or in an object within."""
-    return any(
-        is_instant(key, value) or (isinstance(value, dict) and any(is_instant(k, v) for k, v in value.items()))
-        for key, value in item.items()
-    )
+    return holds_instant(item) or any(isinstance(value, dict) and holds_instant(value) for value in item.values())
 
 
 def _number(key: str) -> Any:

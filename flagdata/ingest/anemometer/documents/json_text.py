@@ -23,7 +23,7 @@ from typing import Any
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.documents import coverage_json, json_keyed, json_measures, json_series
-from flagdata.ingest.anemometer.documents.json_instants import is_instant
+from flagdata.ingest.anemometer.documents.json_instants import holds_instant, is_instant
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
@@ -203,28 +203,31 @@ def _refuse_several_instants(table: Sequence[Mapping[str, str]], *, where: str) 
     Raises:
         InputError: there are such rows.
     """
-    listed = [name.rpartition(".")[0] for name, cell in (table[0].items() if len(table) == 1 else ())
-              if _LAST_INDEX.search(name) and is_instant(name.rpartition(".")[0].rpartition(".")[2], cell)]  # fmt: skip
+    fix = "export them as a list of objects or as CSV, one row a reading with its own time"
+    listed = _listed_instants(table[0]) if len(table) == 1 else []
     if len(listed) > 1 and len(set(listed)) == 1:
         what = f"JSON with {len(listed)} instants in its list {listed[0]!r}, and readings that no rule puts at them"
-        raise InputError(
-            what, where=where, fix="export it as a list of objects or as CSV, one row a reading with its time"
-        )
+        raise InputError(what, where=where, fix=fix)
     for row in table[:_LOOKED_AT]:
-        counted: dict[str, list[str]] = {}
-        for name, cell in row.items():
-            like = _INDEX.sub(".#", name)
-            if like != name and is_instant(name.rpartition(".")[2], cell):
-                counted.setdefault(like, []).append(cell)
-        like, cells = max(counted.items(), key=lambda item: len(set(item[1])), default=("", []))
+        alike = {name: _INDEX.sub(".#", name) for name in row}
+        counted: dict[str, set[str]] = {}
+        for name, like in alike.items():
+            if like != name and is_instant(name.rpartition(".")[2], row[name]):
+                counted.setdefault(like, set()).add(row[name])
+        like, instants = max(counted.items(), key=lambda item: len(item[1]), default=("", set[str]()))
         within = like.rpartition(".#")[0]
-        if len(set(cells)) > 1 and any(
-            _INDEX.sub(".#", name).startswith(f"{within}.#") and "wind" in understand(name.rpartition(".")[2]).quantity
-            for name in row
+        if len(instants) > 1 and any(
+            like.startswith(f"{within}.#") and "wind" in understand(name.rpartition(".")[2]).quantity
+            for name, like in alike.items()
         ):
-            what = f"JSON with readings of {len(set(cells))} instants in one object, in its list {within!r}"
-            fix = "export them as a list of objects or as CSV, one row a reading with its own time"
+            what = f"JSON with readings of {len(instants)} instants in one object, in its list {within!r}"
             raise InputError(what, where=where, fix=fix)
+
+
+def _listed_instants(row: Mapping[str, str]) -> list[str]:
+    """The lists of plain values that instants of a row stand in, one for each of them."""
+    lists = ((name.rpartition(".")[0], cell) for name, cell in row.items() if _LAST_INDEX.search(name))
+    return [name for name, cell in lists if is_instant(name.rpartition(".")[2], cell)]
 
 
 def _in_unit_of_all(
@@ -265,9 +268,7 @@ def _whole(source: TextFile) -> Any:
     first = filled[0].lstrip("\ufeff \t") if filled else ""
     if not first.startswith("[") and first.strip() != "{" and len(filled) > 1:
         return None
-    return json_keyed.as_list(
-        _parsed("\n".join(line for _, lines in source.blocks() for line in lines).lstrip("\ufeff"))
-    )
+    return json_keyed.as_list(_parsed("\n".join(source.each_line()).lstrip("\ufeff")))
 
 
 def _columns(item: dict[str, Any]) -> list[dict[str, str]] | None:
@@ -338,9 +339,9 @@ def _own_reading(whole: dict[str, Any]) -> dict[str, Any] | None:
     """An object without its lists, where its plain members are a reading of the wind at an instant and no list is."""
     plain = {key: value for key, value in whole.items() if not isinstance(value, dict | list)}
     lists = [value for value in whole.values() if isinstance(value, list) and value]
-    if not lists or not any(is_instant(key, value) for key, value in plain.items()):
+    if not lists or not holds_instant(plain):
         return None
-    if any(isinstance(row, dict) and any(is_instant(k, v) for k, v in row.items()) for rows in lists for row in rows):
+    if any(isinstance(row, dict) and holds_instant(row) for rows in lists for row in rows):
         return None
     if not any("wind" in understand(key).quantity for key, value in plain.items() if not isinstance(value, bool)):
         return None
@@ -366,7 +367,7 @@ def _readings_within(items: list[Any]) -> list[Any]:
         ((key, readings),) = lists.items()
         if not readings or not all(isinstance(one, dict) for one in readings):
             return items
-        if not all(any(is_instant(name, value) for name, value in one.items()) for one in readings):
+        if not all(map(holds_instant, readings)):
             return items
         found += [{name: value for name, value in item.items() if name != key} | one for one in readings]
     return found if len(found) > len(items) else items
@@ -375,7 +376,7 @@ def _readings_within(items: list[Any]) -> list[Any]:
 def _at_one_time(above: Mapping[str, Any], items: list[Any]) -> list[Any]:
     """Readings that tell no time, at the one instant that the object around their list tells; others as they are."""
     plain = all(isinstance(item, dict) for item in items)
-    if not plain or any(is_instant(name, value) for item in items for name, value in item.items()):
+    if not plain or any(map(holds_instant, items)):
         return items
     told = {name: value for name, value in above.items() if is_instant(name, value) or _is_update(name, value)}
     return [told | item for item in items] if len(told) == 1 else items

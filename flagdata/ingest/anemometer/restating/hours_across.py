@@ -103,12 +103,17 @@ def _of_items(rows: Sequence[Sequence[str]], kept: int) -> int | None:
     """The column whose cells say what the values are, among them a wind, each once a day; `None` where none does."""
     for at in range(kept):
         items = {row[at] for row in rows}
+        if not 1 < len(items) <= _MOST or not any(map(_is_wind, items)):
+            continue
         others = {tuple(cell for place, cell in enumerate(row[:-1]) if place != at) for row in rows}
-        windy = any("wind" in understand(item).quantity and understand(item).sure for item in items)
-        once = len({tuple(row[:-1]) for row in rows}) == len(rows)
-        if windy and once and 1 < len(items) <= _MOST and len(others) < len(rows):
+        if len(others) < len(rows) == len({tuple(row[:-1]) for row in rows}):
             return at
     return None
+
+
+def _is_wind(item: str) -> bool:
+    heading = understand(item)
+    return heading.sure and "wind" in heading.quantity
 
 
 def _by_item(names: Sequence[str], rows: Sequence[Sequence[str]], item: int) -> tuple[list[str], list[list[str]]]:

@@ -194,17 +194,17 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, se
     if count > few:
         backwards = np.flatnonzero(np.diff(time) < 0) + 1
         at = int(backwards[np.argmax(lag[backwards])])
-        clocks = (
-            "or, if one log's clock was set anew, say whose stamps are right: --clock first (before it) or --clock "
-        )
-        clocks += "last (after it); "
+        ways = ["split the file there and ingest the parts by themselves"]
+        if settable:
+            whose = "--clock first (before it) or --clock last (after it)"
+            ways.append(f"or, if one log's clock was set anew, say whose stamps are right: {whose}")
+        ways.append("or, if all stamps are right and only the rows are out of order: --clock sort")
         raise TimeError(
             f"time runs backwards by {lag[at] / NANOSECONDS:.1f} s, from {iso(int(time[at] + lag[at]))} to "
             f"{iso(int(time[at]))}, and {count} rows would have to go: the logger's clock was set back, or files were "
             "joined",
             where=f"{where}, line {reading.line[at]}",
-            fix=f"split the file there and ingest the parts by themselves; {clocks if settable else ''}or, if all "
-            "stamps are right and only the rows are out of order: --clock sort",
+            fix="; ".join(ways),
         )  # fmt: skip
     return reading.take(keep).with_findings((_left_out(reading, wild, lag),))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -169,11 +168,12 @@ def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:
         return proposal.winds
     known = {site_labels.site_of(text, proposal.parts)[0] for text in proposal.winds}
     for first, lines in source.blocks():
-        head = lines[proposal.first : HEAD_LINES] if first == 1 else ()
-        rows = (cells for line in head if _is_row(cells := cut(line, proposal.delimiter)))
-        later = (cut(line, proposal.delimiter) for line in (lines[HEAD_LINES:] if first == 1 else lines))
-        for cells in chain(rows, later):
-            if len(cells) > proposal.site and cells[proposal.site]:
+        for number, line in enumerate(lines, start=first - 1):
+            if number < proposal.first:
+                continue
+            cells = cut(line, proposal.delimiter)
+            of_a_site = len(cells) > proposal.site and bool(cells[proposal.site])
+            if of_a_site and (number >= HEAD_LINES or _is_row(cells)):
                 known.add(cells[proposal.site])
     return tuple(site_labels.label_of(site, part) for site in sorted(known) for part in sorted(proposal.parts))
 

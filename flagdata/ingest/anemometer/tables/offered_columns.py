@@ -173,11 +173,10 @@ def _hours_of_days(layout: Layout, date: int, others: Sequence[int]) -> list[int
     dates, found = layout.column(date), []
     for index in others:
         cells = layout.column(index)
-        filled = [cell for cell in cells if cell]
-        once = len(set(zip(dates, cells, strict=True))) == len(cells)
-        if once and len(filled) == len(cells) and whole_numbers(filled, 0, 24):
+        written = all(re.fullmatch(r"\d{1,2}", cell) for cell in cells) and whole_numbers(cells, 0, 24)
+        if written and len(set(zip(dates, cells, strict=True))) == len(cells):
             found.append(index)
-    return [index for index in found if all(re.fullmatch(r"\d{1,2}", cell) for cell in layout.column(index))]
+    return found
 
 
 def read_as(layout: Layout, time: TimeChoice, wind: Wind) -> str:

@@ -29,6 +29,7 @@ from flagdata.ingest.anemometer.times.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as
 from flagdata.ingest.anemometer.winds.angles import compass_unit
+from flagdata.ingest.anemometer.winds.axes import EAST, NORTH
 from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.words.headings import fits, understand, words_of
 from flagdata.schema import CHANNELS
@@ -45,12 +46,7 @@ SITE = "site"
 _COUNTS = {form.removeprefix("elapsed-"): form for form in counted.UNITS} | {"µs": "elapsed-us", "μs": "elapsed-us"}
 """Units that stand for a count of them since a start, as in time[s]."""
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
-_AXES = frozenset(
-    {
-        "u", "v", "u10", "v10", "east", "eastward", "north", "northward", "zonal", "meridional", "merid", "uwnd",
-        "vwnd", "ugrd", "vgrd", "ew", "ns",
-    }
-)  # fmt: skip
+_AXES = frozenset({"u", "v", "u10", "v10"}) | NORTH | EAST
 """Words by which users call components of the wind."""
 _ENTRY = re.compile(r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL)
 

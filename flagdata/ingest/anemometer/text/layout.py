@@ -99,7 +99,7 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         # A short log below a long preamble: fewer lines of its end may be rows alone. Their names must bear it out.
         tail = max(_LEAST, tail // 2)
         shorter = _lay_out(lines, filled, tail, interest)
-        if shorter is not None and shorter.by_name and sum(interest(name) > 0 for name in shorter.names) > 1:
+        if shorter is not None and _named(shorter, interest):
             found = shorter
     return found
 
@@ -111,9 +111,14 @@ def _above_a_legend(lines: Sequence[str], interest: Callable[[str], int]) -> Lay
     for end in reversed([at for at, line in enumerate(lines) if not line.strip()]):
         above = [(number, line) for number, line in enumerate(lines[:end]) if line.strip(" \t\x00\x1a")]
         found = _lay_out(lines[:end], above, max(1, len(above) // 2), interest) if above else None
-        if found is not None and found.by_name and sum(interest(name) > 0 for name in found.names) > 1:
+        if found is not None and _named(found, interest):
             return found
     return None
+
+
+def _named(layout: Layout, interest: Callable[[str], int]) -> bool:
+    """Whether the names of a table bear out that it is one."""
+    return layout.by_name and sum(interest(name) > 0 for name in layout.names) > 1
 
 
 def _lay_out(

@@ -10,11 +10,10 @@ from flagdata.ingest.anemometer.winds import own_motion
 from flagdata.ingest.anemometer.words.headings import Heading, words_of
 from flagdata.ingest.anemometer.words.wind_words import VERTICAL
 
-_AXES = (
-    frozenset({"north", "northward", "meridional", "merid", "vwn", "vwnd", "vgrd", "ns"}),
-    frozenset({"east", "eastward", "zonal", "vwe", "uwnd", "ugrd", "ew"}),
-    frozenset({"south", "southward"}), frozenset({"west", "westward"}),
-)  # fmt: skip
+NORTH = frozenset({"north", "northward", "meridional", "merid", "vwn", "vwnd", "vgrd", "ns"})
+EAST = frozenset({"east", "eastward", "zonal", "vwe", "uwnd", "ugrd", "ew"})
+"""Words of the components towards north and towards east."""
+_AXES = (NORTH, EAST, frozenset({"south", "southward"}), frozenset({"west", "westward"}))
 """Words of the components towards north and east, and of what cannot be beside them."""
 _COMPONENTS = ("wind_x", "wind_y", "wind_z")
 _SPEED_UNITS = frozenset({"m/s", "km/h", "kn", "mph", "cm/s", "ft/s"})
