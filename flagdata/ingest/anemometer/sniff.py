@@ -15,8 +15,10 @@ from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind
-from flagdata.ingest.anemometer.tables.draft import skeleton
+from flagdata.ingest.anemometer.tables.drafted_recipe import skeleton
+from flagdata.ingest.anemometer.tables.line_kinds import line_kinds
 from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TextFile
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
@@ -110,7 +112,8 @@ def unknown(source: TextFile) -> Guess:
         return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
     text = "text, but neither a table with a time or a wind, nor sentences of a known log in its first lines"
     fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --recipe FILE.toml"
-    return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
+    kinds = next(filter(None, (line_kinds(filled, sign) for sign in SIGNS)), "")
+    return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=kinds or fix)
 
 
 def _folder(path: Path) -> Guess:

@@ -133,6 +133,10 @@ def pattern(form: str) -> str:
                 position = run.end()
                 continue
             used.append(directive)
+            if directive == "f" and form[position - 1 : position] in ("_", "-", ":"):
+                out.append(r"(?P<f>\d{1,9})")  # the sign before it stands for the point
+                position += 2
+                continue
             beside = _NUMERIC.match(form, position + 2) or (position > 1 and _NUMERIC.match(form, position - 2))
             fixed = bool(beside) and directive in "mdHMSI"
             out.append(f"(?P<{directive}>\\d{{2}})" if fixed else _GROUPS[directive])

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from flagdata.ingest.anemometer.text.rows import has_open_quote
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 _MOST = 10
@@ -35,4 +37,4 @@ def _span(lines: Sequence[str]) -> tuple[int, int] | None:
     odd = [at for at, line in enumerate(lines[:_MOST]) if line.count('"') % 2]
     if len(odd) != 2 or any(line.count('"') % 2 for line in lines[_MOST:]):
         return None
-    return odd[0], odd[1]
+    return (odd[0], odd[1]) if any(has_open_quote(lines[odd[0]], sign) for sign in SIGNS) else None

@@ -22,6 +22,7 @@ from flagdata.ingest.anemometer.restating import labelled
 from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.tables import stated_columns
+from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.times.timecolumns import find_time
@@ -63,8 +64,8 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
     if columns is not None:
         _refuse_times(stated_columns.names_time(columns), where)
         source = restate(source)
-        text, short = _table(source, rate, start, where, told=True)
-        return _counted(source, text, rate, start, short=short)
+        text, found = _table(source, rate, start, where, told=True)
+        return _counted(source, text, rate, start, found)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(sum(bool(_TIMED.search(line)) for line in lines) > 1, where)
         text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
@@ -75,8 +76,8 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         known = labelled.alike(stamped[:HEAD_LINES]) or of_an_instrument(stamped[:HEAD_LINES])
         if not known:
             source = restate(source)
-            text, short = _table(source, rate, start, where)
-            return _counted(source, text, rate, start, short=short)
+            text, found = _table(source, rate, start, where)
+            return _counted(source, text, rate, start, found)
         text = stamped
     return _counted(source, text, rate, start)
 
@@ -161,20 +162,12 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     return TableText.of(source, text, [found])
 
 
-def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, *, short: int = 0) -> TextFile:
-    """The file with these lines, and the finding that says whose clock they are on.
-
-    Args:
-        short: lines that were left out, since they have fewer columns than the table.
-    """
+def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, found: Sequence[Finding] = ()) -> TextFile:
+    """The file with these lines, and the finding that says whose clock they are on beside others."""
     what = (
         f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
     )
-    found = [Finding(kind="rate-given", severity=Severity.WARNING, what=what)]
-    if short:
-        what = f"{short} lines have fewer columns than the table; left out, each counted as a reading"
-        found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=short, what=what))
-    return TableText.of(source, text, found)
+    return TableText.of(source, text, [Finding(kind="rate-given", severity=Severity.WARNING, what=what), *found])
 
 
 def _refuse_times(said: bool, where: str) -> None:
@@ -214,8 +207,10 @@ def _stamp(start: int, count: int, rate: float) -> str:
     return iso(start + round(count * NANOSECONDS / rate))
 
 
-def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool = False) -> tuple[list[str], int]:
-    """A table with a column of instants behind its own, whose numbers stay what they are; and lines too short for it.
+def _table(
+    source: TextFile, rate: float, start: int, where: str, *, told: bool = False
+) -> tuple[list[str], list[Finding]]:
+    """A table with a column of instants behind its own, whose numbers stay what they are; and what is not of it.
 
     Args:
         told: whether the user says that no column is a time.
@@ -223,19 +218,25 @@ def _table(source: TextFile, rate: float, start: int, where: str, *, told: bool 
     lines = source.head(HEAD_LINES)
     layout = lay_out(lines, interest=interest)
     if layout is None:
-        return _single(source, rate, start, where), 0
+        return _single(source, rate, start, where), []
     _refuse_times(not told and find_time(layout) is not None, where)
     first = layout.lines[0]
     width = layout.number_of_columns()
     kept: list[list[str]] = []
-    short = 0
+    others = 0
     for at, line in enumerate(_lines_from(source, first)):
         row = cut(line, layout.delimiter)
-        if len(row) >= width:
+        if len(row) >= width and not any(row[width:]):
             kept.append([*_points(row[:width], layout), _stamp(start, at, rate)])
         else:
-            short += 1
-    return _written(_names(layout.names, layout.units), kept), short
+            others += 1
+    found: list[Finding] = []
+    if others:
+        what = f"{others} lines have another number of columns than the table; left out, each counted as a reading"
+        found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=others, what=what))
+    if (above := rows_above(lines, layout)) != "":
+        found.append(Finding(kind="heading-doubtful", severity=Severity.WARNING, what=above))
+    return _written(_names(layout.names, layout.units), kept), found
 
 
 def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:

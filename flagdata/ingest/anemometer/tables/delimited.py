@@ -89,6 +89,10 @@ class Delimited:
             what = "; ".join(doubt.what for doubt in proposal.doubts)
             open_needs = [need.fix for need in proposal.needs if need.without(options)]
             raise InputError(what, where=where, fix="; ".join([*(doubt.fix for doubt in proposal.doubts), *open_needs]))
+        unsaid = [need for need in proposal.needs if need.without(options)]
+        if any(need.option == "platform" for need in unsaid):
+            what = next(need.what for need in unsaid if need.option == "platform")
+            raise InputError(what, where=where, fix="; ".join(need.fix for need in unsaid))
         winds = proposal.winds if options.wind is None else site_labels.of_column(proposal.winds, options.wind)
         if len(winds) > 1:
             raise InputError(
@@ -107,7 +111,7 @@ class Delimited:
             raise type(error)(error.what, where=error.where, fix="; ".join([told, *rest])) from None
         found = [
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
-            for text in proposal.warnings
+            for text in (*proposal.warnings, *([proposal.afloat] if proposal.afloat and not options.platform else []))
         ]
         mixed = devices.check(source, source.head(HEAD_LINES), reading, recipe, options, where)
         of_each = drafted(source, options, devices_by=mixed.column) if mixed is not None else None

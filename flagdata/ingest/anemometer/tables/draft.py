@@ -15,7 +15,6 @@ import numpy as np
 
 from flagdata.ingest.anemometer.instants import counted, yearless
 from flagdata.ingest.anemometer.options import in_shell
-from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.ingest.anemometer.tables import (
     against_components,
     beside_components,
@@ -29,7 +28,8 @@ from flagdata.ingest.anemometer.tables import (
     unread_rest,
     unread_winds,
 )
-from flagdata.ingest.anemometer.tables.needs import Need, needs_of, stamps_of
+from flagdata.ingest.anemometer.tables.drafted_recipe import delimiter_name, recipe_of
+from flagdata.ingest.anemometer.tables.needs import Need, needs_of, over_ground, stamps_of
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
@@ -40,11 +40,11 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
 from flagdata.ingest.anemometer.winds.codes import below_zero
-from flagdata.ingest.anemometer.winds.found import Column, Wind
+from flagdata.ingest.anemometer.winds.found import Wind
 from flagdata.ingest.anemometer.winds.instruments import find_winds, named_wind
-from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts, of_no_mean
+from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts, is_count, of_no_mean
 from flagdata.ingest.anemometer.winds.row_units import mixed_units
-from flagdata.ingest.anemometer.winds.sites import site_of_all, sites
+from flagdata.ingest.anemometer.winds.sites import sites
 from flagdata.ingest.anemometer.words import ghcn
 from flagdata.ingest.anemometer.words.headings import interest, understand
 from flagdata.units import canonical
@@ -80,6 +80,7 @@ class Draft:
         delimiter: of the cells.
         of_earth: whether the components of the wind are towards east (x) and north (y).
         first: line of its first row, counted from 0.
+        afloat: what is odd unless the user says what the platform does; "" where nothing shows that it moves.
         stretches: whether its sites follow one another, each with a count of time and a start of its own.
     """
 
@@ -97,6 +98,7 @@ class Draft:
     of_earth: bool = False
     stretches: bool = False
     first: int = 0
+    afloat: str = ""
 
 
 @lru_cache(maxsize=4)
@@ -131,7 +133,7 @@ def draft(
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
         time, winds, remarks = known.time, (known.wind,), ()
-        warnings = stated_against.warnings(layout, known.wind)
+        warnings, afloat = stated_against.warnings(layout, known.wind), stated_against.afloat(layout, known.wind)
         of_time = time.columns if time is not None else ()
         mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
     else:
@@ -141,6 +143,7 @@ def draft(
         if time is not None:
             mixed = sites(layout, time=of_time, stamps=stamps_of(layout, of_time))
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
+        afloat = ""
         for part in () if wind is None else site_labels.parts(wind, mixed[1] if mixed is not None else ()):
             if part in {one.label for one in winds}:
                 break
@@ -148,6 +151,7 @@ def draft(
             winds, warnings, named = (*winds, *said), (*warnings, *odd), bool(said)
             if said:
                 warnings = (*warnings, *stated_against.warnings(layout, said[0]))
+                afloat = stated_against.afloat(layout, said[0])
                 break
         if time is None and not winds:
             return None
@@ -202,11 +206,12 @@ def draft(
         remarks = (*remarks, *own_motion.remarks(layout), *(unread.times(layout, time, remarks) if time else ()))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     remarks = (*remarks, *unread_rest.remark(layout, time, winds, (*layout.strange, *remarks, *warnings)))
-    toml = _toml(layout, time, chosen)
+    toml = recipe_of(layout, time, chosen)
+    needs = needs_of(lines, layout, time) + (over_ground(layout, chosen) if columns is None and not named else ())
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), needs=needs_of(lines, layout, time),
+        doubts=tuple(doubts), needs=needs, afloat=afloat,
         unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth, stretches=bool(anew),
@@ -342,7 +347,7 @@ def _unit_doubt(
         what = f"the unit of column {heading!r} is not stated in its heading; line {number} says {words!r}"
         return Doubt(what=what, fix=f"if that is the unit of the wind, give it: --unit {name}")
     column = wind.columns[missing[0]].index
-    if column in counts(layout):
+    if is_count(layout, column):
         what = f"column {layout.names[column]!r} is what an anemometer counts or gives, not yet a speed"
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
         return Doubt(what=what, fix=fix + offered_columns.calibrated(layout, time, column))
@@ -408,88 +413,3 @@ def _units_line(layout: Layout) -> str:
 
 def _shown(layout: Layout, index: int) -> str:
     return repr(layout.names[index]) if layout.names[index] else f"number {index + 1}"
-
-
-def delimiter_name(delimiter: str) -> str:
-    """What a recipe calls a delimiter."""
-    return next(name for name, character in DELIMITERS.items() if character == delimiter)
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
-
-
-def _reference(layout: Layout, index: int) -> str:
-    """A column as a recipe names it: by its heading where that is its own, else by its number."""
-    name = layout.names[index]
-    return _quoted(name) if layout.by_name and name and layout.names.count(name) == 1 else str(index + 1)
-
-
-def skeleton(lines: Sequence[str]) -> tuple[str, str, str] | None:
-    """What a table is of which nothing is known but its columns, what its user can say, and a recipe to complete.
-
-    `None` for no table.
-    """
-    layout = lay_out(lines, interest=interest)
-    if layout is None:
-        return None
-    names = ", ".join(repr(name) for name in layout.names if name)
-    first = ", ".join(layout.rows[0])[:200]
-    what = (
-        f"a table of {layout.number_of_columns()} columns divided by {delimiter_name(layout.delimiter)!r}, "
-        f"{f'called {names}' if names else 'which no line names'}, the first row {first}"
-    )
-    return what, offered_columns.offer(layout, None, ()), _toml(layout, None, None)
-
-
-def _toml(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
-    preamble = layout.preamble if layout.by_name else layout.preamble + layout.header
-    label = wind.label if wind is not None else "anemometer"
-    lines = [
-        'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
-        "[file]", f"delimiter = {_quoted(delimiter_name(layout.delimiter))}", f"decimal = {_quoted(layout.decimal)}",
-        f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
-        f"missing = [{', '.join(map(_quoted, missing_codes.of(layout, wind)))}]", "",
-        "[time]",
-    ]  # fmt: skip
-    if time is None:
-        lines += ['columns = ["?"]  # names, or numbers from 1', 'format = "?"  # such as "%Y %j %H%M" or "epoch-s"']
-    else:
-        lines.append(f"columns = [{', '.join(_reference(layout, index) for index in time.columns)}]")
-        doubt = f"  # {time.doubt}" if time.form is None else ""
-        lines.append(f"format = {_quoted(time.form or '?')}{doubt}")
-    if time is not None and time.zone is not None:
-        lines.append(f"zone = {_quoted(time.zone)}")
-    if wind is not None and wind.site is not None:
-        lines += ["", "[rows]", f"column = {_reference(layout, wind.site[0])}", f"value = {_quoted(wind.site[1])}"]
-    if wind is None:
-        names = ", ".join(name for name in layout.names if name)
-        lines += ["", "[channels.wind_speed]", 'column = "?"  # ' + (f"one of: {names}" if names else "its number")]
-        lines += ['unit = "?"  # m/s, km/h, mph, kn']
-    for channel, column in (wind.columns if wind is not None else {}).items():
-        lines += ["", f"[channels.{channel}]", f"column = {_reference(layout, column.index)}"]
-        lines += [f"unit = {_quoted(column.unit)}" if column.unit else 'unit = "?"  # not stated: m/s, km/h, mph, kn']
-        lines += ['convention = "to"'] if column.towards else []
-        suffix = layout.suffixes[column.index]
-        lines += [f"suffix = {_quoted(suffix)}"] if suffix else []
-    own = wind.columns.values() if wind is not None else ()
-    units = list(dict.fromkeys(other for one in own for other in _beside(layout, one)))
-    for column in units:
-        text = next(row[column].strip() for row in layout.rows if row[column].strip())
-        lines += ["", "[[check]]", f"column = {_reference(layout, column)}", f"values = [{_quoted(text)}]"]
-        lines += ['about = "unit"']
-    site = site_of_all(layout, apart={*time.columns, *units}) if time is not None else None
-    if site is not None and own:
-        lines += ["", "[[check]]", f"column = {_reference(layout, site[0])}", f"values = [{_quoted(site[1])}]"]
-        lines += ['about = "site"']
-    lines += ["", "[sensor]", f"name = {_quoted(label)}"]
-    if wind is not None and wind.height is not None:
-        lines.append(f"height = {wind.height:g}")
-    return "\n".join([*lines, ""])
-
-
-def _beside(layout: Layout, column: Column) -> tuple[int, ...]:
-    """The column that spells a column's unit in every row, where that is how the unit is known."""
-    other = layout.unit_columns[column.index]
-    alone = understand(layout.names[column.index]).unit is None
-    return (other,) if other is not None and alone else ()

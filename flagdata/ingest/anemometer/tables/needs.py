@@ -1,4 +1,4 @@
-"""What the stamps of a table do not tell and no recipe can: their start, their day, their zone."""
+"""What a table does not tell and no recipe can: start, day and zone of its stamps, and whether wind is over ground."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.tables import stated_rate
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
+from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds.found import Wind
 
 
 @dataclass(frozen=True, kw_only=True)
 class Need:
-    """What a table's stamps do not tell and no recipe can: what, how to say it, and the option that says it."""
+    """What a table does not tell and no recipe can: what, how to say it, and the option that says it."""
 
     what: str
     fix: str
-    option: Literal["zone", "date", "start"]
+    option: Literal["zone", "date", "start", "platform"]
 
     def without(self, options: WindOptions) -> bool:
         """Whether the user has not said it yet."""
@@ -51,6 +53,20 @@ def needs_of(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> t
         fix = f"{fix}; {time.zone_advice}" if time.zone_advice else fix
         found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
     return tuple(found)
+
+
+def over_ground(layout: Layout, wind: Wind | None) -> tuple[Need, ...]:
+    """Whether a wind is over ground, where a column shows that its platform moves and the wind does not say it."""
+    moves = own_motion.vessel(layout)
+    relative = wind is not None and any(name.startswith(("apparent", "theoretical")) for name in wind.columns)
+    if not moves or wind is None or "wind_speed" not in wind.columns or relative:
+        return ()
+    what = f"{moves!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over ground"
+    fix = (
+        "say it: --platform moving where it is apparent wind, as an anemometer on board measures it, --platform "
+        "corrected where the platform's motion was taken out, --platform fixed where it stands still"
+    )
+    return (Need(what=what, fix=fix, option="platform"),)
 
 
 def stamps_of(layout: Layout, columns: Sequence[int]) -> list[str]:

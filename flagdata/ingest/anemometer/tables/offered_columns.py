@@ -336,7 +336,11 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
             continue
-        elif may_be_direction(layout, at) and not any("wind_direction" in entry for entry in found.values()):
+        elif (
+            may_be_direction(layout, at)
+            and not any("wind_direction" in entry for entry in found.values())
+            and not any(bow.heading_of(layout, other).channel == "wind_direction" for other in range(len(layout.names)))
+        ):
             channel = "apparent_wind_direction" if bow.to_bow(layout, at) else "wind_direction"
             channel = TOWARDS if channel == "wind_direction" and _blows_to(layout, at) else channel
             found[at] = channel if compass_unit(layout, at) else f"{channel}[deg]"

@@ -13,20 +13,13 @@ _EXTREMES = GUSTS | MAXIMA | MINIMA | {"peak", "lull"}
 
 
 def warnings(layout: Layout, wind: Wind) -> tuple[str, ...]:
-    """A warning where the platform moves below a wind over ground, and of a direction that others speak against."""
+    """A warning of a speed that is no mean by its heading, and of a direction that others speak against."""
     found: list[str] = [*against_components.warnings(layout, wind)]
     speed, direction = wind.columns.get("wind_speed"), wind.columns.get("wind_direction")
-    stated = {layout.names[column.index] for column in wind.columns.values()}
     if speed is not None and set(words_of(layout.names[speed.index])) & _EXTREMES:
         found.append(
             f"column {layout.names[speed.index]!r} holds gusts or extremes by its heading: stored as wind_speed, as "
             "you said, though it is no mean"
-        )
-    vessel = own_motion.vessel(layout)
-    if speed is not None and vessel and vessel not in stated:
-        found.append(
-            f"{vessel!r} shows that the platform moves: {wind.label!r} is taken as wind over ground, as you said; what "
-            "a moving platform measures is apparent_wind_speed and apparent_wind_direction"
         )
     if direction is not None and bow.to_bow(layout, direction.index):
         found.append(
@@ -34,3 +27,15 @@ def warnings(layout: Layout, wind: Wind) -> tuple[str, ...]:
             "from north, as you said; an angle to the bow is apparent_wind_direction or theoretical_wind_direction"
         )
     return tuple(found)
+
+
+def afloat(layout: Layout, wind: Wind) -> str:
+    """What is said of a platform that moves below a wind over ground; "" where none does."""
+    stated = {layout.names[column.index] for column in wind.columns.values()}
+    moves = own_motion.vessel(layout)
+    if "wind_speed" not in wind.columns or not moves or moves in stated:
+        return ""
+    return (
+        f"{moves!r} shows that the platform moves: {wind.label!r} is taken as wind over ground, as you said; what a "
+        "moving platform measures is apparent wind: --platform moving"
+    )

@@ -91,7 +91,7 @@ def parse(text: str) -> tuple[Entry, ...]:
     entries: list[Entry] = []
     by_name = "=" in re.sub(r"\[[^\]]*\]", "", text)
     for number, part in enumerate(parts, start=1):
-        if not part.strip():
+        if not part.strip() or part.strip().startswith("="):  # no column, where "?=wind_speed[?]" was offered
             continue
         match = _ENTRY.fullmatch(part.strip())
         if match is None or not match["name"] or (by_name and match["column"] is None):

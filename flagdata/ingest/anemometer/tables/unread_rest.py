@@ -49,4 +49,7 @@ def listed(layout: Layout, indices: Sequence[int], *, most: int) -> str:
 
 
 def _quoted(layout: Layout, index: int) -> str:
-    return repr(layout.names[index]) if layout.names[index] else f"number {index + 1}"
+    name = layout.names[index]
+    if not name:
+        return f"number {index + 1}"
+    return repr(f"{name}#{index + 1}" if layout.names.count(name) > 1 else name)

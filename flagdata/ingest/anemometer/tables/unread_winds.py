@@ -5,7 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flagdata.ingest.anemometer.tables import offered_columns, unread_rest
+from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
@@ -63,6 +67,7 @@ def remark(
     speed = next((index for index in speeds if _words(layout, index) & _HIGHEST), next(iter(speeds), None))
     if speed is None or time is None or wind is None:
         return (what,)
+    wind = _of_its_rows(layout, speed, (wind, *winds))
     option = offered_columns.read_instead(layout, time, wind, speed)
     read = f"to read {layout.names[speed]!r} as a wind of its own, ingest the file once more with"
     others = [at for at in speeds if at != speed and beside.direction_of(layout, at, apart=time.columns) is not None]
@@ -70,6 +75,16 @@ def remark(
         f"{layout.names[at]!r} likewise with {offered_columns.read_instead(layout, time, wind, at)}" for at in others
     )
     return ("; ".join([what, f"{read} {option}", *further]),)
+
+
+def _of_its_rows(layout: Layout, speed: int, winds: Sequence[Wind]) -> Wind:
+    """The first of the winds that has values in most rows in which a further speed has them."""
+
+    def known(column: int) -> NDArray[np.bool_]:
+        return np.isfinite(numbers(layout.column(column), decimal=layout.decimal).value)
+
+    own = known(speed)
+    return max(winds, key=lambda wind: int((own & known(next(iter(wind.columns.values())).index)).sum()))
 
 
 def _speaks_of_wind(layout: Layout, index: int) -> bool:

@@ -413,9 +413,9 @@ def _heading(
     named = [item for item in worded if not _SAYS_UNITS.match(lines[item[1]])] or worded
     said = [item for item in named if delimiter == " " and _NAMING.match(lines[item[1]])]
     _, at, names, plain = said[0] if said else max(named, key=lambda item: (item[0], item[3], -item[1]))
-    units_at, units = next(
-        ((number, cells) for number, cells, _ in candidates if number > at and _are_units(cells)), (at, None)
-    )
+    below = [(number, cells) for number, cells, _ in candidates if number > at and _are_units(cells)]
+    # Of several the one with the most units: TOA5 has a line of "Avg" and "Smp" below that of units.
+    units_at, units = max(below, key=lambda own: sum(spelled(cell) is not None for cell in own[1]), default=(at, None))
     if units is not None and names[0] and len(cut(_MARK.sub("", lines[units_at].strip()), delimiter)) == width - 1:
         odd = f"line {units_at + 1} has {width - 1} units for {width} columns: taken as those of all but the first"
         return tuple(names), tuple(units), at, plain and len(lines[at]) > 0, (odd,)

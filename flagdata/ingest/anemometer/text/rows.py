@@ -187,10 +187,23 @@ class RowReader:
 
 
 def blank_cells(line: str) -> list[str]:
-    """Cells divided by runs of blanks; quotes bind where they are closed."""
+    """Cells divided by runs of blanks, or by a comma and blanks; quotes bind where they are closed."""
     if '"' not in line or line.count('"') % 2:
-        return line.split()
+        return line.replace(", ", " ").split()
     return [quoted or plain for quoted, plain in _BLANK_CELL.findall(line)]
+
+
+def has_open_quote(line: str, delimiter: str) -> bool:
+    """Whether a quote begins a cell and is not closed; one within a cell that has none before it is a sign (0.01")."""
+    if line.count('"') % 2 == 0:
+        return False
+    cell, rest = re.escape(delimiter), line
+    while (quoted := re.search(rf'(?:^|{cell})\s*"', rest)) is not None:
+        end = re.search(rf'(?<!")(?:"")*"\s*(?:{cell}|$)', rest[quoted.end() :])
+        if end is None:
+            return True
+        rest = rest[quoted.end() + end.end() - len(delimiter) :] if end[0].endswith(delimiter) else ""
+    return False
 
 
 def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
@@ -198,11 +211,11 @@ def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
 
 
 def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:
-    """Cells of each line. Quotes bind within a line; a line with an unclosed quote becomes one cell."""
+    """Cells of each line. Quotes bind within a line; a line with a quote that is not closed becomes one cell."""
     if delimiter == " ":
         return [blank_cells(line) for line in lines]
     if not any('"' in line for line in lines):
         return [line.split(delimiter) for line in lines]
-    closed = [line if line.count('"') % 2 == 0 else "" for line in lines]
+    closed = ["" if has_open_quote(line, delimiter) else line for line in lines]
     rows = list(csv.reader(closed, delimiter=delimiter))
     return [row if kept else [line] for row, kept, line in zip(rows, closed, lines, strict=True)]

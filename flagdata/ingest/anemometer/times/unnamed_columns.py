@@ -144,11 +144,16 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
 def _ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
     """Year, day of the year and a clock of one number side by side, as arrays of Campbell's older loggers have them.
 
-    They are told by their numbers alone: the clock has no minutes above 59, and the rows rise.
+    They are told by their numbers alone: the clock has no minutes above 59, and the rows rise. Month and day may stand
+    between, as they do in the tables of Antarctic stations.
     """
     for index in range(len(columns) - 2):
-        year, day, clock = columns[index : index + 3]
-        if not share(YEAR, year) or not share(DIGITS, clock) or not whole_numbers(day, 1, 366):
+        year, day = columns[index : index + 2]
+        if not share(YEAR, year) or not whole_numbers(day, 1, 366):
+            continue
+        at = index + 4 if _again(columns[index : index + 4]) and index + 4 < len(columns) else index + 2
+        clock = columns[at]
+        if not share(DIGITS, clock):
             continue
         if not whole_numbers(clock, 0, 2400) or any(int(cell) % 100 > 59 for cell in clock if cell.isdigit()):
             continue
@@ -156,9 +161,19 @@ def _ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | N
         found, _ = parse_with_bare_dates(texts, "%Y %j %H%M")
         rising = np.diff(found.ns[found.valid])
         if fits(found) and len(rising) and bool(np.all(rising >= 0)) and bool(np.any(rising > 0)):
-            choice = time_choice(layout, (index, index + 1, index + 2), "%Y %j %H%M", found, 2.2)
+            choice = time_choice(layout, (index, index + 1, at), "%Y %j %H%M", found, 2.2)
             return replace(choice, unnamed=True)
     return None
+
+
+def _again(columns: Sequence[Sequence[str]]) -> bool:
+    """Whether year, day of the year, month and day say the same date twice in every row."""
+    if len(columns) < 4 or not all(share(TWO_DIGITS, cells) for cells in columns[2:]):
+        return False
+    rows = list(zip(*columns, strict=True))
+    ordinal, _ = parse_with_bare_dates([f"{year} {day}" for year, day, _, _ in rows], "%Y %j")
+    dates, _ = parse_with_bare_dates([f"{year} {month} {day}" for year, _, month, day in rows], "%Y %m %d")
+    return bool((ordinal.valid & dates.valid).all()) and bool((ordinal.ns == dates.ns).all())
 
 
 def _hourly(parts: Sequence[Sequence[str]], form: str = "%Y %m %d %H") -> bool:

@@ -10,7 +10,17 @@ import numpy as np
 from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.winds import beside, bow, codes, other_units, own_motion, powers, shipboard, unitcheck
+from flagdata.ingest.anemometer.winds import (
+    beside,
+    bow,
+    codes,
+    other_units,
+    own_motion,
+    places_in_names,
+    powers,
+    shipboard,
+    unitcheck,
+)  # fmt: skip
 from flagdata.ingest.anemometer.winds.angles import compass_unit, day_of_month, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
 from flagdata.ingest.anemometer.winds.directions import judge
@@ -24,6 +34,8 @@ from flagdata.units import unit
 
 _DIRECTION_OF = {name: name.replace("speed", "direction") for name in SPEEDS}
 _UNREADABLE = 0.1
+_QUALITY, _MARKS = frozenset({"q", "qn", "qual"}), 10
+"""What stands in the heading of marks of quality, and the most kinds of marks."""
 
 
 def find_winds(
@@ -49,15 +61,27 @@ def find_winds(
 
 
 def _leave_out_combinations(found: Found) -> None:
-    """Leave out squares, cubes and differences of speeds, which are none."""
+    """Leave out marks of quality, and squares, cubes and differences of speeds, with what is their direction by its
+    place: they are no speeds."""
+    for index in [at for at in found.of(*SPEEDS, "wind_direction") if _marks_another(found, at)]:
+        found.remarks.append(f"column {found.name(index)!r} holds marks of another column of its words: left out")
+        del found.values[index]
     speeds = found.of("wind_speed")
     for index, (base, power) in powers.of_others(found.values, speeds).items():
-        found.remarks.append(f"column {found.name(index)!r} is the {power} of {found.name(base)!r}, no speed: left out")
-        del found.values[index]
+        _leave_out(found, index, f"is the {power} of {found.name(base)!r}, no speed")
     for index, (first, second) in powers.differences(found.values, found.of("wind_speed")).items():
-        of = f"{found.name(first)!r} less {found.name(second)!r}"
-        found.remarks.append(f"column {found.name(index)!r} is {of}, no speed: left out")
-        del found.values[index]
+        _leave_out(found, index, f"is {found.name(first)!r} less {found.name(second)!r}, no speed")
+
+
+def _leave_out(found: Found, index: int, why: str) -> None:
+    """Leave out a column, and its direction where columns with the same headings are repeated for each instrument."""
+    found.remarks.append(f"column {found.name(index)!r} {why}: left out")
+    channel, key = found.headings[index].channel, found.key(index)
+    alike = [at for at in found.of(channel) if found.key(at) == key]
+    towards = [at for at in found.of(_DIRECTION_OF[channel]) if found.key(at) == key]
+    if len(towards) == len(alike) > 1:
+        del found.values[towards[alike.index(index)]]
+    del found.values[index]
 
 
 def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) -> Found:
@@ -122,7 +146,7 @@ def _few_words(found: Found, index: int, parsed: Numbers) -> bool:
 
 
 def _doubt_headings(found: Found, winds: Sequence[Wind]) -> None:
-    """Warn of what headings leave open: whether a speed is the wind's, and whether the wind is over ground."""
+    """Warn where headings leave open whether a speed is the wind's."""
     words = [set(words_of(name)) for name in found.layout.names]
     windy = any("wind" in word or word in WIND for name in words for word in name)
     windy = windy or bool(found.of("wind_direction", *COMPONENTS))
@@ -131,13 +155,6 @@ def _doubt_headings(found: Found, winds: Sequence[Wind]) -> None:
         if speed is not None and not windy and words[speed.index] & {"speed", "velocity", "vel"}:
             found.warnings.append(
                 f"the heading of {wind.label!r} does not say that the speed is the wind's: taken as wind"
-            )
-        afloat = own_motion.vessel(found.layout)
-        relative = any(channel.startswith(("apparent", "theoretical")) for channel in wind.columns)
-        if speed is not None and afloat and not relative:
-            found.warnings.append(
-                f"{afloat!r} shows that the platform moves, and {wind.label!r} does not say whether it is wind over "
-                "ground or apparent wind: taken as over ground"
             )
 
 
@@ -261,6 +278,18 @@ def _marks_quality(found: Found, index: int, indices: Sequence[int]) -> bool:
     return len(own) <= 2 and bool(np.all(own % 1 == 0)) and any(len(other) > 2 for other in kinds.values())
 
 
+def _marks_another(found: Found, index: int) -> bool:
+    """Whether a column has a letter of quality before the words of another (Q_FF beside FF), and holds few numbers."""
+    heading, value = found.headings[index], found.values[index]
+    bare = tuple(word for word in heading.label if word not in _QUALITY)
+    if len(bare) == len(heading.label):
+        return False
+    alike = [at for at in found.of(heading.channel) if found.headings[at].label == bare]
+    kinds = np.unique(value[np.isfinite(value)])
+    few = len(kinds) <= _MARKS and bool(np.all(kinds % 1 == 0))
+    return few and any(found.headings[at].height == heading.height for at in alike)
+
+
 def _same(found: Found, index: int, other: int) -> bool:
     one, two = found.headings[index], found.headings[other]
     if one.mean != two.mean:
@@ -307,7 +336,8 @@ def _components(found: Found, told: str | None) -> list[Wind]:
 
 def _direction(found: Found, speed: int, channel: str) -> tuple[str, Column] | None:
     """The direction that belongs to a speed, as a channel and a column."""
-    candidates = found.of(channel)
+    name = found.layout.names[speed]
+    candidates = [at for at in found.of(channel) if not places_in_names.are_of_two(name, found.layout.names[at])]
     exact = [index for index in candidates if found.key(index) == found.key(speed)]
     height = found.headings[speed].height
     near = [i for i in candidates if height is not None and found.headings[i].height is not None
@@ -326,6 +356,8 @@ def _direction(found: Found, speed: int, channel: str) -> tuple[str, Column] | N
     alike = [index for index in found.of(found.headings[speed].channel) if found.key(index) == found.key(speed)]
     if len(exact) == len(alike) > 1:
         exact = [exact[alike.index(speed)]]  # blocks of columns with the same headings, one an instrument
+    elif len(exact) > 1 and len(alike) > 1 and len({found.layout.names[at] for at in exact}) == 1:
+        exact = _next_to(found, speed, exact)
     plain = [i for i in candidates if not found.headings[i].label and found.headings[i].height is None]
     exact.sort(key=lambda i: (_points(found.headings[i]), found.headings[i].unit is None))
     chosen = exact or near[:1] or lone or plain
@@ -339,6 +371,12 @@ def _direction(found: Found, speed: int, channel: str) -> tuple[str, Column] | N
     if _points(found.headings[index]) and len(angles) == 1:
         index = angles[0]  # the same in degrees
     return _as_direction(found, index, channel)
+
+
+def _next_to(found: Found, speed: int, directions: Sequence[int]) -> list[int]:
+    """Of directions with the same heading the one in the column behind a speed, else the one before; none elsewhere."""
+    beside_it = [at for at in (speed + 1, speed - 1) if at in directions]
+    return beside_it[:1]
 
 
 def _as_direction(found: Found, index: int, channel: str) -> tuple[str, Column] | None:

@@ -14,11 +14,13 @@ _MILLIS = re.compile(r"(?<![^\W_])m[VA](?![^\W_])")
 """Millivolts and milliamperes, whose capital cuts them in two words."""
 _COUNTED = frozenset(
     {
-        "hz", "count", "counts", "pulse", "pulses", "ticks", "clicks", "rotations", "revolutions", "rpm", "freq",
-        "frequency", "adc", "v", "mv", "volt", "volts", "voltage", "ma",
+        "hz", "count", "counts", "cnt", "cnts", "pulse", "pulses", "tick", "ticks", "clicks", "rotations", "rpm",
+        "revolutions", "freq", "frequency", "adc", "v", "mv", "volt", "volts", "voltage", "ma",
     }
 )  # fmt: skip
 """Words of what an anemometer gives before its calibration."""
+_ELECTRIC = frozenset({"v", "mv", "volt", "volts", "voltage", "ma"})
+"""Those that a battery has as well."""
 
 
 def beaufort(layout: Layout) -> tuple[str, ...]:
@@ -32,15 +34,19 @@ def counts(layout: Layout) -> tuple[int, ...]:
     beside_vane = any(understand(name).channel == "wind_direction" for name in layout.names)
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
-        alone = beside_vane and words <= _COUNTED | {"s", "per"} - {"v", "mv", "volt", "volts", "voltage", "ma"}
+        alone = beside_vane and words <= (_COUNTED | {"s", "per", "num", "number"}) - _ELECTRIC
         of_wind = alone or words & {"wind", "anemometer", "anem", "cup", "ws", "windspeed"}
-        if of_wind and (
-            words & (_COUNTED - {"v"})
-            or _MILLIS.search(name)
-            or understand(name, layout.units[index]).strange.lower() in _COUNTED
-        ):
+        if of_wind and is_count(layout, index):
             found.append(index)
     return tuple(found)
+
+
+def is_count(layout: Layout, index: int) -> bool:
+    """Whether a column's heading says that it holds counts, a frequency or volts."""
+    name = layout.names[index]
+    if set(words_of(name)) & (_COUNTED - {"v"}) or _MILLIS.search(name):
+        return True
+    return understand(name, layout.units[index]).strange.lower() in _COUNTED
 
 
 def of_no_mean(layout: Layout) -> str:

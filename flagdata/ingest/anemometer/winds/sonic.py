@@ -40,7 +40,8 @@ def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> R
         text += "; no direction, since the sensor's azimuth is not known"
         fix = "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to the north)"
     else:
-        added["wind_direction"] = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
+        towards = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
+        added["wind_direction"] = np.where(added["wind_speed"] == 0, np.nan, towards)  # calm air comes from nowhere
         text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"
     finding = Finding(kind="speed-from-components", severity=Severity.NOTE, count=len(x), what=text, fix=fix)
     return replace(reading, channels={**channels, **added}, findings=(*reading.findings, finding))

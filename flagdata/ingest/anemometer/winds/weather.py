@@ -42,9 +42,10 @@ def with_weather(found: Found, wind: Wind, *, many: bool) -> Wind:
 
 def _weather(found: Found, index: int, channel: str) -> Column | None:
     heading, value = found.headings[index], found.values[index]
-    median = float(np.nanmedian(value))
     if fits(channel, heading.unit):
         return Column(index=index, unit=heading.unit, told=f"in {heading.unit} by its heading")
+    known = value[value >= 0]  # none is below zero, in K too: -9999 stands for no value
+    median = float(np.median(known)) if len(known) else np.nan
     guess: str | None = None
     if heading.unit is None and channel == "relative_humidity" and 1.5 < float(np.nanmax(value)) <= 115:
         guess = "%"

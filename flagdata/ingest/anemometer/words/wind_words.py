@@ -14,7 +14,7 @@ SPEED = frozenset(
         "windgeschwindigkeit", "vit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
         "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "geschw", "wg", "wv", "mph", "kmh", "kph", "knots",
-        "windstrength", "velmedia", "vvento", "vviento", "vvent",
+        "windstrength", "winspd", "winspeed", "velmedia", "vvento", "vviento", "vvent",
     }
 )  # fmt: skip
 DIRECTION = frozenset(
@@ -22,7 +22,7 @@ DIRECTION = frozenset(
         "dir", "direction", "richtung", "windrichtung", "wd", "wdir", "winddir", "winddirection", "wnddir", "drct",
         "dd", "vane", "wvane", "windvane", "angle", "direccion", "dirección", "direção", "direcao", "richting",
         "windrichting", "direzione", "retning", "vindretning", "riktning", "vindriktning", "wddir", "wdr", "wdire",
-        "deg", "winddeg", "azimuth", "bearing", "provenienza", "direcció", "direc",
+        "deg", "winddeg", "azimuth", "bearing", "provenienza", "direcció", "direc", "windir",
     }
 )  # fmt: skip
 SURE_DIRECTION = DIRECTION - {"angle", "deg", "azimuth", "bearing", "dd", "vane"}

@@ -75,3 +75,21 @@ def test_an_extreme_read_for_itself_is_told_the_direction_of_its_mean(log_file: 
         _LISTED + _rows("2026-05-01 {at:02d}:00:00+00:00,-3.5,-3.25,81.5,{speed}.25,{speed}.75,{turned}.5,")
     )
     assert "the direction 'DW1' is that of 'VW1'" in _notes(read_log(path, WindOptions(wind="VW1_max")))
+
+
+@pytest.mark.parametrize(
+    ("speed", "direction", "its"),
+    [
+        ("MSNB_N Wind speed (m/s)", "MSNB_S Wind from direction (deg)", False),
+        ("MSNB_N Wind speed (m/s)", "MSNB_N Wind from direction (deg)", True),
+        ("mast 1 wind speed (m/s)", "mast 2 wind direction (deg)", False),
+        ("met_wind speed (m/s)", "met_wind direction (deg)", True),
+    ],
+)
+def test_a_direction_of_another_place_is_not_that_of_a_speed(
+    log_file: Write, speed: str, direction: str, its: bool
+) -> None:
+    path = log_file(f"time,{speed},{direction}\n" + _rows("2026-05-01T{at:02d}:00:00Z,{speed}.5,{turned}"))
+    log = read_log(path, WindOptions(wind=None))
+    assert ("wind_direction" in log.series.channels) is its
+    assert its or direction in _notes(log)

@@ -387,3 +387,10 @@ def test_a_stream_of_several_talkers_without_time_names_both_at_once(read: Read)
         read("$36MWV,353.4,R,0.92,M\n$37MWV,353.4,R,0.92,M\n$36MWV,350.4,R,0.97,M\n")
     assert "--talker" in caught.value.fix
     assert "ZDA" in caught.value.fix
+
+
+def test_components_of_calm_air_have_no_direction(read: Read) -> None:
+    lines = ["Q,+000.00,+000.00,M,00,", *(f"Q,+00{1 + i}.00,+00{1 + i}.00,M,00," for i in range(4))]
+    direction = read(stamped(lines), azimuth=0.0).series.channels["wind_direction"]
+    assert np.isnan(direction[0])
+    assert direction[1:] == pytest.approx([np.radians(135)] * 4)

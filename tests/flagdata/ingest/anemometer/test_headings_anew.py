@@ -73,3 +73,20 @@ def test_a_stamp_that_few_rows_have_is_not_their_time(log_file: Write) -> None:
     log = read_log(log_file(rows), WindOptions(wind="3", unit="m/s"))
     assert len(set(log.series.time.tolist())) == 40
     assert "unreadable-stamps" not in {finding.kind for finding in log.findings}
+
+
+def test_rows_of_two_cells_and_rows_of_other_widths_above_the_table_are_told(log_file: Write) -> None:
+    words = "time,wind_dir\n2026-05-01 15:31:43,Southeast by South\n2026-05-01 15:33:10,Southwest by West\n"
+    later = "".join(f"2026-05-02T00:{at:02d}:00Z,{200 + at}.5\n" for at in range(30))
+    log = read_log(log_file(words + later), WindOptions(columns="time,wind_direction[deg]", zone="UTC"))
+    told = [finding.what for finding in log.findings if finding.kind == "heading-doubtful"]
+    assert any("lines 2 to 3 hold 2 rows of another form" in text for text in told)
+    wider = "".join(f"{at},43337.5{at:02d},{at % 4}.5,1,2,3\n" for at in range(8))
+    rows = "".join(f"2026-05-02T00:{at:02d}:00Z,{3 + at % 4}.5\n" for at in range(40))
+    log = read_log(log_file(wider + rows), WindOptions(columns="time,wind_speed[m/s]"))
+    told = [finding.what for finding in log.findings if finding.kind == "heading-doubtful"]
+    assert any("8 of lines 1 to 8 hold numbers as the rows do" in text for text in told)
+    counted = "".join(f"{at},{3 + at % 4}.5\n" for at in range(40))
+    log = read_log(log_file(wider + counted), WindOptions(columns=",wind_speed[m/s]", start=0, rate=1.0))
+    told = [finding.what for finding in log.findings if finding.kind == "heading-doubtful"]
+    assert any("8 of lines 1 to 8 hold numbers as the rows do" in text for text in told)

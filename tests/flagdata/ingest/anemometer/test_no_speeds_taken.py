@@ -198,3 +198,32 @@ def test_a_sniff_says_what_a_file_was_rewritten_from(log_file: Write) -> None:
     rows = [f'{{"time": "2026-05-01T{at:02d}:00:00Z", "wind_speed_ms": {2 + at}}}' for at in range(12)]
     notes = sniff(log_file("\n".join(rows) + "\n"))[0].notes
     assert notes[0].startswith("JSON, read as a table of 2 columns")
+
+
+def test_the_direction_beside_a_difference_goes_with_it(log_file: Write) -> None:
+    """Blocks with the same headings, whose differences of directions look like directions but for their sign."""
+    rows = [
+        f"2026-05-01T{at:02d}:00:00Z,{1 + 0.3 * (at % 5):.2f},{10 + at},{1.2 + 0.2 * (at % 4):.2f},{330 + at},"
+        f"{0.3 * (at % 5) - 0.2 - 0.2 * (at % 4):.2f},{40 - 3 * at}"
+        for at in range(12)
+    ]
+    path = log_file(_table("time,wind_speed,wind_dir,wind_speed,wind_dir,wind_speed,wind_dir", rows))
+    series = read_log(path, WindOptions(wind="wind_speed#4", unit="m/s")).series
+    np.testing.assert_allclose(np.degrees(series.channels["wind_direction"]), 330 + np.arange(12))
+
+
+def test_marks_of_quality_are_no_second_wind(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{3 + 0.1 * at:.1f},{at % 2}" for at in range(12)]
+    path = log_file(_table("time,TOW.FF_10M_10 [m/s],TOW.Q_FF_10M_10", rows))
+    assert anemometers(path) == ()  # one
+    notes = " ".join(finding.what for finding in read_log(path, WindOptions()).findings)
+    assert "'TOW.Q_FF_10M_10' holds marks of another column" in notes
+
+
+def test_ticks_beside_a_direction_are_counts_and_no_speed(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{at}.5,{600 + at},{200 + at}" for at in range(12)]
+    path = log_file(_table("time,R_u [deg],NumTicks [Cnt],Wind direction [degrees]", rows))
+    for options in (WindOptions(), WindOptions(columns="1=time,3=wind_speed,4=wind_direction[deg]")):
+        with pytest.raises(InputError, match=r"'NumTicks .Cnt.' is what an anemometer counts") as raised:
+            read_log(path, options)
+        assert "3=wind_speed[? m/s],4=wind_direction[deg]" in (raised.value.fix or "")

@@ -103,3 +103,17 @@ def test_a_column_that_is_headed_as_a_wind_and_holds_words_is_not_offered(read: 
     assert "2=wind_speed" not in line
     found = read(text, columns="1=time,3=wind_speed[m/s]")
     assert found.series.channels["wind_speed"][:2].tolist() == pytest.approx([9.5, 10.5])
+
+
+def test_the_direction_that_its_heading_names_goes_before_other_angles(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{at}.5,{200 + at}\n" for at in range(12))
+    with pytest.raises(InputError) as caught:
+        read(f"time,R_u [deg],Wind direction [degrees]\n{rows}")
+    assert "wind_direction[deg]" in (caught.value.fix or "")
+    assert re.search(r'--columns "time,[^,]*,wind_direction\[deg\]', caught.value.fix or "")
+
+
+def test_nothing_in_place_of_a_question_mark_is_no_column(read: Read) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{200 + at}\n" for at in range(12))
+    log = read(f"time,angle\n{rows}", columns="1=time,2=wind_direction[deg],=wind_speed[]")
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx(np.arange(200, 212))

@@ -188,3 +188,10 @@ def test_a_year_outside_the_accepted_ones_is_told_from_what_is_no_date(year: int
     stamps = parse([f"{year}-05-01T12:00:00Z", "2026-02-30T12:00:00Z", "2026-05-01T12:00:00Z", "noon"], "iso")
     assert stamps.valid.tolist() == [False, False, True, False]
     assert stamps.distant.tolist() == [True, False, False, False]
+
+
+def test_a_fraction_may_stand_behind_a_sign_that_is_no_point() -> None:
+    for form in ("%Y%m%d_%H%M%S_%f", "%Y%m%d_%H%M%S_%U"):
+        found = parse(["20150101_001000_000000", "20150101_001000_250000"], form)
+        assert found.valid.all()
+        assert (found.ns - ns("2015-01-01T00:10:00")).tolist() == [0, S // 4]

@@ -164,9 +164,15 @@ def test_text_of_another_kind_is_called_by_name_with_what_to_do(log_file: Write,
         read_log(log_file(text), WindOptions())
 
 
-def test_a_platform_that_moves_is_told_beside_a_wind_that_does_not_say_whose(read: Read) -> None:
-    log = read(table("Wind Speed (kn),Boat Speed (kn)", ["12,5.1", "13,5.2"]))
-    assert "shows that the platform moves" in warned(log)
+def test_a_platform_that_moves_is_asked_about_beside_a_wind_that_does_not_say_whose(read: Read) -> None:
+    text = table("Wind Speed (kn),Boat Speed (kn)", ["12,5.1", "13,5.2"])
+    with pytest.raises(InputError, match="shows that the platform moves") as raised:
+        read(text)
+    assert "--platform moving" in (raised.value.fix or "")
+    assert "wind_speed" in read(text, platform="fixed").series.channels
+    moving = read(text, platform="moving")
+    assert "apparent_wind_speed" in moving.series.channels
+    assert "over ground" not in warned(moving)
 
 
 def test_a_speed_that_nothing_calls_the_winds_is_told(read: Read) -> None:

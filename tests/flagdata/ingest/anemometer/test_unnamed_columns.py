@@ -163,3 +163,16 @@ def test_a_speed_that_the_user_names_by_its_number_tells_that_no_direction_is_re
     assert '--columns "1=time,4=wind_speed[m/s],?=wind_direction[deg]"' in told
     read = read_log(log_file(rows), WindOptions(columns="1=time,5=wind_direction[deg],4=wind_speed[m/s]", zone="UTC"))
     np.testing.assert_allclose(np.rad2deg(read.series.channels["wind_direction"][:2]), [20.5, 21.5], atol=1e-9)
+
+
+def test_a_date_that_stands_twice_before_the_clock_is_read_once(log_file: Write) -> None:
+    """Year, day of the year, month, day and a clock, as tables of Antarctic stations have them."""
+    rows = "".join(
+        f"2014 {32 + at // 24:3d} {2:2d} {1 + at // 24:2d} {at % 24:02d}00 {-6.7 - at % 3:6.1f} {1.5 + at % 4:6.1f}\n"
+        for at in range(72)
+    )
+    path = log_file(f"Year: 2014  Month: 02  ID: BAT\n{rows}")
+    log = read_log(path, WindOptions(wind="7", unit="m/s", zone="UTC"))
+    assert iso(int(log.series.time[0])) == "2014-02-01T00:00:00Z"
+    assert np.unique(np.diff(log.series.time)).tolist() == [3600 * 10**9]
+    assert len(log.series) == 72

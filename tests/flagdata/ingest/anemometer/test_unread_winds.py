@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.errors import InputError
 from flagdata.ingest.anemometer import WindOptions, read_log
 
 Write = Callable[[str], Path]
@@ -104,10 +105,18 @@ def test_a_table_with_a_place_and_an_attitude_is_of_a_platform_that_may_move(log
     rows = "".join(
         f"2026-05-01T12:{at:02d}:00Z,None,None,{at % 3}.5,{100 + at}.0,-1{at}.0\n" for at in range(12)
     )  # fmt: skip
-    log = read_log(
-        log_file(f"time,gps_lat,gps_lon,Data_Wind_spd,Data_Wind_dir,IMU_roll\n{rows}"), WindOptions(unit="kn")
-    )
-    told = " ".join(finding.what for finding in log.findings if finding.severity == "warning")
-    assert "'IMU_roll' shows that the platform moves" in told
+    path = log_file(f"time,gps_lat,gps_lon,Data_Wind_spd,Data_Wind_dir,IMU_roll\n{rows}")
+    with pytest.raises(InputError, match="'IMU_roll' shows that the platform moves"):
+        read_log(path, WindOptions(unit="kn"))
+    log = read_log(path, WindOptions(unit="kn", platform="moving"))
+    assert {"apparent_wind_speed", "apparent_wind_direction"} <= set(log.series.channels)
     still = read_log(log_file(f"time,a,b,wind_spd,wind_dir,roll\n{rows}"), WindOptions(unit="kn"))
     assert not any("platform moves" in finding.what for finding in still.findings)
+
+
+def test_a_gust_is_offered_with_the_wind_in_whose_rows_it_stands(log_file: Write) -> None:
+    rapid = [f"2026-05-01T12:{at:02d}:00Z,{at % 4}.5,{100 + at},,," for at in range(0, 24, 2)]
+    means = [f"2026-05-01T12:{at:02d}:00Z,,,{at % 3}.5,{200 + at},{4 + at % 3}.5" for at in range(1, 24, 2)]
+    heading = "time,rapid wind speed [m/s],rapid wind direction,wind speed [m/s],wind direction,wind gust [m/s]"
+    path = log_file("\n".join([heading, *sorted(rapid + means)]) + "\n")
+    assert '"1=time,5=wind_direction[deg],6=wind_speed[m/s]"' in _note(path, wind="rapid wind speed [m/s]")
