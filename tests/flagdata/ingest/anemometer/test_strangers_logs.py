@@ -459,7 +459,8 @@ def test_degrees_called_otherwise_go_before_points_of_the_compass(read: Read) ->
 def test_the_angle_of_the_true_wind_is_no_direction_from_north(log_file: Write) -> None:
     rows = "".join(f"2026-05-01T12:00:{at:02d}Z,5.1,10.0,40,{200 + at}\n" for at in range(12))
     log = read_log(
-        log_file(f"Time,BoatSpeed,TrueWindSpeed,TrueWindAngle,TrueWindDirection\n{rows}"), WindOptions(unit="kn")
+        log_file(f"Time,BoatSpeed,TrueWindSpeed,TrueWindAngle,TrueWindDirection\n{rows}"),
+        WindOptions(unit="kn", platform="corrected"),
     )
     np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"][:2]), [200, 201])
 

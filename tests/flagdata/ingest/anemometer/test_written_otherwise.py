@@ -137,7 +137,7 @@ def test_rows_above_the_first_that_is_read_are_told(log_file: Write) -> None:
         rows += [f"{at}.5\t0.2" for at in range(3)] if day < 12 else []
     path = log_file("\n".join(rows) + "\n")
     log = read_log(path, WindOptions(columns="day,month,year,,,,,wind_speed[m/s],,", zone="UTC"))
-    told = [f.what for f in log.findings if "are divided as the rows are" in f.what]
+    told = [f.what for f in log.findings if "hold numbers as the rows do" in f.what]
     assert len(log.series.time) == 28 or told
 
 
