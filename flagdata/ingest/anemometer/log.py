@@ -92,7 +92,15 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
     ordered = in_order(reading, where=str(path), choice=options.clock, source=source)
     reading = zero.settle(possible.impossible(ordered), choice)
-    for check in (quality.faults, quality.negative, quality.dead_zone, quality.idle, quality.stale, quality.at_nyquist):
+    for check in (
+        quality.faults,
+        quality.negative,
+        quality.dead_zone,
+        quality.idle,
+        quality.one_direction,
+        quality.stale,
+        quality.at_nyquist,
+    ):
         reading = _apply(reading, check)
     findings = (*reading.findings, *quality.gaps(reading), *future.report(reading, now=time.time_ns()))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))

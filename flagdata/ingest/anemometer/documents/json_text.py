@@ -233,7 +233,14 @@ def _listed_instants(row: Mapping[str, str]) -> list[str]:
 def _in_unit_of_all(
     whole: Any, table: list[dict[str, str]], names: dict[str, None]
 ) -> tuple[list[dict[str, str]], dict[str, None]]:
-    """The rows and columns, of which speeds without a unit have the one unit that the whole object states for all."""
+    """The rows and columns with the units that the whole object states, one for all speeds or one for each name."""
+    of_each = next((own for key in ("unit", "units") if isinstance(own := _member(whole, key), dict)), None)
+    if of_each is not None:
+        named = {name: of_each.get(name.rpartition(".")[2]) for name in names}
+        return _renamed(table, names, {
+            name: f"{name} [{unit}]" for name, unit in named.items()
+            if isinstance(unit, str) and spelled(unit) is not None and understand(name).unit is None
+        })  # fmt: skip
     stated = [whole.get(key) for key in ("unit", "units")] if isinstance(whole, dict) else []
     known = next((unit for text in stated if isinstance(text, str) and (unit := spelled(text)) is not None), None)
     if known is None:
@@ -243,6 +250,17 @@ def _in_unit_of_all(
         name: f"{name} [{known}]" for name, heading in headings.items()
         if heading.quantity.endswith("wind_speed") and heading.unit is None and fits("wind_speed", known)
     }  # fmt: skip
+    return _renamed(table, names, renamed)
+
+
+def _member(whole: Any, key: str) -> Any:
+    return whole.get(key) if isinstance(whole, dict) else None
+
+
+def _renamed(
+    table: list[dict[str, str]], names: dict[str, None], renamed: Mapping[str, str]
+) -> tuple[list[dict[str, str]], dict[str, None]]:
+    """The rows and columns under other names."""
     changed = [{renamed.get(name, name): cell for name, cell in row.items()} for row in table]
     return changed, {renamed.get(name, name): None for name in names}
 

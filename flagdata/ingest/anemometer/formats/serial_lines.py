@@ -49,6 +49,11 @@ _MONTH = re.compile(
     r"\s*[\"\[(]?(?P<day>\d{1,2})[-/ ](?P<month>[A-Za-z]{3})[-/ ](?P<year>\d{4})[T ,;:\t]"
     r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
 )
+_CTIME = re.compile(
+    r"\s*[\"\[(]?(?:[A-Za-z]{3},? )?(?P<month>[A-Za-z]{3}) +(?P<day>\d{1,2}) (?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?) "
+    r"(?P<year>\d{4})[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
+)
+"""As C's asctime and Python's time.asctime write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971 2018"."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 LONGEST = 2000
 """Characters of the longest line of an instrument; longer ones are something else."""
@@ -111,7 +116,7 @@ def split_stamp(line: str) -> tuple[str, str]:
         stamp = f"{match['date']}T{match['time']}{match['zone'] or ''}"
         raw = _unquoted(match["raw"])
         return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
-    match = _MONTH.match(line)
+    match = _MONTH.match(line) or _CTIME.match(line)
     if match is not None and match["month"].lower() in MONTHS:
         month = MONTHS.index(match["month"].lower()) + 1
         return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}", _unquoted(match["raw"])

@@ -44,6 +44,8 @@ DATES_SHARED = 0.5
 """Share of the rows that share a date without a time of day, from which they are refused."""
 ISOLATED = 0.2
 """Share of the pairs of neighbours that share a stamp, up to which the alike among them are taken for copies."""
+_JOINED = 3
+"""Places where time runs backwards from which on the rows are in no order, and no clock was set back."""
 COPIES, COPIED = 2.0, 0.1
 """Changes of the values within stamps that readings would have shown, and the share of them that copies may show."""
 
@@ -194,15 +196,20 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, se
     if count > few:
         backwards = np.flatnonzero(np.diff(time) < 0) + 1
         at = int(backwards[np.argmax(lag[backwards])])
-        ways = ["split the file there and ingest the parts by themselves"]
-        if settable:
-            whose = "--clock first (before it) or --clock last (after it)"
-            ways.append(f"or, if one log's clock was set anew, say whose stamps are right: {whose}")
-        ways.append("or, if all stamps are right and only the rows are out of order: --clock sort")
+        sort = "if all stamps are right and only the rows are out of order: --clock sort"
+        whose = (
+            "if one log's clock was set anew, say whose stamps are right: --clock first (before it) or --clock last "
+        )
+        ways = [f"or, {whose}(after it)"] if settable else []
+        why = "the logger's clock was set back, or files were joined"
+        if len(backwards) > _JOINED:
+            ways = [sort, *ways, "if rows of several stations are mixed, name the column that tells them apart as site"]
+            why = f"so it does in {len(backwards)} places, where rows are in no order or of several stations"
+        else:
+            ways = ["split the file there and ingest the parts by themselves", *ways, f"or, {sort}"]
         raise TimeError(
             f"time runs backwards by {lag[at] / NANOSECONDS:.1f} s, from {iso(int(time[at] + lag[at]))} to "
-            f"{iso(int(time[at]))}, and {count} rows would have to go: the logger's clock was set back, or files were "
-            "joined",
+            f"{iso(int(time[at]))}, and {count} rows would have to go: {why}",
             where=f"{where}, line {reading.line[at]}",
             fix="; ".join(ways),
         )  # fmt: skip

@@ -25,6 +25,8 @@ STALE_SHORTEST = 5
 """Rows; a shorter run of repeats is never called stale."""
 STALE_SECONDS = 1.0
 """A shorter run is never called stale either: fast loggers read a smoothed signal several times over."""
+VANE_ROWS, VANE_SPEEDS = 20, 3
+"""Rows and different speeds from which on a direction that stays the same is told."""
 STUCK_SECONDS = 60.0
 STUCK_REPEATS = 60
 """Wind that reads the same for as long as this [s], so many times, is stale whatever the rest of the log looks like."""
@@ -205,6 +207,30 @@ def idle(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
             )
         )  # fmt: skip
     return flags, tuple(found)
+
+
+def one_direction(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Directions that are the same in every row of a wind that varies, and speeds and directions that are all 0."""
+    flags = np.zeros(len(reading.time), dtype=np.uint16)
+    speed, towards = reading.channels.get("wind_speed"), reading.channels.get("wind_direction")
+    if speed is None or towards is None:
+        return flags, ()
+    known = np.isfinite(speed) & np.isfinite(towards)
+    if int(known.sum()) < VANE_ROWS or len(np.unique(towards[known])) > 1:
+        return flags, ()
+    at = float(np.degrees(towards[known][0]))
+    what = f"wind_direction is {at:g}° in all {int(known.sum())} rows"
+    if not speed[known].any():
+        what += " and wind_speed is 0: calm air all along, or columns that were never filled"
+    elif len(np.unique(speed[known])) >= VANE_SPEEDS:
+        what += ", while the speed varies: a vane that is stuck, not connected or not set up"
+    else:
+        return flags, ()
+    found = Finding(
+        kind="direction-stays", severity=Severity.WARNING, count=int(known.sum()), value=at, what=what,
+        where=f"line {reading.line[known][0]}", fix="check the vane, its cable and the column",
+    )  # fmt: skip
+    return flags, (found,)
 
 
 def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:

@@ -9,6 +9,7 @@ from flagdata.ingest.anemometer.winds.found import Wind
 from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
 from flagdata.ingest.anemometer.words.headings import words_of
 
+_SECTORS = frozenset({"sixteenths", "45 deg"})
 _EXTREMES = GUSTS | MAXIMA | MINIMA | {"peak", "lull"}
 
 
@@ -20,6 +21,11 @@ def warnings(layout: Layout, wind: Wind) -> tuple[str, ...]:
         found.append(
             f"column {layout.names[speed.index]!r} holds gusts or extremes by its heading: stored as wind_speed, as "
             "you said, though it is no mean"
+        )
+    if direction is not None and direction.unit in _SECTORS:
+        found.append(
+            f"column {layout.names[direction.index]!r} is taken as sectors of the compass that are counted clockwise "
+            "from north, the first of which is 0, as you said: compare one with a wind that is known"
         )
     if direction is not None and bow.to_bow(layout, direction.index):
         found.append(

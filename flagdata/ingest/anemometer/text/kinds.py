@@ -20,8 +20,8 @@ _STAMP = re.compile(
 _DAY_OF_WEEK = r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]{0,6}\.?,?\s+"
 _MONTH_NAME = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]{0,6}\.?,?"
 _MONTH_STAMP = re.compile(
-    r"(\d{1,2}[- ])?[A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*"
-    rf"|(?:{_DAY_OF_WEEK})?(?:\d{{1,2}}[- ])?{_MONTH_NAME}\s+\d{{1,4}}\b.*"
+    r"\d{1,2}[- ][A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*"
+    rf"|(?:{_DAY_OF_WEEK})?(?:\d{{1,2}}[- ])?{_MONTH_NAME}[-\s]+\d{{1,4}}\b.*"
 )
 _QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:;+-]\s?){{1,8}}(?:-1)?)")
 OF_LOGS = frozenset({"m/s", "rad", "K", "Pa", "1"})

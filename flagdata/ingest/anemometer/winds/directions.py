@@ -72,11 +72,12 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
     whole, several = bool(np.all(known % 1 == 0)), len(np.unique(known)) > _FEW
     if heading.unit in (None, "deg") and low >= 0 and high <= 16 and whole and several:
         eight = high <= _EIGHT
+        counted = ("sixteenths",) if high < 16 else ()  # of sixteen that are counted from 0 none is 16
         return Judged(
             left_out=f"holds sectors of the compass ({low:g} to {high:g}), no angle; left out; they may be the "
             f"{'eight or the ' if eight else ''}sixteen from north on, counted from 0, or tens of degrees; where they "
             "begin elsewhere, a recipe's offset turns them",
-            may_be=("45 deg", "sixteenths", "10 deg", "deg") if eight else ("sixteenths", "10 deg", "deg"),
+            may_be=("45 deg", *counted, "10 deg", "deg") if eight else (*counted, "10 deg", "deg"),
         )
     if heading.misstated:
         return _misstated(heading.misstated, low, high)

@@ -72,10 +72,11 @@ def differences(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int
         columns: speeds.
     """
     found: dict[int, tuple[int, int]] = {}
+    varying = [at for at in columns if len(np.unique(values[at][np.isfinite(values[at])])) > 1]
     for index in columns:
         if not bool(np.any(values[index] < 0)):
             continue
-        for first, second in permutations([at for at in columns if at != index], 2):
+        for first, second in permutations([at for at in varying if at != index], 2):
             off = np.abs(values[first] - values[second] - values[index])
             known = off[np.isfinite(off)]
             if len(known) >= _ROWS and float((known <= _ROUNDED).mean()) >= _SHARE:

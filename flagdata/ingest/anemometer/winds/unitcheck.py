@@ -31,6 +31,8 @@ FASTEST = 60.0
 """Speed [m/s] above which a value, other than a gust, is doubted; hurricanes of category 4 begin at 58 m/s."""
 IMPOSSIBLE = 75.0
 """Median [m/s] that no wind has, by which a unit is doubted of however few rows."""
+_FASTEST_OF_ALL = 120.0
+"""Number that few speeds of a log reach in any unit."""
 DAY = 86_400.0
 _STEPS: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("mph", (1.0, 0.5, 0.1)), ("kn", (1.0, 0.5, 0.1)), ("km/h", (1.0, 0.1)), ("m/s", (1.0, 0.5, 0.1)),
@@ -103,7 +105,8 @@ def likely(values: NDArray[np.float64]) -> Evidence | None:
     median, high = float(np.median(known)), float(np.quantile(known, 0.99))
     if high > FASTEST or median > WINDY:
         slower = median * unit("km/h").scale > STORMY
-        return Evidence(unit="km/day" if slower else "km/h", reason=_too_fast(median, high, "m/s"))
+        reason = _too_fast(median, high, "m/s") + _or_angles(known)
+        return Evidence(unit="km/day" if slower else "km/h", reason=reason)
     return None
 
 
@@ -135,7 +138,7 @@ def contradiction(
         return None
     ordinary = (name for name in others if median * unit(name).scale / scale <= STORMY)
     other = next(ordinary, others[0])
-    reason = _too_fast(median / scale, high / scale, stated)
+    reason = _too_fast(median / scale, high / scale, stated) + _or_angles(known / scale)
     if tenths:
         smaller = "0.1 m/s" if median < 10 * FASTEST / 3 else "0.01 m/s"
         reason += f"; whole numbers may also be in {smaller} (--unit '{smaller}')"
@@ -153,6 +156,12 @@ def gust_factor(mean: NDArray[np.float64], gust: NDArray[np.float64]) -> float |
 
 def _too_fast(median: float, high: float, name: str) -> str:
     return f"half of the values are above {median:.3g}, one in a hundred above {high:.3g}: in {name} an extreme wind"
+
+
+def _or_angles(values: NDArray[np.float64]) -> str:
+    """What is said of numbers beyond every wind that may be directions."""
+    low, high = float(values.min()), float(values.max())
+    return "; all are between 0 and 360, as directions are" if low >= 0 and _FASTEST_OF_ALL < high <= 360 else ""
 
 
 def _finding(channel: str, stated: str, found: Evidence) -> Finding:

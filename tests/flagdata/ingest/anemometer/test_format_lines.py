@@ -394,3 +394,13 @@ def test_components_of_calm_air_have_no_direction(read: Read) -> None:
     direction = read(stamped(lines), azimuth=0.0).series.channels["wind_direction"]
     assert np.isnan(direction[0])
     assert direction[1:] == pytest.approx([np.radians(135)] * 4)
+
+
+def test_stamps_as_asctime_writes_them_are_read_before_sentences(read: Read) -> None:
+    body = [f"WIMWV,{100 + at},T,003.{at},M,A" for at in range(8)]
+    lines = [f"[Tue Jul 17 12:48:{36 + at:02d}.971 2018] ${text}*{checksum(text):02X}" for at, text in enumerate(body)]
+    log = read("\n".join(lines), zone="-07:00")
+    assert log.format == "nmea-stamped"
+    assert iso(int(log.series.time[0])) == "2018-07-17T19:48:36.971Z"
+    assert log.series.channels["theoretical_wind_speed"] == pytest.approx(3 + np.arange(8) / 10)
+    assert split_stamp("Jul  7 12:48:36 2018 > $X")[0] == "2018-07-07T12:48:36"

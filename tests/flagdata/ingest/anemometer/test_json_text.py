@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, LimitError, TimeError
@@ -131,3 +132,11 @@ def test_lists_of_one_length_are_columns_with_their_units_and_zone_told(
     series = read_log(path, WindOptions(zone="+02:00")).series
     assert series.channels["wind_speed"].tolist() == pytest.approx(SPEEDS)
     assert series.time[0] == START * 10**9
+
+
+def test_units_of_each_name_beside_a_list_of_readings_are_theirs(read: Read) -> None:
+    rows = [{"timestamp": 1613977312 + 600 * at, "wind_speed": 2.7 + at, "temperature": 281.0} for at in range(12)]
+    units = {"wind_speed": "km/h", "temperature": "K", "wind_direction": "none"}
+    found = read(json.dumps({"data_count": 12, "units": units, "values": rows}))
+    assert found.series.channels["wind_speed"] == pytest.approx((2.7 + np.arange(12)) / 3.6)
+    assert found.series.channels["air_temperature"] == pytest.approx(281.0)

@@ -227,3 +227,10 @@ def test_ticks_beside_a_direction_are_counts_and_no_speed(log_file: Write) -> No
         with pytest.raises(InputError, match=r"'NumTicks .Cnt.' is what an anemometer counts") as raised:
             read_log(path, options)
         assert "3=wind_speed[? m/s],4=wind_direction[deg]" in (raised.value.fix or "")
+
+
+def test_a_speed_is_no_difference_with_a_column_that_was_never_filled(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{3 - at}.5,0.0,{3 - at}.5" for at in range(12)]
+    path = log_file(_table("time,craft wind speed [m/s],wind speed [m/s],radial wind speed [m/s]", rows))
+    notes = " ".join(finding.what for finding in read_log(path, WindOptions(wind="wind speed [m/s]")).findings)
+    assert " less " not in notes

@@ -331,3 +331,22 @@ def test_a_log_without_one_usable_wind_is_kept_for_what_else_it_measured(read: R
     (finding,) = [f for f in log.findings if f.kind == "no-usable-wind"]
     assert (finding.severity, finding.count) == (Severity.ERROR, 200)
     assert "air_temperature" in finding.what
+
+
+@pytest.mark.parametrize(
+    ("speed", "direction", "says"),
+    [
+        (gusts(40), np.zeros(40), "a vane that is stuck"),
+        (np.zeros(40), np.zeros(40), "columns that were never filled"),
+        (gusts(40), np.linspace(0, 1, 40), ""),
+        (np.full(40, 3.0), np.ones(40), ""),  # `stale` tells readings that repeat
+        (gusts(12), np.zeros(12), ""),  # a short log may hold one direction
+    ],
+)
+def test_a_direction_that_stays_while_the_speed_varies_is_told(
+    speed: np.ndarray, direction: np.ndarray, says: str
+) -> None:
+    log = reading(T0 + np.arange(len(speed)) * 60 * S, wind_speed=speed, wind_direction=direction)
+    _, found = quality.one_direction(log)
+    assert kinds(found) == (["direction-stays"] if says else [])
+    assert says in " ".join(one.what for one in found)

@@ -483,8 +483,16 @@ def test_sixteenths_are_an_eighth_of_pi_each(log_file: Write) -> None:
     path = log_file(f"time,Wind speed (m/s),Wind direction\n{rows}")
     assert any("sixteenths" in finding.what for finding in read_log(path).findings)
     line = "time,wind_speed[m/s],wind_direction[sixteenths]"
-    channels = read_log(path, WindOptions(columns=line)).series.channels
-    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 22.5 * np.arange(16))
+    log = read_log(path, WindOptions(columns=line))
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"]), 22.5 * np.arange(16))
+    assert any("counted clockwise from north, the first of which is 0" in finding.what for finding in log.findings)
+
+
+def test_numbers_up_to_16_are_no_sixteen_sectors_counted_from_0(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{at}\n" for at in range(17))
+    log = read_log(log_file(f"time,Wind speed (m/s),Wind direction\n{rows}"))
+    assert "wind_direction" not in log.series.channels
+    assert not any("[sixteenths]" in finding.what for finding in log.findings)
 
 
 @pytest.mark.parametrize(("constant", "doubted"), [("4", True), ("30", True), ("0", False), ("270", False)])
